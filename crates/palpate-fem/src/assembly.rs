@@ -1,0 +1,144 @@
+//! Stiffness and mass of the whole body, in 3×3 blocks by node pairs.
+//!
+//! K [N/m] has a block for each pair of nodes that share an element; the consistent mass M [kg] is a
+//! number times the unit matrix for each, so both live on one sparsity.
+
+use crate::discretisation::Discretisation;
+use crate::element::{Elasticity, ElementMatrices};
+use crate::material::lame_constants;
+use faer::{Mat, MatRef};
+use glam::DMat3;
+use palpate::Material;
+use rayon::prelude::*;
+
+/// K and M on a common pattern, both triangles, rows sorted.
+#[derive(Debug, Clone)]
+pub struct Assembly {
+    /// Where each node's row starts; length nodes + 1.
+    pub offsets: Vec<usize>,
+    /// Column nodes, ascending within a row.
+    pub columns: Vec<u32>,
+    /// Stiffness blocks [N/m].
+    pub stiffness: Vec<DMat3>,
+    /// Mass entries [kg].
+    pub mass: Vec<f64>,
+}
+
+/// Which of the two matrices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Which {
+    /// K.
+    Stiffness,
+    /// M.
+    Mass,
+}
+
+impl Assembly {
+    /// Sum the element matrices; `materials` has one entry per region.
+    pub fn new(discretisation: &Discretisation, materials: &[Material]) -> Self {
+        let n = discretisation.nodes.len();
+        let per = discretisation.order.nodes();
+
+        // Pattern: elements of each node, then their nodes.
+        let mut starts = vec![0_usize; n + 1];
+        discretisation
+            .elements
+            .iter()
+            .for_each(|&node| starts[node as usize + 1] += 1);
+        (0..n).for_each(|i| starts[i + 1] += starts[i]);
+        let mut owners = vec![0_u32; discretisation.elements.len()];
+        let mut fill = starts.clone();
+        for (at, &node) in discretisation.elements.iter().enumerate() {
+            owners[fill[node as usize]] = (at / per) as u32;
+            fill[node as usize] += 1;
+        }
+        let element = |e: u32| &discretisation.elements[e as usize * per..][..per];
+        let rows: Vec<Vec<u32>> = (0..n)
+            .into_par_iter()
+            .map(|node| {
+                let of_node = &owners[starts[node]..starts[node + 1]];
+                let mut row: Vec<u32> = of_node.iter().flat_map(|&e| element(e)).copied().collect();
+                row.sort_unstable();
+                row.dedup();
+                row
+            })
+            .collect();
+        let mut offsets = vec![0; n + 1];
+        rows.iter()
+            .enumerate()
+            .for_each(|(i, row)| offsets[i + 1] = offsets[i] + row.len());
+        let columns = rows.concat();
+
+        // Values.
+        let elasticities: Vec<Elasticity> = materials
+            .iter()
+            .map(|material| {
+                let (lambda, mu) = lame_constants(material);
+                Elasticity {
+                    lambda,
+                    mu,
+                    density: material.density_kg_m3,
+                }
+            })
+            .collect();
+        let mut stiffness = vec![DMat3::ZERO; columns.len()];
+        let mut mass = vec![0.0; columns.len()];
+        for (nodes, &region) in discretisation.element_nodes().zip(&discretisation.regions) {
+            let corners = [0, 1, 2, 3].map(|at| discretisation.nodes[nodes[at] as usize]);
+            let ElementMatrices {
+                stiffness: k,
+                mass: m,
+            } = discretisation
+                .order
+                .matrices(corners, elasticities[region as usize]);
+            for (i, &node) in nodes.iter().enumerate() {
+                let row = offsets[node as usize]..offsets[node as usize + 1];
+                for (j, other) in nodes.iter().enumerate() {
+                    if let Ok(at) = columns[row.clone()].binary_search(other) {
+                        stiffness[row.start + at] += k[i * per + j];
+                        mass[row.start + at] += m[i * per + j];
+                    }
+                }
+            }
+        }
+        Self {
+            offsets,
+            columns,
+            stiffness,
+            mass,
+        }
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// K·X or M·X for a block of columns with 3·nodes rows.
+    pub fn multiply(&self, which: Which, x: MatRef<'_, f64>) -> Mat<f64> {
+        let mut y = Mat::zeros(x.nrows(), x.ncols());
+        y.par_col_iter_mut()
+            .zip(x.par_col_iter())
+            .for_each(|(mut out, column)| {
+                let at = |node: u32| {
+                    let base = 3 * node as usize;
+                    glam::DVec3::new(column[base], column[base + 1], column[base + 2])
+                };
+                for node in 0..self.nodes() {
+                    let row = self.offsets[node]..self.offsets[node + 1];
+                    let nodes = self.columns[row.clone()].iter();
+                    let sum: glam::DVec3 = match which {
+                        Which::Stiffness => nodes
+                            .zip(&self.stiffness[row])
+                            .map(|(&c, k)| *k * at(c))
+                            .sum(),
+                        Which::Mass => nodes.zip(&self.mass[row]).map(|(&c, &m)| at(c) * m).sum(),
+                    };
+                    for (axis, value) in sum.to_array().into_iter().enumerate() {
+                        out[3 * node + axis] = value;
+                    }
+                }
+            });
+        y
+    }
+}

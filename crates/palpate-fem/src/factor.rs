@@ -1,0 +1,295 @@
+//! Sparse factors of K + s·M: the only place that knows faer's and METIS' types.
+//!
+//! Constrained degrees of freedom keep their row with a diagonal entry alone, so that sizes never change;
+//! a right-hand side is zero there. For s ≥ 0 the factor is Cholesky's; for s < 0 the inertia of
+//! L·B·Lᵀ (pivots of size one and two) counts the eigenvalues of the pencil below −s (Sylvester).
+
+use crate::assembly::Assembly;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::perm::Perm;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalIntranodeLbltRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+use std::sync::Arc;
+
+/// Why a factor could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FactorError {
+    /// The matrix is not positive definite: the body can still move without resistance.
+    #[error("the stiffness matrix is not positive definite (at row {0})")]
+    NotPositiveDefinite(usize),
+    /// The ordering or the symbolic analysis failed; most likely memory ran out.
+    #[error("the sparse factor cannot be set up ({0})")]
+    Setup(String),
+}
+
+/// Elimination order and pattern of the factor: made once per mesh.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    symbolic: Arc<SymbolicCholesky<usize>>,
+}
+
+/// A Cholesky factor.
+#[derive(Debug)]
+pub struct Factor {
+    symbolic: Arc<SymbolicCholesky<usize>>,
+    constrained: Vec<usize>,
+    values: Vec<f64>,
+}
+
+/// Below this many nodes the ordering is left as it is: there is nothing to gain.
+const ORDER_FROM: usize = 64;
+
+fn parallel() -> Par {
+    Par::rayon(0)
+}
+
+impl Pattern {
+    /// Analyse the pattern of a body.
+    ///
+    /// # Errors
+    /// [`FactorError::Setup`].
+    pub fn new(assembly: &Assembly) -> Result<Self, FactorError> {
+        let n = assembly.nodes();
+        let setup = |e: &dyn std::fmt::Debug| FactorError::Setup(format!("{e:?}"));
+        let order: Vec<usize> = if n < ORDER_FROM {
+            (0..n).collect()
+        } else {
+            nested_dissection(assembly)?
+        };
+        let forward: Vec<usize> = order
+            .iter()
+            .flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2])
+            .collect();
+        let mut inverse = vec![0; forward.len()];
+        forward
+            .iter()
+            .enumerate()
+            .for_each(|(new, &old)| inverse[old] = new);
+        let order = Perm::new_checked(
+            forward.into_boxed_slice(),
+            inverse.into_boxed_slice(),
+            3 * n,
+        );
+        let matrix = lower_triangle(assembly, &vec![false; 3 * n], 0.0);
+        let parameters = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..CholeskySymbolicParams::default()
+        };
+        let ordering = SymmetricOrdering::Custom(order.as_ref());
+        let symbolic =
+            factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, parameters)
+                .map_err(|e| setup(&e))?;
+        Ok(Self {
+            symbolic: Arc::new(symbolic),
+        })
+    }
+
+    /// Numbers that a factor on this pattern stores.
+    pub fn stored_values(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
+    /// Cholesky factor of K + `shift`·M; `constrained` has one entry per degree of freedom.
+    ///
+    /// # Errors
+    /// [`FactorError::NotPositiveDefinite`].
+    pub fn factor(
+        &self,
+        assembly: &Assembly,
+        constrained: &[bool],
+        shift: f64,
+    ) -> Result<Factor, FactorError> {
+        let matrix = lower_triangle(assembly, constrained, shift);
+        let mut values = vec![0.0; self.symbolic.len_val()];
+        let scratch = self
+            .symbolic
+            .factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
+        let mut memory = MemBuffer::new(scratch);
+        self.symbolic
+            .factorize_numeric_llt::<f64>(
+                &mut values,
+                matrix.as_ref(),
+                Side::Lower,
+                Default::default(),
+                parallel(),
+                MemStack::new(&mut memory),
+                Default::default(),
+            )
+            .map_err(|error| match error {
+                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
+                    FactorError::NotPositiveDefinite(index)
+                }
+            })?;
+        let constrained = (0..constrained.len())
+            .filter(|&row| constrained[row])
+            .collect();
+        Ok(Factor {
+            symbolic: self.symbolic.clone(),
+            constrained,
+            values,
+        })
+    }
+
+    /// Number of eigenvalues of K·φ = ω²·M·φ with ω² < `below`, rigid motions included.
+    pub fn eigenvalues_below(
+        &self,
+        assembly: &Assembly,
+        constrained: &[bool],
+        below: f64,
+    ) -> usize {
+        let matrix = lower_triangle(assembly, constrained, -below);
+        let n = matrix.ncols();
+        let mut values = vec![0.0; self.symbolic.len_val()];
+        let (mut subdiagonal, mut forward, mut inverse) =
+            (vec![0.0; n], vec![0_usize; n], vec![0_usize; n]);
+        let scratch = self
+            .symbolic
+            .factorize_numeric_intranode_lblt_scratch::<f64>(parallel(), Default::default());
+        let mut memory = MemBuffer::new(scratch);
+        self.symbolic.factorize_numeric_intranode_lblt::<f64>(
+            &mut values,
+            &mut subdiagonal,
+            &mut forward,
+            &mut inverse,
+            matrix.as_ref(),
+            Side::Lower,
+            parallel(),
+            MemStack::new(&mut memory),
+            Default::default(),
+        );
+        let SymbolicCholeskyRaw::Supernodal(supernodal) = self.symbolic.raw() else {
+            return 0;
+        };
+        let permutation =
+            Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), n);
+        let factor = SupernodalIntranodeLbltRef::new(
+            supernodal,
+            &values,
+            &subdiagonal,
+            permutation.as_ref(),
+        );
+        let mut negative = 0;
+        for supernode in (0..supernodal.n_supernodes()).map(|s| factor.supernode(s)) {
+            let block = supernode.val();
+            let mut j = 0;
+            while j < block.ncols() {
+                let off = subdiagonal[supernode.start() + j];
+                if off == 0.0 {
+                    negative += usize::from(block[(j, j)] < 0.0);
+                    j += 1;
+                } else {
+                    let (a, c) = (block[(j, j)], block[(j + 1, j + 1)]);
+                    negative += if a * c < off * off {
+                        1
+                    } else {
+                        2 * usize::from(a < 0.0)
+                    };
+                    j += 2;
+                }
+            }
+        }
+        negative
+    }
+}
+
+impl Factor {
+    /// Solve for a block of columns in place; rows of constrained degrees of freedom are zeroed first,
+    /// so that their solution is zero.
+    pub fn solve(&self, mut columns: MatMut<'_, f64>) {
+        for &row in &self.constrained {
+            columns.as_mut().row_mut(row).fill(0.0);
+        }
+        let symbolic = &*self.symbolic;
+        let scratch = symbolic.solve_in_place_scratch::<f64>(columns.ncols(), Par::Seq);
+        let mut memory = MemBuffer::new(scratch);
+        LltRef::<usize, f64>::new(symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            columns,
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
+    }
+}
+
+/// Lower triangle of K + `shift`·M in compressed columns.
+fn lower_triangle(
+    assembly: &Assembly,
+    constrained: &[bool],
+    shift: f64,
+) -> SparseColMat<usize, f64> {
+    let n = assembly.nodes();
+    // Struck-out entries stay as zeros, so that one pattern serves every set of constraints; on the diagonal
+    // they keep their own stiffness, so that scaling stays even.
+    let (mut offsets, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+    for node in 0..n {
+        let row = assembly.offsets[node]..assembly.offsets[node + 1];
+        for axis in 0..3 {
+            let column = 3 * node + axis;
+            for at in row.clone() {
+                let other = assembly.columns[at] as usize;
+                for part in 0..3 {
+                    let line = 3 * other + part;
+                    if line < column {
+                        continue;
+                    }
+                    let struck_out = constrained[line] || constrained[column];
+                    // K is symmetric: entry (line, column) is block(node, other)[axis][part].
+                    let mut value = assembly.stiffness[at].col(part)[axis];
+                    if part == axis && !struck_out {
+                        value += shift * assembly.mass[at];
+                    }
+                    if struck_out && line != column {
+                        value = 0.0;
+                    }
+                    rows.push(line);
+                    values.push(value);
+                }
+            }
+            offsets.push(rows.len());
+        }
+    }
+    let symbolic = SymbolicSparseColMat::new_checked(3 * n, 3 * n, offsets, None, rows);
+    SparseColMat::new(symbolic, values)
+}
+
+/// Nested dissection of the node graph by METIS; gives old numbers in elimination order.
+fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, FactorError> {
+    let n = assembly.nodes();
+    let too_large = |_| FactorError::Setup("more than 2³¹ entries".into());
+    let mut starts = vec![0_i32];
+    let mut neighbours = Vec::new();
+    for node in 0..n {
+        let row = &assembly.columns[assembly.offsets[node]..assembly.offsets[node + 1]];
+        neighbours.extend(
+            row.iter()
+                .filter(|&&other| other as usize != node)
+                .map(|&other| other as i32),
+        );
+        starts.push(i32::try_from(neighbours.len()).map_err(too_large)?);
+    }
+    let mut count = i32::try_from(n).map_err(too_large)?;
+    let (mut order, mut inverse) = (vec![0_i32; n], vec![0_i32; n]);
+    // SAFETY: the arrays have the lengths that METIS 5 states for METIS_NodeND (starts n + 1, order and
+    // inverse n, neighbours as starts say, without self loops); null asks for no weights and defaults.
+    let status = unsafe {
+        metis_sys::METIS_NodeND(
+            &mut count,
+            starts.as_mut_ptr(),
+            neighbours.as_mut_ptr(),
+            std::ptr::null_mut(),
+            std::ptr::null_mut(),
+            order.as_mut_ptr(),
+            inverse.as_mut_ptr(),
+        )
+    };
+    if status != metis_sys::rstatus_et_METIS_OK {
+        return Err(FactorError::Setup(format!("METIS returned {status}")));
+    }
+    Ok(order.into_iter().map(|node| node as usize).collect())
+}

@@ -1,0 +1,418 @@
+//! The lowest elastic modes: K·φ = ω²·M·φ.
+//!
+//! Block Krylov on the operator G·M (see `system`), whose eigenvalues on the elastic motions are 1/ω²:
+//! a random block, M-orthonormal, is multiplied again and again, every new block is made orthogonal to all
+//! before (twice), and the operator is projected on the basis (Rayleigh-Ritz). A mode counts as found when
+//! |G·M·φ − φ/ω²| in the norm of M is below [`TOLERANCE`]/ω². A block finds as many copies of
+//! a repeated eigenvalue as it has columns; that none is missed is checked with the inertia of K − s·M for
+//! an s in a gap just above the last mode, and the basis is extended by a fresh random block if one is.
+//! References: Golub & Underwood 1977 (block Lanczos); Grimes, Lewis & Simon 1994, SIAM J. Matrix Anal. 15, 228.
+
+use crate::progress::Progress;
+use crate::system::System;
+use faer::{Mat, MatRef, Side};
+use glam::DVec3;
+
+/// Elastic modes of a body.
+#[derive(Debug, Clone)]
+pub struct Modes {
+    /// ω² [rad²/s²], ascending.
+    pub squares: Vec<f64>,
+    /// Φ [1/√kg], a column per mode, orthonormal in M.
+    pub shapes: Mat<f64>,
+}
+
+/// Why modes could not be found.
+#[derive(Debug, thiserror::Error)]
+pub enum ModesError {
+    /// More modes are asked for than there are.
+    #[error(
+        "{wanted} modes are wanted, the model has {available} elastic modes: use a finer mesh or --modes {available}"
+    )]
+    TooMany {
+        /// Asked for.
+        wanted: usize,
+        /// Degrees of freedom less rigid motions.
+        available: usize,
+    },
+    /// The body has motions without stiffness beside the rigid ones.
+    #[error("{0}")]
+    Mechanism(String),
+    /// The iteration did not reach its tolerance.
+    #[error(
+        "the modes did not converge: {found} of {wanted} after a basis of {basis}, largest residual {residual:e}; \
+         the mesh may have slivers or materials that differ by many orders"
+    )]
+    NoConvergence {
+        /// Modes within tolerance.
+        found: usize,
+        /// Asked for.
+        wanted: usize,
+        /// Columns of the basis.
+        basis: usize,
+        /// Relative residual of the last wanted mode.
+        residual: f64,
+    },
+    /// The inertia count and the modes found disagree.
+    #[error("{counted} modes lie below {frequency_hz} Hz, but {found} were found")]
+    Missed {
+        /// By inertia.
+        counted: usize,
+        /// By the iteration.
+        found: usize,
+        /// The bound.
+        frequency_hz: f64,
+    },
+    /// A dense decomposition failed.
+    #[error("dense eigenproblem: {0}")]
+    Dense(String),
+}
+
+/// Relative residual of a mode; the frequency's error is of its square, the shape's of its size over the gap.
+const TOLERANCE: f64 = 1e-9;
+
+/// Columns that are multiplied at once: more than any multiplicity that symmetry forces (3 for a cube, 7 for
+/// the low modes of a ball), and enough for the solves to run at full speed.
+const BLOCK: usize = 16;
+
+/// Up to this many degrees of freedom all modes are computed densely, in about a second.
+const DENSE_UP_TO: usize = 900;
+
+/// Two neighbours in the spectrum are a gap when ω² differs by this share.
+const GAP: f64 = 1e-5;
+
+/// ω² below this share of the typical elastic one is a mechanism: a hinge that no shape resists.
+const MECHANISM_BELOW: f64 = 1e-10;
+
+/// The `wanted` lowest elastic modes.
+///
+/// # Errors
+/// See [`ModesError`].
+pub fn lowest_modes(
+    system: &System,
+    wanted: usize,
+    progress: &mut dyn Progress,
+) -> Result<Modes, ModesError> {
+    let available = system.elastic_modes();
+    if wanted > available {
+        return Err(ModesError::TooMany { wanted, available });
+    }
+    // The Krylov basis needs room: several columns per mode.
+    let dense = system.discretisation.dofs() <= DENSE_UP_TO || 3 * wanted + 8 * BLOCK > available;
+    let modes = if dense {
+        all_modes(system, wanted, progress)?
+    } else {
+        krylov(system, wanted, progress)?
+    };
+    check_mechanism(system, &modes)?;
+    Ok(modes)
+}
+
+/// A size of elastic ω² for the body: (c_s/diameter)², from the stiffest entries' ratio would depend on the mesh.
+fn check_mechanism(system: &System, modes: &Modes) -> Result<(), ModesError> {
+    let (Some(&first), Some(&last)) = (modes.squares.first(), modes.squares.last()) else {
+        return Ok(());
+    };
+    if first > MECHANISM_BELOW * last {
+        return Ok(());
+    }
+    // Where the loose part moves most.
+    let shape = modes.shapes.col(0);
+    let size = |n: usize| DVec3::new(shape[3 * n], shape[3 * n + 1], shape[3 * n + 2]).length();
+    let nodes = &system.discretisation.nodes;
+    let worst = (0..nodes.len())
+        .max_by(|&a, &b| size(a).total_cmp(&size(b)))
+        .unwrap_or(0);
+    let p = nodes[worst];
+    Err(ModesError::Mechanism(format!(
+        "the body has a motion without stiffness beside the rigid ones: a part near ({:.6}, {:.6}, {:.6}) m hangs \
+         on a hinge (an edge or a node alone)",
+        p.x, p.y, p.z
+    )))
+}
+
+fn krylov(
+    system: &System,
+    wanted: usize,
+    progress: &mut dyn Progress,
+) -> Result<Modes, ModesError> {
+    let n = system.discretisation.dofs();
+    let available = system.elastic_modes();
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut basis = Basis {
+        columns: Mat::zeros(n, 0),
+        projected: Vec::new(),
+    };
+    let mut block = random_block(system, &mut random);
+    progress.begin("modes", wanted as u64);
+    let (mut reported, mut checked_missing) = (0, 0);
+    loop {
+        let Some(accepted) = basis.append(system, block) else {
+            return Err(no_convergence(0, wanted, basis.len(), f64::NAN));
+        };
+        let image = system.elastic_compliance(system.mass_times(accepted.as_ref()));
+        let (next, coefficients) = basis.orthogonalise(system, image);
+        basis.projected.push(coefficients);
+        block = next;
+
+        // Rayleigh-Ritz now and then: it costs the cube of the basis.
+        let full = basis.len() + BLOCK > available;
+        if basis.len() < wanted + 2 * BLOCK || !(basis.len() / BLOCK).is_multiple_of(6) && !full {
+            continue;
+        }
+        let ritz = basis.ritz(system, &block)?;
+        let found = ritz
+            .residuals
+            .iter()
+            .take_while(|r| **r < TOLERANCE)
+            .count();
+        progress.advance((found.min(wanted) - reported) as u64);
+        reported = found.min(wanted);
+        // A gap at or above the last wanted mode, among those found.
+        let gap = (wanted..found).find(|&at| ritz.squares[at] > ritz.squares[at - 1] * (1.0 + GAP));
+        let Some(gap) = gap else {
+            if full || basis.len() > 12 * wanted + 40 * BLOCK {
+                let residual = ritz.residuals.get(wanted - 1).copied().unwrap_or(f64::NAN);
+                return Err(no_convergence(found, wanted, basis.len(), residual));
+            }
+            continue;
+        };
+        let bound = (ritz.squares[gap - 1] * ritz.squares[gap]).sqrt();
+        let counted = system.elastic_modes_below(bound);
+        if counted == gap {
+            return Ok(Modes {
+                squares: ritz.squares[..wanted].to_vec(),
+                shapes: &basis.columns * ritz.vectors.subcols(0, wanted),
+            });
+        }
+        checked_missing += 1;
+        if checked_missing > 4 || counted < gap {
+            let frequency_hz = bound.sqrt() / std::f64::consts::TAU;
+            return Err(ModesError::Missed {
+                counted,
+                found: gap,
+                frequency_hz,
+            });
+        }
+        // Something hides from this Krylov space: fresh directions beside the next ones find it.
+        let (fresh, _) = basis.orthogonalise(system, random_block(system, &mut random));
+        let width = block.ncols();
+        block.resize_with(fresh.nrows(), width + fresh.ncols(), |i, j| {
+            fresh[(i, j - width)]
+        });
+    }
+}
+
+fn no_convergence(found: usize, wanted: usize, basis: usize, residual: f64) -> ModesError {
+    ModesError::NoConvergence {
+        found,
+        wanted,
+        basis,
+        residual,
+    }
+}
+
+/// M-orthonormal columns and the operator projected on them.
+struct Basis {
+    columns: Mat<f64>,
+    /// Per block: Vᵀ·M·G·M·V_block for the columns that stood when it was multiplied.
+    projected: Vec<Mat<f64>>,
+}
+
+struct Ritz {
+    squares: Vec<f64>,
+    /// Relative residuals.
+    residuals: Vec<f64>,
+    vectors: Mat<f64>,
+}
+
+impl Basis {
+    fn len(&self) -> usize {
+        self.columns.ncols()
+    }
+
+    /// Take the part of a block that is orthogonal to the basis; gives coefficients too.
+    fn orthogonalise(&self, system: &System, mut block: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
+        let mut coefficients = Mat::zeros(self.len(), block.ncols());
+        for _ in 0..2 {
+            let share = self.columns.transpose() * system.mass_times(block.as_ref());
+            block -= &self.columns * &share;
+            coefficients += share;
+        }
+        (block, coefficients)
+    }
+
+    /// Make a block M-orthonormal and append it; none when the block has lost its rank.
+    fn append(&mut self, system: &System, mut block: Mat<f64>) -> Option<Mat<f64>> {
+        system.remove_rigid(&mut block);
+        orthonormalise(system, &mut block)?;
+        let old = self.len();
+        self.columns
+            .resize_with(block.nrows(), old + block.ncols(), |i, j| {
+                block[(i, j - old)]
+            });
+        Some(block)
+    }
+
+    /// Eigenpairs of the projected operator; `next` is the part of its last image that leaves the basis.
+    fn ritz(&self, system: &System, next: &Mat<f64>) -> Result<Ritz, ModesError> {
+        let dim = self.len();
+        let mut h = Mat::<f64>::zeros(dim, dim);
+        let mut start = 0;
+        for block in &self.projected {
+            for (j, i) in (0..block.ncols()).flat_map(|j| (0..block.nrows()).map(move |i| (j, i))) {
+                // Rows that came after the block are given by symmetry.
+                h[(i, start + j)] = block[(i, j)];
+                h[(start + j, i)] = block[(i, j)];
+            }
+            start += block.ncols();
+        }
+        // faer's eigensolver wants entries near 1.
+        let scale = h.norm_max();
+        h *= faer::Scale(1.0 / scale);
+        let eigen = h
+            .self_adjoint_eigen(Side::Lower)
+            .map_err(|e| ModesError::Dense(format!("{e:?}")))?;
+        let vectors = Mat::from_fn(dim, dim, |i, j| eigen.U()[(i, dim - 1 - j)]);
+        let values: Vec<f64> = (0..dim).map(|j| eigen.S()[dim - 1 - j] * scale).collect();
+        // |G·M·φ − θφ| = |next·(last rows of y)|, with the Gram matrix of `next`.
+        let gram = next.transpose() * system.mass_times(next.as_ref());
+        let last = vectors.subrows(dim - next.ncols(), next.ncols());
+        let weighted = &gram * last;
+        let residuals = (0..dim).map(|j| {
+            let square: f64 = (0..next.ncols())
+                .map(|i| last[(i, j)] * weighted[(i, j)])
+                .sum();
+            square.max(0.0).sqrt() / values[j].abs()
+        });
+        Ok(Ritz {
+            squares: values.iter().map(|theta| 1.0 / theta).collect(),
+            residuals: residuals.collect(),
+            vectors,
+        })
+    }
+}
+
+/// Cholesky-QR in the product of M, twice for full precision. None when columns are dependent.
+fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
+    for _ in 0..2 {
+        // Columns to unit size first: Krylov blocks shrink by many orders.
+        let gram = block.transpose() * system.mass_times(block.as_ref());
+        let sizes: Vec<f64> = (0..gram.ncols())
+            .map(|j| gram[(j, j)].max(0.0).sqrt())
+            .collect();
+        if sizes.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+            return None;
+        }
+        let unit = Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| {
+            gram[(i, j)] / (sizes[i] * sizes[j])
+        });
+        let llt = unit.llt(Side::Lower).ok()?;
+        // B ← B·D⁻¹·L⁻ᵀ.
+        let mut transposed = Mat::from_fn(block.ncols(), block.nrows(), |j, i| {
+            block[(i, j)] / sizes[j]
+        });
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+            llt.L(),
+            transposed.as_mut(),
+            faer::Par::rayon(0),
+        );
+        *block = transposed.transpose().to_owned();
+    }
+    Some(())
+}
+
+fn random_block(system: &System, random: &mut Random) -> Mat<f64> {
+    let noise = Mat::from_fn(system.discretisation.dofs(), BLOCK, |_, _| random.next());
+    // One application of the operator damps the jagged part of the noise.
+    system.elastic_compliance(system.mass_times(noise.as_ref()))
+}
+
+/// A fixed sequence of numbers in −½…½, so that the same mesh gives the same bits (Marsaglia's xorshift).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+/// All modes by a dense decomposition of L⁻¹·K·L⁻ᵀ with M = L·Lᵀ; the second route, and the one for small bodies.
+///
+/// # Errors
+/// [`ModesError::Dense`].
+pub fn all_modes(
+    system: &System,
+    wanted: usize,
+    progress: &mut dyn Progress,
+) -> Result<Modes, ModesError> {
+    progress.begin("all modes, densely", 1);
+    let assembly = &system.assembly;
+    let dofs = system.discretisation.dofs();
+    let free: Vec<usize> = (0..dofs).filter(|&dof| !system.is_fixed(dof)).collect();
+    let mut place = vec![usize::MAX; dofs];
+    free.iter()
+        .enumerate()
+        .for_each(|(at, &dof)| place[dof] = at);
+    let n = free.len();
+    let (mut k, mut m) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
+    for node in 0..assembly.nodes() {
+        for at in assembly.offsets[node]..assembly.offsets[node + 1] {
+            let other = assembly.columns[at] as usize;
+            for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+                let (row, column) = (place[3 * node + a], place[3 * other + b]);
+                if row != usize::MAX && column != usize::MAX {
+                    k[(row, column)] = assembly.stiffness[at].col(b)[a];
+                    m[(row, column)] = if a == b { assembly.mass[at] } else { 0.0 };
+                }
+            }
+        }
+    }
+    let dense = |e: &dyn std::fmt::Debug| ModesError::Dense(format!("{e:?}"));
+    let llt = m.llt(Side::Lower).map_err(|e| dense(&e))?;
+    let lower_solve = |x: &mut Mat<f64>| {
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+            llt.L(),
+            x.as_mut(),
+            faer::Par::rayon(0),
+        );
+    };
+    lower_solve(&mut k);
+    let mut k = k.transpose().to_owned();
+    lower_solve(&mut k);
+    let scale = k.norm_max();
+    let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) / scale);
+    let eigen = symmetric
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|e| dense(&e))?;
+    let skip = system.rigid_motions();
+    let mut vectors = eigen.U().subcols(skip, wanted).to_owned();
+    faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+        llt.L().transpose(),
+        vectors.as_mut(),
+        faer::Par::rayon(0),
+    );
+    let mut shapes = Mat::zeros(dofs, wanted);
+    for (j, (at, &dof)) in (0..wanted).flat_map(|j| free.iter().enumerate().map(move |f| (j, f))) {
+        shapes[(dof, j)] = vectors[(at, j)];
+    }
+    system.remove_rigid(&mut shapes);
+    progress.advance(1);
+    Ok(Modes {
+        squares: (0..wanted).map(|j| eigen.S()[skip + j] * scale).collect(),
+        shapes,
+    })
+}
+
+/// Largest entry of |ΦᵀMΦ − I|.
+pub fn orthonormality_error(system: &System, shapes: MatRef<'_, f64>) -> f64 {
+    let gram = shapes.transpose() * system.mass_times(shapes);
+    let error = |i: usize, j: usize| (gram[(i, j)] - f64::from(u8::from(i == j))).abs();
+    (0..gram.ncols())
+        .flat_map(|j| (0..=j).map(move |i| (i, j)))
+        .map(|(i, j)| error(i, j))
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,239 @@
+//! Residual compliance S = G − Φ·Λ⁻¹·Φᵀ on the touchable (surface) degrees of freedom.
+//!
+//! Column by column from the factor, in blocks. Stored in f32: rounding moves an entry by at most 2⁻²⁴ of
+//! itself, so each diagonal entry is raised by 2⁻²⁴ of its row's absolute sum, which keeps S positive
+//! semi-definite (Gershgorin) and changes it by less than a millionth.
+
+use crate::modes::Modes;
+use crate::progress::Progress;
+use crate::system::System;
+use faer::Mat;
+use glam::DVec3;
+use palpate::{GravityResponse, NearField, ResidualCompliance};
+use rayon::prelude::*;
+
+/// What to keep of the residual compliance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ResidualChoice {
+    /// Whole up to [`WHOLE_UP_TO`] touchable degrees of freedom, the near field beyond.
+    #[default]
+    Automatic,
+    /// Whole, whatever it takes: 2·n² bytes for n touchable degrees of freedom.
+    Whole,
+    /// The near field within a radius [m].
+    NearField(f64),
+    /// Nothing: to see what the modes alone are worth.
+    None,
+}
+
+/// Touchable degrees of freedom up to which S is kept whole: 288 MB.
+pub const WHOLE_UP_TO: usize = 12_000;
+
+/// Radius of the automatic near field in mean edges of the surface. By 4 cells S has fallen below 5 % of its
+/// diagonal; the taper keeps 94 % of an entry one edge away.
+const NEAR_EDGES: f64 = 12.0;
+
+/// Columns that are solved together on one core.
+const COLUMNS: usize = 48;
+
+/// The largest that rounding to f32 moves a number, as a share of it.
+const F32_ROUNDING: f64 = 1.0 / (1_u64 << 24) as f64;
+
+/// S on the surface nodes, given by their numbers in the discretisation.
+pub fn residual_compliance(
+    system: &System,
+    modes: &Modes,
+    surface_nodes: &[u32],
+    mean_edge: f64,
+    choice: ResidualChoice,
+    progress: &mut dyn Progress,
+) -> ResidualCompliance {
+    let touchable = 3 * surface_nodes.len();
+    match choice {
+        ResidualChoice::None => ResidualCompliance::None,
+        ResidualChoice::Automatic if touchable > WHOLE_UP_TO => near_field(
+            system,
+            modes,
+            surface_nodes,
+            NEAR_EDGES * mean_edge,
+            progress,
+        ),
+        ResidualChoice::NearField(radius) => {
+            near_field(system, modes, surface_nodes, radius, progress)
+        }
+        ResidualChoice::Automatic | ResidualChoice::Whole => {
+            whole(system, modes, surface_nodes, progress)
+        }
+    }
+}
+
+/// Row of the surface's degree of freedom in the system.
+fn dof(surface_nodes: &[u32], touchable: usize) -> usize {
+    3 * surface_nodes[touchable / 3] as usize + touchable % 3
+}
+
+/// Columns of S at the surface for a range of touchable degrees of freedom: columns[j][i] = S_ij.
+fn columns(
+    system: &System,
+    modes: &Modes,
+    surface_nodes: &[u32],
+    range: std::ops::Range<usize>,
+) -> Vec<Vec<f64>> {
+    let n = system.discretisation.dofs();
+    let mut loads = Mat::zeros(n, range.len());
+    for (column, touchable) in range.clone().enumerate() {
+        loads[(dof(surface_nodes, touchable), column)] = 1.0;
+    }
+    let mut solved = system.elastic_compliance(loads);
+    // Less what the modes give: Φ·(Λ⁻¹·Φᵀ·e).
+    let shares = Mat::from_fn(modes.squares.len(), range.len(), |i, column| {
+        modes.shapes[(dof(surface_nodes, range.start + column), i)] / modes.squares[i]
+    });
+    solved -= &modes.shapes * shares;
+    let at_surface = |column: usize| {
+        (0..3 * surface_nodes.len())
+            .map(|row| solved[(dof(surface_nodes, row), column)])
+            .collect()
+    };
+    (0..range.len()).map(at_surface).collect()
+}
+
+/// Visit every column of S once, a few blocks at a time on all cores.
+fn for_each_column(
+    system: &System,
+    modes: &Modes,
+    surface_nodes: &[u32],
+    progress: &mut dyn Progress,
+    mut visit: impl FnMut(usize, &[f64]),
+) {
+    let touchable = 3 * surface_nodes.len();
+    progress.begin("residual compliance", touchable as u64);
+    let starts: Vec<usize> = (0..touchable).step_by(COLUMNS).collect();
+    for batch in starts.chunks(rayon::current_num_threads()) {
+        let solved: Vec<_> = batch
+            .par_iter()
+            .map(|&start| {
+                columns(
+                    system,
+                    modes,
+                    surface_nodes,
+                    start..(start + COLUMNS).min(touchable),
+                )
+            })
+            .collect();
+        for (&start, block) in batch.iter().zip(&solved) {
+            block
+                .iter()
+                .enumerate()
+                .for_each(|(at, column)| visit(start + at, column));
+            progress.advance(block.len() as u64);
+        }
+    }
+}
+
+fn whole(
+    system: &System,
+    modes: &Modes,
+    surface_nodes: &[u32],
+    progress: &mut dyn Progress,
+) -> ResidualCompliance {
+    let touchable = 3 * surface_nodes.len();
+    let mut packed = vec![0.0_f32; touchable * (touchable + 1) / 2];
+    let mut diagonal = vec![0.0; touchable];
+    for_each_column(system, modes, surface_nodes, progress, |j, column| {
+        for (i, &value) in column.iter().enumerate().skip(j) {
+            packed[i * (i + 1) / 2 + j] = value as f32;
+        }
+        diagonal[j] = column[j] + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
+    });
+    for (i, value) in diagonal.into_iter().enumerate() {
+        packed[i * (i + 1) / 2 + i] = value as f32;
+    }
+    ResidualCompliance::Whole(packed)
+}
+
+fn near_field(
+    system: &System,
+    modes: &Modes,
+    surface_nodes: &[u32],
+    radius: f64,
+    progress: &mut dyn Progress,
+) -> ResidualCompliance {
+    let positions: Vec<DVec3> = surface_nodes
+        .iter()
+        .map(|&node| system.discretisation.nodes[node as usize])
+        .collect();
+    let mut near = NearField {
+        radius,
+        offsets: vec![0],
+        nodes: Vec::new(),
+        blocks: Vec::new(),
+    };
+    // S is symmetric: column j is row j. Blocks above the diagonal are copied from below at the end, so
+    // that both triangles are the same numbers.
+    for_each_column(system, modes, surface_nodes, progress, |j, column| {
+        let (node, axis) = (j / 3, j % 3);
+        if axis == 0 {
+            let within = (0..positions.len())
+                .filter(|&i| (positions[i] - positions[node]).length() < radius);
+            near.nodes.extend(within.map(|i| i as u32));
+            near.blocks.resize(9 * near.nodes.len(), 0.0);
+            near.offsets.push(near.nodes.len() as u32);
+        }
+        let row = near.offsets[node] as usize..near.nodes.len();
+        let mut sum = 0.0;
+        for at in row.clone() {
+            let other = near.nodes[at] as usize;
+            let taper = NearField::taper((positions[other] - positions[node]).length() / radius);
+            for part in 0..3 {
+                let value = column[3 * other + part] * taper;
+                near.blocks[9 * at + 3 * axis + part] = value as f32;
+                sum += value.abs();
+            }
+        }
+        if let Some(own) = row.into_iter().find(|&at| near.nodes[at] as usize == node) {
+            near.blocks[9 * own + 4 * axis] = (column[j] + F32_ROUNDING * sum) as f32;
+        }
+    });
+    for node in 0..positions.len() {
+        for at in near.offsets[node] as usize..near.offsets[node + 1] as usize {
+            let other = near.nodes[at] as usize;
+            let row = near.offsets[other] as usize..near.offsets[other + 1] as usize;
+            if other > node {
+                continue;
+            }
+            if let Ok(mirror) = near.nodes[row.clone()].binary_search(&(node as u32)) {
+                for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+                    if other < node || a > b {
+                        near.blocks[9 * (row.start + mirror) + 3 * b + a] =
+                            near.blocks[9 * at + 3 * a + b];
+                    }
+                }
+            }
+        }
+    }
+    ResidualCompliance::NearField(near)
+}
+
+/// Response of a body with fixed nodes to uniform acceleration: modal forces Φᵀ·M·e and the static
+/// displacement (G − Φ·Λ⁻¹·Φᵀ)·M·e that the modes miss, for the three axes e.
+pub fn gravity_response(system: &System, modes: &Modes, surface_nodes: &[u32]) -> GravityResponse {
+    let n = system.discretisation.dofs();
+    let uniform = Mat::from_fn(n, 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
+    let weight = system.mass_times(uniform.as_ref());
+    let forces = modes.shapes.transpose() * &weight;
+    let shares = Mat::from_fn(modes.squares.len(), 3, |i, axis| {
+        forces[(i, axis)] / modes.squares[i]
+    });
+    let residual = system.elastic_compliance(weight) - &modes.shapes * shares;
+    GravityResponse {
+        modal_forces: (0..3)
+            .flat_map(|axis| (0..forces.nrows()).map(move |i| (i, axis)))
+            .map(|at| forces[at])
+            .collect(),
+        residual_displacements: (0..3 * surface_nodes.len())
+            .flat_map(|row| (0..3).map(move |axis| (row, axis)))
+            .map(|(row, axis)| residual[(dof(surface_nodes, row), axis)])
+            .collect(),
+    }
+}

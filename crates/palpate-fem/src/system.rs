@@ -1,0 +1,258 @@
+//! The elastic body as one operator: G, its elastic static compliance.
+//!
+//! For a free body K has six zero modes, the rigid motions Φr. Inertia relief balances a load by the
+//! inertia it causes, holds six degrees of freedom, and takes the rigid part out again:
+//!
+//! ```text
+//! G = (I − Φr·Φrᵀ·M)·K⁻·(I − M·Φr·Φrᵀ)        ΦrᵀMΦr = I
+//! ```
+//!
+//! K⁻ is K's inverse with the six held degrees of freedom struck out; any six that stop all rigid
+//! motion give the same G. For a body with fixed nodes G is K's inverse on the free ones.
+//! Reference: Géradin & Rixen, *Mechanical Vibrations*, 3.5.
+
+use crate::assembly::{Assembly, Which};
+use crate::discretisation::Discretisation;
+use crate::factor::{Factor, FactorError, Pattern};
+use faer::{Mat, MatRef};
+use glam::{DMat3, DVec3};
+use palpate::MassProperties;
+
+/// Assembled body with its factor.
+pub struct System {
+    /// Nodes and elements.
+    pub discretisation: Discretisation,
+    /// K and M.
+    pub assembly: Assembly,
+    /// Mass, centre, inertia.
+    pub mass: MassProperties,
+    /// Fixed nodes, ascending; empty for a free body.
+    pub fixed_nodes: Vec<u32>,
+    pattern: Pattern,
+    fixed: Vec<bool>,
+    factor: Factor,
+    rigid: Option<Rigid>,
+}
+
+/// Rigid motions of a free body, orthonormal in M.
+struct Rigid {
+    shapes: Mat<f64>,
+    weighted: Mat<f64>,
+}
+
+/// Why a system can't be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SystemError {
+    /// The fixed nodes don't hold the body.
+    #[error("{0}")]
+    Support(String),
+    /// The factor failed.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}
+
+impl System {
+    /// Factor a body; `fixed_nodes` are nodes of the discretisation, ascending.
+    ///
+    /// # Errors
+    /// When the fixed nodes leave a rigid motion, or the stiffness is not positive definite.
+    pub fn new(
+        discretisation: Discretisation,
+        assembly: Assembly,
+        fixed_nodes: Vec<u32>,
+    ) -> Result<Self, SystemError> {
+        let mass = mass_properties(&discretisation, &assembly);
+        let shapes = rigid_shapes(&discretisation, &mass);
+        let mut fixed = vec![false; discretisation.dofs()];
+        for &node in &fixed_nodes {
+            fixed[3 * node as usize..][..3].fill(true);
+        }
+        let pattern = Pattern::new(&assembly)?;
+        let (mut held, mut rigid) = (fixed.clone(), None);
+        if fixed_nodes.is_empty() {
+            for (row, _) in independent_rows(&shapes, 0..shapes.nrows()) {
+                held[row] = true;
+            }
+            let weighted = assembly.multiply(Which::Mass, shapes.as_ref());
+            rigid = Some(Rigid { shapes, weighted });
+        } else {
+            let rows = fixed_nodes
+                .iter()
+                .flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
+            let pivots = independent_rows(&shapes, rows);
+            if pivots.len() < 6 || pivots[5].1 < 1e-9 * pivots[0].1 {
+                return Err(SystemError::Support(format!(
+                    "the {} fixed nodes leave the body free to turn: fix at least three nodes that are not on one line",
+                    fixed_nodes.len()
+                )));
+            }
+        }
+        let factor = pattern.factor(&assembly, &held, 0.0)?;
+        Ok(Self {
+            discretisation,
+            assembly,
+            mass,
+            fixed_nodes,
+            pattern,
+            fixed,
+            factor,
+            rigid,
+        })
+    }
+
+    /// Cholesky factor of K + `shift`·M with the fixed nodes struck out; `shift` > 0 for a free body.
+    ///
+    /// # Errors
+    /// When it is not positive definite.
+    pub fn shifted_factor(&self, shift: f64) -> Result<Factor, FactorError> {
+        self.pattern.factor(&self.assembly, &self.fixed, shift)
+    }
+
+    /// Number of elastic modes with ω² below a bound [rad²/s²] above 0, by the inertia of K − bound·M.
+    pub fn elastic_modes_below(&self, bound: f64) -> usize {
+        self.pattern
+            .eigenvalues_below(&self.assembly, &self.fixed, bound)
+            .saturating_sub(self.rigid_motions())
+    }
+
+    /// Whether a degree of freedom is fixed.
+    pub fn is_fixed(&self, dof: usize) -> bool {
+        self.fixed[dof]
+    }
+
+    /// Number of rigid motions: 6 or 0.
+    pub fn rigid_motions(&self) -> usize {
+        if self.rigid.is_some() { 6 } else { 0 }
+    }
+
+    /// Number of elastic modes that the body has.
+    pub fn elastic_modes(&self) -> usize {
+        self.discretisation.dofs() - 3 * self.fixed_nodes.len() - self.rigid_motions()
+    }
+
+    /// G·B for a block of loads [N], one per column; displacements [m].
+    pub fn elastic_compliance(&self, mut loads: Mat<f64>) -> Mat<f64> {
+        self.balance(&mut loads);
+        self.factor.solve(loads.as_mut());
+        self.remove_rigid(&mut loads);
+        loads
+    }
+
+    /// Loads minus the inertia of the rigid motion they cause: (I − M·Φr·Φrᵀ)·B.
+    pub fn balance(&self, loads: &mut Mat<f64>) {
+        if let Some(Rigid { shapes, weighted }) = &self.rigid {
+            let share = shapes.transpose() * &*loads;
+            *loads -= weighted * share;
+        }
+    }
+
+    /// Displacements minus their rigid part: (I − Φr·Φrᵀ·M)·U; zero at fixed nodes.
+    pub fn remove_rigid(&self, displacements: &mut Mat<f64>) {
+        if let Some(Rigid { shapes, weighted }) = &self.rigid {
+            let share = weighted.transpose() * &*displacements;
+            *displacements -= shapes * share;
+        }
+        for &node in &self.fixed_nodes {
+            for axis in 0..3 {
+                displacements.row_mut(3 * node as usize + axis).fill(0.0);
+            }
+        }
+    }
+
+    /// M·X.
+    pub fn mass_times(&self, x: MatRef<'_, f64>) -> Mat<f64> {
+        self.assembly.multiply(Which::Mass, x)
+    }
+}
+
+/// Mass, centre of mass and inertia by the consistent mass matrix, which integrates linear and quadratic
+/// functions of position exactly.
+fn mass_properties(discretisation: &Discretisation, assembly: &Assembly) -> MassProperties {
+    // Moments about a point of the body, so that far-away coordinates lose no digits.
+    let origin = discretisation.nodes[0];
+    let (mut mass, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
+    for node in 0..assembly.nodes() {
+        let p = discretisation.nodes[node] - origin;
+        for at in assembly.offsets[node]..assembly.offsets[node + 1] {
+            let q = discretisation.nodes[assembly.columns[at] as usize] - origin;
+            mass += assembly.mass[at];
+            first += q * assembly.mass[at];
+            second += DMat3::from_cols(p * q.x, p * q.y, p * q.z) * assembly.mass[at];
+        }
+    }
+    let centre = first / mass;
+    second -= DMat3::from_cols(centre * centre.x, centre * centre.y, centre * centre.z) * mass;
+    second = (second + second.transpose()) * 0.5;
+    let trace = second.x_axis.x + second.y_axis.y + second.z_axis.z;
+    let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - second;
+    MassProperties {
+        mass_kg: mass,
+        center_of_mass_m: (centre + origin).to_array(),
+        inertia_kg_m2: inertia.to_cols_array_2d(),
+    }
+}
+
+/// Three translations and three rotations about the principal axes through the centre of mass, orthonormal in M.
+fn rigid_shapes(discretisation: &Discretisation, mass: &MassProperties) -> Mat<f64> {
+    let centre = DVec3::from_array(mass.center_of_mass_m);
+    let largest = mass
+        .inertia_kg_m2
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |a, b| a.max(b.abs()));
+    let scaled = Mat::from_fn(3, 3, |i, j| mass.inertia_kg_m2[i][j] / largest);
+    let mut shapes = Mat::zeros(discretisation.dofs(), 6);
+    let principal = scaled.self_adjoint_eigen(faer::Side::Lower);
+    for (node, &p) in discretisation.nodes.iter().enumerate() {
+        for axis in 0..3 {
+            shapes[(3 * node + axis, axis)] = 1.0 / mass.mass_kg.sqrt();
+        }
+        let Ok(principal) = &principal else { continue };
+        for k in 0..3 {
+            let direction = DVec3::new(
+                principal.U()[(0, k)],
+                principal.U()[(1, k)],
+                principal.U()[(2, k)],
+            );
+            let inertia = principal.S()[k] * largest;
+            let velocity = direction.cross(p - centre) / inertia.sqrt();
+            for (axis, value) in velocity.to_array().into_iter().enumerate() {
+                shapes[(3 * node + axis, 3 + k)] = value;
+            }
+        }
+    }
+    shapes
+}
+
+/// Up to six rows of an n×6 matrix that are linearly independent, with their pivots, by Gram-Schmidt with
+/// the largest remaining row each time.
+fn independent_rows(
+    shapes: &Mat<f64>,
+    candidates: impl Iterator<Item = usize>,
+) -> Vec<(usize, f64)> {
+    let mut rows: Vec<(usize, [f64; 6])> = candidates
+        .map(|row| (row, std::array::from_fn(|k| shapes[(row, k)])))
+        .collect();
+    let dot = |a: &[f64; 6], b: &[f64; 6]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut taken = Vec::new();
+    for _ in 0..6 {
+        let best = rows
+            .iter()
+            .copied()
+            .max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)));
+        let Some((row, pivot)) = best else { break };
+        let size = dot(&pivot, &pivot);
+        if size == 0.0 {
+            break;
+        }
+        taken.push((row, size.sqrt()));
+        for (_, other) in &mut rows {
+            let share = dot(other, &pivot) / size;
+            other
+                .iter_mut()
+                .zip(pivot)
+                .for_each(|(o, p)| *o -= share * p);
+        }
+    }
+    taken
+}

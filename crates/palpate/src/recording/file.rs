@@ -1,0 +1,351 @@
+//! The recording file `*.palp`: a safetensors container.
+//!
+//! Little-endian tensors with names, and one metadata entry `palpate`: JSON of [`Metadata`] and
+//! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). Reading
+//! checks the hash, then every length, index and number, and allocates no more than the file's size.
+
+use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
+use crate::error::Error;
+use crate::surface::Surface;
+use alloc::borrow::Cow;
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+use safetensors::{Dtype, SafeTensors, View};
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+
+/// Version of the file layout that is written; every earlier one stays readable.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// The entry `palpate`. The metadata's text is kept as it stands, because the hash covers it.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    metadata: Box<RawValue>,
+    content_hash: String,
+}
+
+/// One tensor to be written.
+struct Tensor {
+    dtype: Dtype,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl View for &Tensor {
+    fn dtype(&self) -> Dtype {
+        self.dtype
+    }
+    fn shape(&self) -> &[usize] {
+        &self.shape
+    }
+    fn data(&self) -> Cow<'_, [u8]> {
+        Cow::Borrowed(&self.bytes)
+    }
+    fn data_len(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+fn tensor_f64(shape: &[usize], values: impl Iterator<Item = f64>) -> Tensor {
+    Tensor {
+        dtype: Dtype::F64,
+        shape: shape.to_vec(),
+        bytes: values.flat_map(f64::to_le_bytes).collect(),
+    }
+}
+
+fn tensor_f32(shape: &[usize], values: &[f32]) -> Tensor {
+    let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    Tensor {
+        dtype: Dtype::F32,
+        shape: shape.to_vec(),
+        bytes,
+    }
+}
+
+fn tensor_u32(shape: &[usize], values: impl Iterator<Item = u32>) -> Tensor {
+    Tensor {
+        dtype: Dtype::U32,
+        shape: shape.to_vec(),
+        bytes: values.flat_map(u32::to_le_bytes).collect(),
+    }
+}
+
+/// Hash over the metadata's JSON and every tensor, in the order of their names.
+fn content_hash<'a>(
+    metadata: &str,
+    tensors: impl Iterator<Item = (&'a str, &'a [usize], &'a [u8])>,
+) -> String {
+    let mut sorted: Vec<_> = tensors.collect();
+    sorted.sort_by_key(|(name, ..)| *name);
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(metadata.as_bytes());
+    for (name, shape, bytes) in sorted {
+        hasher.update(name.as_bytes());
+        for &extent in shape {
+            hasher.update(&(extent as u64).to_le_bytes());
+        }
+        hasher.update(bytes);
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+impl Recording {
+    /// The bytes of a recording file. The same recording gives the same bytes.
+    ///
+    /// # Errors
+    /// When the recording is inconsistent.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
+        self.validate()?;
+        let (n, m) = (self.surface.positions.len(), self.modes.len());
+        let mut tensors = vec![
+            (
+                "surface.positions",
+                tensor_f64(
+                    &[n, 3],
+                    self.surface.positions.iter().flat_map(|p| p.to_array()),
+                ),
+            ),
+            (
+                "surface.triangles",
+                tensor_u32(
+                    &[self.surface.triangles.len(), 3],
+                    self.surface.triangles.iter().flatten().copied(),
+                ),
+            ),
+            (
+                "surface.source_nodes",
+                tensor_u32(&[n], self.surface.source_nodes.iter().copied()),
+            ),
+            (
+                "modes.angular_frequencies",
+                tensor_f64(&[m], self.modes.angular_frequencies.iter().copied()),
+            ),
+            (
+                "modes.damping_ratios",
+                tensor_f64(&[m], self.modes.damping_ratios.iter().copied()),
+            ),
+            (
+                "modes.mode_shapes",
+                tensor_f64(&[3 * n, m], self.modes.mode_shapes.iter().copied()),
+            ),
+        ];
+        match &self.residual {
+            ResidualCompliance::None => {}
+            ResidualCompliance::Whole(packed) => {
+                tensors.push(("residual.packed", tensor_f32(&[packed.len()], packed)));
+            }
+            ResidualCompliance::NearField(near) => {
+                tensors.push((
+                    "residual.radius",
+                    tensor_f64(&[1], [near.radius].into_iter()),
+                ));
+                tensors.push((
+                    "residual.offsets",
+                    tensor_u32(&[n + 1], near.offsets.iter().copied()),
+                ));
+                tensors.push((
+                    "residual.nodes",
+                    tensor_u32(&[near.nodes.len()], near.nodes.iter().copied()),
+                ));
+                tensors.push((
+                    "residual.blocks",
+                    tensor_f32(&[near.nodes.len(), 3, 3], &near.blocks),
+                ));
+            }
+        }
+        if let Some(gravity) = &self.gravity {
+            tensors.push((
+                "gravity.modal_forces",
+                tensor_f64(&[3, m], gravity.modal_forces.iter().copied()),
+            ));
+            tensors.push((
+                "gravity.residual_displacements",
+                tensor_f64(&[3 * n, 3], gravity.residual_displacements.iter().copied()),
+            ));
+        }
+        let json = |value: serde_json::Result<String>| {
+            value.map_err(|e| Error::Recording(format!("metadata cannot be written: {e}")))
+        };
+        let metadata = RawValue::from_string(json(serde_json::to_string(&self.metadata))?)
+            .map_err(|e| Error::Recording(format!("metadata cannot be written: {e}")))?;
+        let content_hash = content_hash(
+            metadata.get(),
+            tensors
+                .iter()
+                .map(|(name, t)| (*name, t.shape.as_slice(), t.bytes.as_slice())),
+        );
+        let header = Header {
+            metadata,
+            content_hash,
+        };
+        let header = [("palpate".to_string(), json(serde_json::to_string(&header))?)];
+        let views = tensors.iter().map(|(name, tensor)| (*name, tensor));
+        safetensors::serialize(views, Some(header.into_iter().collect()))
+            .map_err(|e| Error::Recording(format!("cannot be written: {e}")))
+    }
+
+    /// Read a recording file.
+    ///
+    /// # Errors
+    /// Names what is wrong with a file that is no recording, of a newer version, truncated,
+    /// damaged, or inconsistent.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let container = |e: safetensors::SafeTensorError| {
+            Error::Recording(format!(
+                "the file is damaged, truncated or of another kind ({e})"
+            ))
+        };
+        let (_, raw_header) = SafeTensors::read_metadata(bytes).map_err(container)?;
+        let json = raw_header
+            .metadata()
+            .as_ref()
+            .and_then(|entries| entries.get("palpate"));
+        let Some(json) = json else {
+            return Err(Error::Recording(
+                "a safetensors file, but without the metadata of palpate".into(),
+            ));
+        };
+        let header: Header = parse(json)?;
+        let VersionOnly { format_version } = parse(header.metadata.get())?;
+        if format_version != FORMAT_VERSION {
+            return Err(Error::Recording(format!(
+                "format version {format_version}, this palpate reads version {FORMAT_VERSION}: \
+                 record it again or use a newer palpate"
+            )));
+        }
+        let file = SafeTensors::deserialize(bytes).map_err(container)?;
+        let views: Vec<_> = file.iter().collect();
+        let hash = content_hash(
+            header.metadata.get(),
+            views.iter().map(|(name, v)| (*name, v.shape(), v.data())),
+        );
+        if hash != header.content_hash {
+            return Err(Error::Recording(
+                "its content does not fit its hash: the file was damaged or changed after it was written".into(),
+            ));
+        }
+        let recording = Self::from_tensors(parse(header.metadata.get())?, &Tensors(&file))?;
+        recording.validate()?;
+        Ok(recording)
+    }
+
+    fn from_tensors(metadata: Metadata, tensors: &Tensors) -> Result<Self, Error> {
+        let surface = Surface {
+            positions: tensors
+                .f64("surface.positions")?
+                .chunks_exact(3)
+                .map(DVec3::from_slice)
+                .collect(),
+            triangles: tensors
+                .u32("surface.triangles")?
+                .chunks_exact(3)
+                .map(|t| [t[0], t[1], t[2]])
+                .collect(),
+            source_nodes: tensors.u32("surface.source_nodes")?,
+        };
+        let modes = ModalBasis {
+            angular_frequencies: tensors.f64("modes.angular_frequencies")?,
+            damping_ratios: tensors.f64("modes.damping_ratios")?,
+            mode_shapes: tensors.f64("modes.mode_shapes")?,
+        };
+        let residual = if tensors.has("residual.packed") {
+            ResidualCompliance::Whole(tensors.f32("residual.packed")?)
+        } else if tensors.has("residual.blocks") {
+            ResidualCompliance::NearField(NearField {
+                radius: tensors
+                    .f64("residual.radius")?
+                    .first()
+                    .copied()
+                    .unwrap_or(f64::NAN),
+                offsets: tensors.u32("residual.offsets")?,
+                nodes: tensors.u32("residual.nodes")?,
+                blocks: tensors.f32("residual.blocks")?,
+            })
+        } else {
+            ResidualCompliance::None
+        };
+        let gravity = if tensors.has("gravity.modal_forces") {
+            Some(GravityResponse {
+                modal_forces: tensors.f64("gravity.modal_forces")?,
+                residual_displacements: tensors.f64("gravity.residual_displacements")?,
+            })
+        } else {
+            None
+        };
+        Ok(Self {
+            metadata,
+            surface,
+            modes,
+            residual,
+            gravity,
+        })
+    }
+}
+
+#[derive(Deserialize)]
+struct VersionOnly {
+    format_version: u32,
+}
+
+fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, Error> {
+    serde_json::from_str(json)
+        .map_err(|e| Error::Recording(format!("its metadata cannot be read: {e}")))
+}
+
+/// Typed access to the tensors of a file.
+struct Tensors<'a>(&'a SafeTensors<'a>);
+
+impl Tensors<'_> {
+    fn has(&self, name: &str) -> bool {
+        self.0.tensor(name).is_ok()
+    }
+
+    fn bytes(&self, name: &str, dtype: Dtype) -> Result<&[u8], Error> {
+        let tensor = self
+            .0
+            .tensor(name)
+            .map_err(|_| Error::Recording(format!("the tensor {name} is missing")))?;
+        if tensor.dtype() != dtype {
+            return Err(Error::Recording(format!(
+                "{name} holds {:?}, expected {dtype:?}",
+                tensor.dtype()
+            )));
+        }
+        Ok(tensor.data())
+    }
+
+    fn f64(&self, name: &str) -> Result<Vec<f64>, Error> {
+        let bytes = self.bytes(name, Dtype::F64)?;
+        Ok(bytes
+            .as_chunks::<8>()
+            .0
+            .iter()
+            .map(|b| f64::from_le_bytes(*b))
+            .collect())
+    }
+
+    fn f32(&self, name: &str) -> Result<Vec<f32>, Error> {
+        let bytes = self.bytes(name, Dtype::F32)?;
+        Ok(bytes
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|b| f32::from_le_bytes(*b))
+            .collect())
+    }
+
+    fn u32(&self, name: &str) -> Result<Vec<u32>, Error> {
+        let bytes = self.bytes(name, Dtype::U32)?;
+        Ok(bytes
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|b| u32::from_le_bytes(*b))
+            .collect())
+    }
+}

@@ -1,0 +1,156 @@
+//! What a recording says about itself; stored as JSON in the file.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Description of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// Version of the file's layout; see [`crate::FORMAT_VERSION`].
+    pub format_version: u32,
+    /// How force and displacement are sampled: always `held force, displacement at end of step`.
+    pub hold: String,
+    /// Unit system: always `SI`.
+    pub units: String,
+    /// Whether the body is free to move or held by fixed nodes.
+    pub support: Support,
+    /// Materials, one per region.
+    pub materials: Vec<Material>,
+    /// Damping law of the elastic modes.
+    pub damping: Damping,
+    /// Size of the finite element model.
+    pub mesh: MeshCounts,
+    /// Mass, centre and inertia.
+    pub mass: MassProperties,
+    /// How far the recording is from the unreduced finite element model; absent if not measured.
+    pub certificate: Option<Certificate>,
+    /// Where it came from.
+    pub provenance: Provenance,
+}
+
+/// Whether a body may move as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Support {
+    /// Free in space: six rigid motions.
+    Free,
+    /// Some nodes are fixed; the body frame stays where it is put.
+    Fixed,
+}
+
+/// A linear isotropic material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Material {
+    /// The region it fills; empty when there is one region.
+    pub region: String,
+    /// Young's modulus [Pa].
+    pub young_pa: f64,
+    /// Poisson's ratio [1].
+    pub poisson: f64,
+    /// Density [kg/m³].
+    pub density_kg_m3: f64,
+}
+
+/// Damping of the elastic modes. The rigid motion is not damped.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Damping {
+    /// C = αM + βK: ζ = α/(2ω) + βω/2.
+    Rayleigh {
+        /// α [1/s].
+        alpha: f64,
+        /// β [s].
+        beta: f64,
+    },
+    /// The same ratio ζ [1] for every mode.
+    Ratio(f64),
+}
+
+impl Damping {
+    /// ζ [1] of a mode with angular frequency ω [rad/s].
+    pub fn ratio(&self, angular_frequency: f64) -> f64 {
+        match *self {
+            Self::Rayleigh { alpha, beta } => {
+                alpha / (2.0 * angular_frequency) + beta * angular_frequency / 2.0
+            }
+            Self::Ratio(zeta) => zeta,
+        }
+    }
+}
+
+/// Size of the finite element model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeshCounts {
+    /// Nodes, mid-edge nodes of quadratic elements included.
+    pub nodes: u64,
+    /// Tetrahedra.
+    pub elements: u64,
+    /// 1: linear, 2: quadratic.
+    pub order: u32,
+    /// Nodes that are fixed.
+    pub fixed_nodes: u64,
+}
+
+/// Mass properties, integrated with the consistent mass matrix.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MassProperties {
+    /// Mass [kg].
+    pub mass_kg: f64,
+    /// Centre of mass [m], in the coordinates of the input mesh (after `--scale`).
+    pub center_of_mass_m: [f64; 3],
+    /// Inertia [kg·m²] about the centre of mass, in the axes of the input mesh.
+    pub inertia_kg_m2: [[f64; 3]; 3],
+}
+
+/// Force-error certificate: the recording against the unreduced finite element model, measured
+/// when it was made. All errors are relative, 0.01 is 1 %.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Largest error of the force when a sample is pressed in by a smooth ramp and held:
+    /// √(Σ|f − f_fem|² / Σ|f_fem|²) over [`CertificateEvent::duration_s`].
+    pub force_error_max: f64,
+    /// Median of the same over the samples.
+    pub force_error_median: f64,
+    /// Largest error of the static compliance of a sample.
+    pub static_compliance_error_max: f64,
+    /// Largest error of R[0] of a sample, at [`CertificateEvent::step_s`].
+    pub instantaneous_compliance_error_max: f64,
+    /// Up to this frequency the dynamic compliance of every sample is within 5 % of its static size.
+    pub bandwidth_hz: f64,
+    /// How far the reference itself may be off: the change when its last two spaces are left out.
+    pub reference_error: f64,
+    /// Number of samples: points and patches, three directions each.
+    pub samples: u64,
+    /// Number of modes of all that the finite element model has.
+    pub modes_of: [u64; 2],
+    /// The motion that the force error is measured on.
+    pub event: CertificateEvent,
+    /// Where the largest force error was found [m, body frame], and the patch radius there [m]
+    /// (0: a point).
+    pub worst_at_m: [f64; 3],
+    /// Patch radius of the worst sample [m]; 0 for a point.
+    pub worst_patch_radius_m: f64,
+}
+
+/// The press that the certificate's force error is measured on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CertificateEvent {
+    /// Step [s].
+    pub step_s: f64,
+    /// Rise time of the smooth ramp [s].
+    pub rise_s: f64,
+    /// How long force is compared [s].
+    pub duration_s: f64,
+}
+
+/// Where a recording came from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The primitive's text or the mesh file's name, without its folder.
+    pub source: String,
+    /// BLAKE3 of the mesh as computed (nodes, tetrahedra, regions), in hexadecimal.
+    pub mesh_hash: String,
+    /// Version of palpate that made it.
+    pub palpate_version: String,
+}

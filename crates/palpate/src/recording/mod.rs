@@ -1,0 +1,181 @@
+//! What offline work hands to the runtime: one body's responses, surface, mass and certificate.
+
+mod file;
+mod metadata;
+mod residual;
+
+pub use file::FORMAT_VERSION;
+pub use metadata::{
+    Certificate, CertificateEvent, Damping, MassProperties, Material, MeshCounts, Metadata,
+    Provenance, Support,
+};
+pub use residual::{NearField, ResidualCompliance};
+
+use crate::error::Error;
+use crate::surface::Surface;
+use alloc::format;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// All responses of one elastic body, in modal form with residual compliance:
+/// u = Φ·q + S·f on the surface, q by the exact recursion of each mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Units, conventions, material, mass, certificate and where it came from.
+    pub metadata: Metadata,
+    /// The free surface at rest.
+    pub surface: Surface,
+    /// The elastic modes that are kept.
+    pub modes: ModalBasis,
+    /// Static compliance of everything that the kept modes miss.
+    pub residual: ResidualCompliance,
+    /// How a body with fixed nodes sags under its weight; none for a free body, which falls.
+    pub gravity: Option<GravityResponse>,
+}
+
+/// Elastic modes, orthonormal in the mass matrix: ΦᵀMΦ = I.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalBasis {
+    /// ω [rad/s], ascending, all positive; length m.
+    pub angular_frequencies: Vec<f64>,
+    /// ζ [1], not negative; length m.
+    pub damping_ratios: Vec<f64>,
+    /// Φ [1/√kg] at the surface nodes, row by row: (3·node + axis)·m + mode.
+    pub mode_shapes: Vec<f64>,
+}
+
+/// Response of a body with fixed nodes to a uniform acceleration field, per axis of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GravityResponse {
+    /// Modal force per unit acceleration [√kg]: axis·m + mode.
+    pub modal_forces: Vec<f64>,
+    /// Static displacement that the modes miss, per unit acceleration [s²]:
+    /// (3·node + axis of displacement)·3 + axis of acceleration.
+    pub residual_displacements: Vec<f64>,
+}
+
+impl ModalBasis {
+    /// Number of modes, m.
+    pub fn len(&self) -> usize {
+        self.angular_frequencies.len()
+    }
+
+    /// Whether no mode is kept.
+    pub fn is_empty(&self) -> bool {
+        self.angular_frequencies.is_empty()
+    }
+
+    /// Φ at one surface node and axis: m numbers [1/√kg].
+    pub fn row(&self, node: usize, axis: usize) -> &[f64] {
+        let m = self.len();
+        &self.mode_shapes[(3 * node + axis) * m..][..m]
+    }
+}
+
+impl GravityResponse {
+    /// Displacement [m] of a node under an acceleration [m/s²], the part that modes miss.
+    pub fn residual_displacement(&self, node: usize, acceleration: DVec3) -> DVec3 {
+        let row =
+            |axis: usize| DVec3::from_slice(&self.residual_displacements[(3 * node + axis) * 3..]);
+        DVec3::new(
+            row(0).dot(acceleration),
+            row(1).dot(acceleration),
+            row(2).dot(acceleration),
+        )
+    }
+}
+
+impl Recording {
+    /// Mass [kg] of the body.
+    pub fn mass(&self) -> f64 {
+        self.metadata.mass.mass_kg
+    }
+
+    /// Inertia [kg·m²] about the centre of mass, in body axes.
+    pub fn inertia(&self) -> DMat3 {
+        DMat3::from_cols_array_2d(&self.metadata.mass.inertia_kg_m2)
+    }
+
+    /// Refuse what a step could trip over: lengths that don't fit, numbers that are not finite,
+    /// indices out of range, impossible physics.
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let fail = |what| Err(Error::Recording(what));
+        let (nodes, modes) = (self.surface.positions.len(), self.modes.len());
+        if nodes == 0 || self.surface.triangles.is_empty() {
+            return fail("the surface is empty".into());
+        }
+        if self.surface.source_nodes.len() != nodes {
+            return fail(format!(
+                "{} source nodes for {nodes} nodes",
+                self.surface.source_nodes.len()
+            ));
+        }
+        if let Some(t) = self
+            .surface
+            .triangles
+            .iter()
+            .position(|t| t.iter().any(|&n| n as usize >= nodes))
+        {
+            return fail(format!(
+                "triangle {t} names a node beyond the surface's {nodes} nodes"
+            ));
+        }
+        if self.modes.damping_ratios.len() != modes
+            || self.modes.mode_shapes.len() != 3 * nodes * modes
+        {
+            return fail(format!(
+                "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
+                self.modes.mode_shapes.len(),
+                3 * nodes * modes
+            ));
+        }
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        if !self.surface.positions.iter().all(|p| p.is_finite()) {
+            return fail("a surface position is not finite".into());
+        }
+        if !finite(&self.modes.mode_shapes) {
+            return fail("a mode shape is not finite".into());
+        }
+        let frequencies = &self.modes.angular_frequencies;
+        if !frequencies.iter().all(|w| w.is_finite() && *w > 0.0) || !frequencies.is_sorted() {
+            return fail("angular frequencies must be positive, finite and ascending".into());
+        }
+        if !self
+            .modes
+            .damping_ratios
+            .iter()
+            .all(|z| z.is_finite() && *z >= 0.0)
+        {
+            return fail("damping ratios must be finite and not negative".into());
+        }
+        self.residual.validate(nodes)?;
+        let mass = self.mass();
+        if !(mass.is_finite() && mass > 0.0) {
+            return fail(format!("mass is {mass} kg, expected a positive number"));
+        }
+        let inertia = self.inertia();
+        let symmetric = (inertia - inertia.transpose())
+            .to_cols_array()
+            .iter()
+            .all(|v| v.abs() <= 1e-12 * inertia.x_axis.x);
+        if !(inertia.is_finite()
+            && symmetric
+            && inertia.determinant() > 0.0
+            && inertia.x_axis.x > 0.0)
+        {
+            return fail("the inertia tensor is not symmetric and positive definite".into());
+        }
+        match (&self.gravity, self.metadata.support) {
+            (None, Support::Free) => Ok(()),
+            (Some(gravity), Support::Fixed)
+                if gravity.modal_forces.len() == 3 * modes
+                    && gravity.residual_displacements.len() == 9 * nodes
+                    && finite(&gravity.modal_forces)
+                    && finite(&gravity.residual_displacements) =>
+            {
+                Ok(())
+            }
+            _ => fail("the gravity response does not fit the support".into()),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Residual compliance S: static compliance of everything that the kept modes miss.
+//!
+//! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. It acts within
+//! a step only, as a massless spring. Whole for small surfaces; for large ones its near field
+//! S ∘ ψ(|xᵢ − xⱼ|/r), with Wendland's function ψ(s) = (1 − s)⁴(4s + 1) for s < 1, 0 beyond. ψ
+//! is positive definite in space, so by Schur's product theorem the near field is positive
+//! semi-definite too, and its diagonal is exact (Wendland 1995, Adv. Comput. Math. 4, 389).
+
+use crate::error::Error;
+use alloc::format;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// Residual compliance between surface nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ResidualCompliance {
+    /// Left out: the force is then wrong by up to several times. For comparison only.
+    None,
+    /// The lower triangle row by row, entry (i, j ≤ i) at i(i+1)/2 + j [m/N].
+    Whole(Vec<f32>),
+    /// Node blocks near the diagonal.
+    NearField(NearField),
+}
+
+/// Node blocks of S within a cut-off radius, both triangles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NearField {
+    /// Cut-off radius r [m].
+    pub radius: f64,
+    /// For each node, where its blocks start; length nodes + 1.
+    pub offsets: Vec<u32>,
+    /// Other node of each block, ascending within a row.
+    pub nodes: Vec<u32>,
+    /// Nine numbers per block [m/N], row by row.
+    pub blocks: Vec<f32>,
+}
+
+impl ResidualCompliance {
+    /// Block S_ij [m/N]: displacement of node i per force on node j.
+    ///
+    /// # Real time
+    pub fn block(&self, i: usize, j: usize) -> DMat3 {
+        match self {
+            Self::None => DMat3::ZERO,
+            Self::Whole(packed) => {
+                let entry = |r: usize, c: usize| {
+                    let (r, c) = if r < c { (c, r) } else { (r, c) };
+                    f64::from(packed[r * (r + 1) / 2 + c])
+                };
+                let column = |b: usize| {
+                    DVec3::new(
+                        entry(3 * i, 3 * j + b),
+                        entry(3 * i + 1, 3 * j + b),
+                        entry(3 * i + 2, 3 * j + b),
+                    )
+                };
+                DMat3::from_cols(column(0), column(1), column(2))
+            }
+            Self::NearField(near) => {
+                let row = near.offsets[i] as usize..near.offsets[i + 1] as usize;
+                match near.nodes[row.clone()].binary_search(&(j as u32)) {
+                    Ok(position) => near.block(row.start + position),
+                    Err(_) => DMat3::ZERO,
+                }
+            }
+        }
+    }
+
+    pub(super) fn validate(&self, nodes: usize) -> Result<(), Error> {
+        let fail = |what| Err(Error::Recording(what));
+        let values: &[f32] = match self {
+            Self::None => &[],
+            Self::Whole(packed) => {
+                let needed = 3 * nodes * (3 * nodes + 1) / 2;
+                if packed.len() != needed {
+                    return fail(format!(
+                        "residual compliance holds {} numbers, {nodes} nodes need {needed}",
+                        packed.len()
+                    ));
+                }
+                packed
+            }
+            Self::NearField(near) => {
+                let blocks = near.nodes.len();
+                if near.offsets.len() != nodes + 1
+                    || near.offsets[0] != 0
+                    || near.offsets[nodes] as usize != blocks
+                    || !near.offsets.is_sorted()
+                    || near.blocks.len() != 9 * blocks
+                    || near.nodes.iter().any(|&n| n as usize >= nodes)
+                    || !(near.radius.is_finite() && near.radius > 0.0)
+                {
+                    return fail("the residual near field does not fit together".into());
+                }
+                &near.blocks
+            }
+        };
+        match values.iter().position(|v| !v.is_finite()) {
+            Some(at) => fail(format!("residual compliance number {at} is not finite")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl NearField {
+    fn block(&self, at: usize) -> DMat3 {
+        let b = &self.blocks[9 * at..9 * at + 9];
+        let row = |r: usize| {
+            DVec3::new(
+                f64::from(b[3 * r]),
+                f64::from(b[3 * r + 1]),
+                f64::from(b[3 * r + 2]),
+            )
+        };
+        DMat3::from_cols(row(0), row(1), row(2)).transpose()
+    }
+
+    /// Wendland's ψ at distance over radius s ≥ 0.
+    pub fn taper(s: f64) -> f64 {
+        if s >= 1.0 {
+            return 0.0;
+        }
+        let square = (1.0 - s) * (1.0 - s);
+        square * square * (4.0 * s + 1.0)
+    }
+}

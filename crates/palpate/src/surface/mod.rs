@@ -1,0 +1,181 @@
+//! The free surface of a body: rest positions, triangles, and points on them.
+//!
+//! A point on a triangle with corners i, j, k and barycentric weights w moves by
+//! Σ w·u over its corners; a force at the point enters the corners with the same weights, so
+//! that work is the same on both sides and reciprocity holds.
+
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Boundary triangles of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    /// Rest position of each surface node [m, body frame].
+    pub positions: Vec<DVec3>,
+    /// Three surface nodes per triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each surface node, its number in the finite element model: first the nodes of the
+    /// input mesh in their order, then the mid-edge nodes of quadratic elements.
+    pub source_nodes: Vec<u32>,
+}
+
+/// A material point on the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Position in [`Surface::triangles`].
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's corners; they sum to 1.
+    pub weights: [f64; 3],
+}
+
+impl Surface {
+    /// The three corner nodes of the point's triangle with their weights.
+    pub fn corners(&self, point: &SurfacePoint) -> [(usize, f64); 3] {
+        let [i, j, k] = self.triangles[point.triangle as usize];
+        let [wi, wj, wk] = point.weights;
+        [(i as usize, wi), (j as usize, wj), (k as usize, wk)]
+    }
+
+    /// Rest position of a surface point [m, body frame].
+    pub fn rest_position(&self, point: &SurfacePoint) -> DVec3 {
+        self.corners(point)
+            .iter()
+            .map(|&(node, weight)| self.positions[node] * weight)
+            .sum()
+    }
+
+    /// Radius [m] of the smallest sphere about the body frame's origin that holds the surface.
+    pub fn radius(&self) -> f64 {
+        self.positions
+            .iter()
+            .map(|p| p.length())
+            .fold(0.0, f64::max)
+    }
+
+    /// Diagonal [m] of the bounding box at rest.
+    pub fn diagonal(&self) -> f64 {
+        let low = self
+            .positions
+            .iter()
+            .copied()
+            .reduce(DVec3::min)
+            .unwrap_or_default();
+        let high = self
+            .positions
+            .iter()
+            .copied()
+            .reduce(DVec3::max)
+            .unwrap_or_default();
+        (high - low).length()
+    }
+
+    /// Mean edge length [m] of the triangles at rest.
+    pub fn mean_edge(&self) -> f64 {
+        let mut sum = 0.0;
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|node| self.positions[node as usize]);
+            sum += (a - b).length() + (b - c).length() + (c - a).length();
+        }
+        sum / (3 * self.triangles.len().max(1)) as f64
+    }
+
+    /// The point of the surface at rest nearest to a body point, and its distance [m].
+    ///
+    /// Looks at every triangle: for setting up, not for a step. `None` without triangles.
+    pub fn nearest(&self, point_in_body: DVec3) -> Option<(SurfacePoint, f64)> {
+        let mut best: Option<(SurfacePoint, f64)> = None;
+        for (triangle, corners) in self.triangles.iter().enumerate() {
+            let corners = corners.map(|node| self.positions[node as usize]);
+            let weights = nearest_on_triangle(corners, point_in_body);
+            let nearest: DVec3 = corners.iter().zip(weights).map(|(&c, w)| c * w).sum();
+            let distance = (nearest - point_in_body).length();
+            if best.is_none_or(|(_, least)| distance < least) {
+                best = Some((
+                    SurfacePoint {
+                        triangle: triangle as u32,
+                        weights,
+                    },
+                    distance,
+                ));
+            }
+        }
+        best
+    }
+}
+
+/// Barycentric weights of the point of triangle (a, b, c) nearest to p, by the regions of
+/// corners, edges and face (Ericson, *Real-Time Collision Detection*, 5.1.5).
+fn nearest_on_triangle([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return [1.0 - t, t, 0.0];
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return [1.0 - t, 0.0, t];
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - t, t];
+    }
+    let (v, w) = (vb / (va + vb + vc), vc / (va + vb + vc));
+    [1.0 - v - w, v, w]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec;
+
+    fn square() -> Surface {
+        Surface {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            source_nodes: vec![0, 1, 2, 3],
+        }
+    }
+
+    #[test]
+    fn nearest_point_beats_a_dense_sampling_of_the_surface() {
+        let surface = square();
+        for query in [
+            DVec3::new(0.3, 0.2, 0.5),
+            DVec3::new(-0.4, 0.5, -0.1),
+            DVec3::new(2.0, 3.0, 0.0),
+            DVec3::new(0.6, -0.7, 0.2),
+            DVec3::new(1.3, 0.4, 0.2),
+        ] {
+            let (point, distance) = surface.nearest(query).expect("two triangles");
+            let mut sampled = f64::INFINITY;
+            let n = 200;
+            for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+                let sample = DVec3::new(f64::from(i), f64::from(j), 0.0) / f64::from(n);
+                sampled = sampled.min((sample - query).length());
+            }
+            assert!(
+                distance <= sampled && sampled - distance < 0.01,
+                "{query}: {distance} {sampled}"
+            );
+            assert!((surface.rest_position(&point) - query).length() - distance < 1e-15);
+            assert!(point.weights.iter().all(|w| (0.0..=1.0).contains(w)));
+        }
+    }
+}
