@@ -1,1 +1,64 @@
-//! x
+//! The command `palpate` as a library: one verb, one file under `verbs`.
+//!
+//! Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
+//! input is bad or a check failed; 2: the command line is wrong.
+
+mod failure;
+mod path;
+mod plot;
+mod progress;
+mod scene_file;
+mod source;
+mod verbs;
+mod verification;
+mod vtu;
+
+pub use failure::Failure;
+
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// Touch elastic objects that are free to move: record a mesh once, then get contact forces at 1 kHz.
+#[derive(Parser)]
+#[command(name = "palpate", version, arg_required_else_help = true)]
+#[command(
+    after_help = "Start with `palpate demo`. `palpate VERB --help` tells more about each verb."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Demo(verbs::demo::Arguments),
+    Record(verbs::record::Arguments),
+    Inspect(verbs::inspect::Arguments),
+    Run(verbs::run::Arguments),
+    Verify(verbs::verify::Arguments),
+    Bench(verbs::bench::Arguments),
+}
+
+/// Run a command line and print what went wrong.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => error.exit(),
+    };
+    let done = match arguments.verb {
+        Verb::Demo(arguments) => verbs::demo::demo(&arguments),
+        Verb::Record(arguments) => verbs::record::record(&arguments),
+        Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
+        Verb::Run(arguments) => verbs::run::run(&arguments),
+        Verb::Verify(arguments) => verbs::verify::verify(&arguments),
+        Verb::Bench(arguments) => verbs::bench::bench(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}

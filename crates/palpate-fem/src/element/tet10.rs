@@ -12,13 +12,13 @@ type Form = [[f64; 4]; 4];
 /// Symmetric Q of each shape function.
 fn forms() -> [Form; 10] {
     let mut forms = [[[0.0; 4]; 4]; 10];
-    for a in 0..4 {
+    for (a, form) in forms[..4].iter_mut().enumerate() {
         // 2λ_a² − λ_a·Σ_b λ_b.
-        for b in 0..4 {
-            forms[a][a][b] -= 0.5;
-            forms[a][b][a] -= 0.5;
+        for other in form.iter_mut() {
+            other[a] -= 0.5;
         }
-        forms[a][a][a] += 2.0;
+        form[a].iter_mut().for_each(|entry| *entry -= 0.5);
+        form[a][a] += 2.0;
     }
     for (form, [a, b]) in forms[4..].iter_mut().zip(EDGES) {
         form[a][b] = 2.0;

@@ -91,7 +91,10 @@ pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
             "sphere radius is {radius} m, expected a positive number"
         )));
     }
-    let count = 20 * u64::from(layers).pow(3);
+    let count = u64::from(layers)
+        .checked_pow(3)
+        .and_then(|n| n.checked_mul(20))
+        .unwrap_or(u64::MAX);
     if layers == 0 || count > MOST_TETRAHEDRA {
         return Err(MeshError::Unusable(format!(
             "sphere of {layers} layers has {count} tetrahedra, expected 1 layer or more and at most {MOST_TETRAHEDRA} tetrahedra"

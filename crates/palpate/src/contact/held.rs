@@ -117,11 +117,11 @@ mod tests {
         let rho = [DVec3::new(1.0, -2.0, 0.3), DVec3::new(0.1, 0.7, -0.9)];
         system.solve(|i| rho[i]);
         let f = [system.force(0), system.force(1)];
-        for i in 0..2 {
+        for (i, wanted) in rho.into_iter().enumerate() {
             let back: DVec3 = (0..2)
                 .map(|j| blocks(false)(i.max(j), i.min(j)) * f[j])
                 .sum();
-            assert!((back - rho[i]).length() < 1e-14, "{back} {}", rho[i]);
+            assert!((back - wanted).length() < 1e-14, "{back} {wanted}");
         }
     }
 

@@ -1,0 +1,376 @@
+//! Scene files: TOML in, model and devices out. Every error names the file and the line.
+
+use crate::Failure;
+use crate::path::DevicePath;
+use glam::{DQuat, DVec3};
+use palpate::{
+    Grasp, Model, ModelParameters, MotionRule, ObjectStart, Pose, Recording, RigidCompliance, Twist,
+};
+use serde::Deserialize;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use toml::Spanned;
+
+/// A scene that is ready to run.
+pub struct Scene {
+    /// Objects and rules.
+    pub model: Model,
+    /// Names of the objects, in the model's order.
+    pub object_names: Vec<String>,
+    /// What each device does, in the model's order.
+    pub devices: Vec<SceneDevice>,
+    /// Things the user should know.
+    pub remarks: Vec<String>,
+}
+
+/// A device that holds a point and follows a path.
+pub struct SceneDevice {
+    /// Its name.
+    pub name: String,
+    /// What it holds.
+    pub grasp: Grasp,
+    /// Where it is over time.
+    pub path: DevicePath,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    #[serde(default = "default_step")]
+    step: Spanned<f64>,
+    #[serde(default)]
+    gravity: [f64; 3],
+    motion: Option<Spanned<String>>,
+    rigid_compliance: Option<bool>,
+    #[serde(default)]
+    object: Vec<Spanned<ObjectEntry>>,
+    #[serde(default)]
+    device: Vec<Spanned<DeviceEntry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectEntry {
+    name: Spanned<String>,
+    recording: Spanned<PathBuf>,
+    #[serde(default)]
+    position: [f64; 3],
+    #[serde(default = "identity")]
+    orientation: [f64; 4],
+    #[serde(default)]
+    velocity: [f64; 3],
+    #[serde(default)]
+    angular_velocity: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DeviceEntry {
+    name: Spanned<String>,
+    mode: Spanned<String>,
+    attach: AttachEntry,
+    path: PathEntry,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AttachEntry {
+    object: Spanned<String>,
+    point: Spanned<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathEntry {
+    file: Spanned<PathBuf>,
+}
+
+fn default_step() -> Spanned<f64> {
+    Spanned::new(0..0, ModelParameters::default().step_s)
+}
+
+fn identity() -> [f64; 4] {
+    [1.0, 0.0, 0.0, 0.0]
+}
+
+/// How far from the surface a point to hold may be, as a share of the object's diagonal.
+const OFF_SURFACE: f64 = 0.05;
+
+/// A hand that starts farther than this share of the diagonal from its point gets a remark.
+const FAR_START: f64 = 0.01;
+
+/// The scene's text with its place, for errors.
+struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl Source<'_> {
+    fn fail<T>(&self, span: Range<usize>, what: impl std::fmt::Display) -> Result<T, Failure> {
+        let line = self.text[..span.start.min(self.text.len())]
+            .lines()
+            .count()
+            .max(1);
+        // A span that starts a line counts that line itself.
+        let starts_line = span.start > 0 && self.text[..span.start].ends_with('\n');
+        Err(Failure(format!(
+            "{}: line {}: {what}",
+            self.path.display(),
+            line + usize::from(starts_line)
+        )))
+    }
+
+    fn relative(&self, file: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+}
+
+/// Read a scene file, its recordings and its paths.
+pub fn read(path: &Path) -> Result<Scene, Failure> {
+    let text =
+        std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    let source = Source { path, text: &text };
+    let file: SceneFile = toml::from_str(&text)
+        .map_err(|e| Failure(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+    if file.object.is_empty() {
+        return source.fail(0..0, "the scene has no [[object]]");
+    }
+    let names = file
+        .object
+        .iter()
+        .map(|o| &o.get_ref().name)
+        .chain(file.device.iter().map(|d| &d.get_ref().name));
+    check_names(&source, names)?;
+
+    let mut objects = Vec::new();
+    for entry in &file.object {
+        objects.push(read_object(&source, entry)?);
+    }
+    let object_names: Vec<String> = file
+        .object
+        .iter()
+        .map(|o| o.get_ref().name.get_ref().clone())
+        .collect();
+    let mut remarks = Vec::new();
+    let mut devices = Vec::new();
+    for entry in &file.device {
+        devices.push(read_device(
+            &source,
+            entry.get_ref(),
+            &objects,
+            &object_names,
+            &mut remarks,
+        )?);
+    }
+    check_grasps(&source, &file, &devices)?;
+    remarks.extend(late_recordings(
+        &objects,
+        &object_names,
+        *file.step.get_ref(),
+    ));
+
+    let motion = match file
+        .motion
+        .as_ref()
+        .map(|m| (m.get_ref().as_str(), m.span()))
+    {
+        None | Some(("exact", _)) => MotionRule::ExactHeld,
+        Some(("paper", _)) => MotionRule::Paper,
+        Some((other, span)) => {
+            return source.fail(
+                span,
+                format!("motion is {other:?}, expected \"exact\" or \"paper\""),
+            );
+        }
+    };
+    let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
+        RigidCompliance::Included
+    } else {
+        RigidCompliance::Dropped
+    };
+    let step_s = *file.step.get_ref();
+    if !(step_s > 0.0 && step_s <= 1.0) {
+        return source.fail(
+            file.step.span(),
+            format!("step is {step_s} s, expected above 0 and at most 1"),
+        );
+    }
+    let gravity = DVec3::from_array(file.gravity);
+    let parameters = ModelParameters {
+        step_s,
+        gravity,
+        motion,
+        rigid_compliance,
+        devices: devices.len(),
+    };
+    let model =
+        Model::new(parameters, objects).map_err(|e| Failure(format!("{}: {e}", path.display())))?;
+    Ok(Scene {
+        model,
+        object_names,
+        devices,
+        remarks,
+    })
+}
+
+/// Names stand in CSV headers: each once, and without separators.
+fn check_names<'a>(
+    source: &Source,
+    names: impl Iterator<Item = &'a Spanned<String>>,
+) -> Result<(), Failure> {
+    let mut seen = std::collections::HashSet::new();
+    for name in names {
+        let text = name.get_ref();
+        let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+        if text.is_empty() || !text.chars().all(plain) {
+            return source.fail(
+                name.span(),
+                format!("name is {text:?}, expected letters, digits, - and _"),
+            );
+        }
+        if !seen.insert(text) || text == "energy" || text == "t" {
+            return source.fail(name.span(), format!("the name {text:?} is taken already"));
+        }
+    }
+    Ok(())
+}
+
+fn read_object(
+    source: &Source,
+    entry: &Spanned<ObjectEntry>,
+) -> Result<(Arc<Recording>, ObjectStart), Failure> {
+    let object = entry.get_ref();
+    let place = object.recording.span();
+    let path = source.relative(object.recording.get_ref());
+    let recording = match crate::verbs::read_recording(&path) {
+        Ok(recording) => recording,
+        Err(failure) => return source.fail(place, failure),
+    };
+    let [w, x, y, z] = object.orientation;
+    let start = ObjectStart {
+        pose: Pose {
+            position: DVec3::from_array(object.position),
+            orientation: DQuat::from_xyzw(x, y, z, w),
+        },
+        twist: Twist {
+            linear: DVec3::from_array(object.velocity),
+            angular: DVec3::from_array(object.angular_velocity),
+        },
+    };
+    // Tried on its own, so that the line is that of this object.
+    let recording = Arc::new(recording);
+    if let Err(error) = Model::new(ModelParameters::default(), vec![(recording.clone(), start)]) {
+        let what = error.to_string().replacen("object 0: ", "", 1);
+        return source.fail(
+            object.name.span(),
+            format!("object {:?}: {what}", object.name.get_ref()),
+        );
+    }
+    Ok((recording, start))
+}
+
+fn read_device(
+    source: &Source,
+    device: &DeviceEntry,
+    objects: &[(Arc<Recording>, ObjectStart)],
+    object_names: &[String],
+    remarks: &mut Vec<String>,
+) -> Result<SceneDevice, Failure> {
+    let name = device.name.get_ref().clone();
+    if device.mode.get_ref() != "held" {
+        let mode = device.mode.get_ref();
+        return source.fail(
+            device.mode.span(),
+            format!("mode is {mode:?}, expected \"held\""),
+        );
+    }
+    let wanted = device.attach.object.get_ref();
+    let Some(object) = object_names.iter().position(|name| name == wanted) else {
+        let known = object_names.join(", ");
+        return source.fail(
+            device.attach.object.span(),
+            format!("there is no object {wanted:?}; the scene has {known}"),
+        );
+    };
+    let (recording, start) = &objects[object];
+    let point_span = device.attach.point.span();
+    let point = DVec3::from_array(*device.attach.point.get_ref());
+    let nearest = if point.is_finite() {
+        recording.surface.nearest(point)
+    } else {
+        None
+    };
+    let diagonal = recording.surface.diagonal();
+    let allowed = OFF_SURFACE * diagonal;
+    let grasp = match nearest {
+        Some((point, distance)) if distance <= allowed => Grasp { object, point },
+        Some((_, distance)) => {
+            return source.fail(
+                point_span,
+                format!(
+                    "the point {point} is {distance:.4} m from the surface of {wanted:?}, at most {allowed:.4} m are \
+                     allowed; it is given in the body frame, whose origin is the centre of mass"
+                ),
+            );
+        }
+        None => return source.fail(point_span, format!("the point {point} is not finite")),
+    };
+    let file = &device.path.file;
+    let path = match DevicePath::read(&source.relative(file.get_ref())) {
+        Ok(path) => path,
+        Err(failure) => return source.fail(file.span(), failure),
+    };
+    let first = path.at(0.0);
+    let held = start
+        .pose
+        .world_from_body(recording.surface.rest_position(&grasp.point));
+    let distance = (first - held).length();
+    if distance > FAR_START * diagonal {
+        remarks.push(format!(
+            "device {name:?} starts {distance:.4} m from the point that it holds: the point is pulled there in the \
+             first step"
+        ));
+    }
+    Ok(SceneDevice { name, grasp, path })
+}
+
+/// No two devices may hold the same point: where they differ no force could satisfy both.
+fn check_grasps(source: &Source, file: &SceneFile, devices: &[SceneDevice]) -> Result<(), Failure> {
+    for (at, device) in devices.iter().enumerate() {
+        if let Some(other) = devices[..at]
+            .iter()
+            .find(|other| other.grasp == device.grasp)
+        {
+            let point = &file.device[at].get_ref().attach.point;
+            return source.fail(
+                point.span(),
+                format!(
+                    "device {:?} holds the same point as {:?}",
+                    device.name, other.name
+                ),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A certificate is measured at one step size; a much shorter step excites what the recording left out.
+fn late_recordings<'a>(
+    objects: &'a [(Arc<Recording>, ObjectStart)],
+    names: &'a [String],
+    step_s: f64,
+) -> impl Iterator<Item = String> + 'a {
+    objects.iter().zip(names).filter_map(move |((recording, _), name)| {
+        let certificate = recording.metadata.certificate.as_ref()?;
+        let error = certificate.force_error_max;
+        (error > 0.05).then(|| {
+            format!(
+                "the forces of {name:?} are off by up to {:.0} % (certificate of its recording, at steps of {} s; \
+                 this scene has {step_s} s)",
+                100.0 * error,
+                certificate.event.step_s
+            )
+        })
+    })
+}

@@ -1,0 +1,221 @@
+//! `palpate inspect`: what is in a recording.
+
+use crate::Failure;
+use crate::verbs::{print, print_json, read_recording};
+use clap::Args;
+use palpate::{Certificate, Damping, Recording, ResidualCompliance, Support};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Show what is in a recording, with its force-error certificate
+#[derive(Args)]
+pub struct Arguments {
+    /// The recording
+    file: PathBuf,
+    /// One JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Run the verb.
+pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
+    let recording = read_recording(&arguments.file)?;
+    if arguments.json {
+        return print_as_json(&recording);
+    }
+    let bytes = std::fs::metadata(&arguments.file).map_or(0, |m| m.len() as usize);
+    print_for_person(&recording, &arguments.file, bytes)
+}
+
+fn frequencies_hz(recording: &Recording) -> Vec<f64> {
+    recording
+        .modes
+        .angular_frequencies
+        .iter()
+        .map(|omega| omega / std::f64::consts::TAU)
+        .collect()
+}
+
+/// The recording as one JSON object.
+pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
+    let metadata = &recording.metadata;
+    let failed = |e: serde_json::Error| Failure(format!("JSON: {e}"));
+    let residual: Value = match &recording.residual {
+        ResidualCompliance::None => json!({ "kind": "none" }),
+        ResidualCompliance::Whole(_) => json!({ "kind": "whole" }),
+        ResidualCompliance::NearField(near) => {
+            json!({ "kind": "near_field", "radius_m": near.radius })
+        }
+    };
+    print_json(&json!({
+        "format_version": metadata.format_version,
+        "nodes": metadata.mesh.nodes,
+        "elements": metadata.mesh.elements,
+        "order": metadata.mesh.order,
+        "fixed_nodes": metadata.mesh.fixed_nodes,
+        "surface_nodes": recording.surface.positions.len(),
+        "surface_triangles": recording.surface.triangles.len(),
+        "support": metadata.support,
+        "mass_kg": metadata.mass.mass_kg,
+        "center_of_mass_m": metadata.mass.center_of_mass_m,
+        "inertia_kg_m2": metadata.mass.inertia_kg_m2,
+        "materials": serde_json::to_value(&metadata.materials).map_err(failed)?,
+        "damping": serde_json::to_value(metadata.damping).map_err(failed)?,
+        "modes": recording.modes.len(),
+        "frequencies_hz": frequencies_hz(recording),
+        "damping_ratios": recording.modes.damping_ratios,
+        "residual_compliance": residual,
+        "certificate": serde_json::to_value(&metadata.certificate).map_err(failed)?,
+        "hold": metadata.hold,
+        "units": metadata.units,
+        "provenance": serde_json::to_value(&metadata.provenance).map_err(failed)?,
+    }))
+}
+
+/// The recording for a person.
+pub fn print_for_person(recording: &Recording, path: &Path, bytes: usize) -> Result<(), Failure> {
+    print(&describe(recording, path, bytes).map_err(|e| Failure(e.to_string()))?)
+}
+
+fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, std::fmt::Error> {
+    let metadata = &recording.metadata;
+    let mut out = String::new();
+    writeln!(
+        out,
+        "{} ({}), from {}",
+        path.display(),
+        size(bytes),
+        metadata.provenance.source
+    )?;
+    let mesh = &metadata.mesh;
+    let kind = if mesh.order == 1 {
+        "linear"
+    } else {
+        "quadratic"
+    };
+    writeln!(
+        out,
+        "  mesh         {} nodes, {} {kind} tetrahedra",
+        mesh.nodes, mesh.elements
+    )?;
+    let surface = &recording.surface;
+    writeln!(
+        out,
+        "  surface      {} nodes, {} triangles",
+        surface.positions.len(),
+        surface.triangles.len()
+    )?;
+    match metadata.support {
+        Support::Free => writeln!(out, "  support      free in space")?,
+        Support::Fixed => writeln!(out, "  support      {} nodes fixed", mesh.fixed_nodes)?,
+    }
+    for material in &metadata.materials {
+        let region = if material.region.is_empty() {
+            String::new()
+        } else {
+            format!("{}: ", material.region)
+        };
+        writeln!(
+            out,
+            "  material     {region}E = {} Pa, ν = {}, ρ = {} kg/m³",
+            material.young_pa, material.poisson, material.density_kg_m3
+        )?;
+    }
+    match metadata.damping {
+        Damping::Rayleigh { alpha, beta } => {
+            writeln!(out, "  damping      α = {alpha} 1/s, β = {beta} s")?
+        }
+        Damping::Ratio(0.0) => writeln!(out, "  damping      none")?,
+        Damping::Ratio(zeta) => writeln!(out, "  damping      ζ = {zeta}")?,
+    }
+    let mass = &metadata.mass;
+    let [x, y, z] = mass
+        .center_of_mass_m
+        .map(|v| if v.abs() < 1e-12 { 0.0 } else { v });
+    writeln!(
+        out,
+        "  mass         {:.6} kg, centre ({x:.6}, {y:.6}, {z:.6}) m in the mesh file",
+        mass.mass_kg
+    )?;
+    let frequencies = frequencies_hz(recording);
+    let shown: Vec<String> = frequencies
+        .iter()
+        .take(8)
+        .map(|f| format!("{f:.4}"))
+        .collect();
+    let last = frequencies.last().copied().unwrap_or_default();
+    writeln!(
+        out,
+        "  modes        {} elastic, {} … {last:.4} Hz",
+        frequencies.len(),
+        shown.join(" ")
+    )?;
+    match &recording.residual {
+        ResidualCompliance::None => writeln!(out, "  residual     none")?,
+        ResidualCompliance::Whole(_) => writeln!(out, "  residual     whole")?,
+        ResidualCompliance::NearField(near) => {
+            writeln!(out, "  residual     within {:.4} m", near.radius)?
+        }
+    }
+    match &metadata.certificate {
+        None => writeln!(out, "  certificate  none")?,
+        Some(certificate) => describe_certificate(&mut out, certificate)?,
+    }
+    Ok(out)
+}
+
+fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt::Result {
+    let Certificate {
+        event,
+        samples,
+        modes_of: [kept, all],
+        ..
+    } = certificate;
+    writeln!(
+        out,
+        "  certificate  against all {all} modes of the mesh, {kept} kept; {samples} points and patches"
+    )?;
+    let ms = |s: f64| 1000.0 * s;
+    writeln!(
+        out,
+        "    force error          {} at most, {} in the median; pressed in {} ms, held to {} ms",
+        percent(certificate.force_error_max),
+        percent(certificate.force_error_median),
+        ms(event.rise_s),
+        ms(event.duration_s)
+    )?;
+    writeln!(
+        out,
+        "    static compliance    {} at most",
+        percent(certificate.static_compliance_error_max)
+    )?;
+    writeln!(
+        out,
+        "    R[0] at {} ms step   {} at most: a jump of the hand within one step feels too soft by so much",
+        ms(event.step_s),
+        percent(certificate.instantaneous_compliance_error_max)
+    )?;
+    writeln!(
+        out,
+        "    bandwidth            {:.1} Hz (dynamic compliance within 5 % of the static)",
+        certificate.bandwidth_hz
+    )?;
+    writeln!(
+        out,
+        "    the reference itself is known to {}",
+        percent(certificate.reference_error)
+    )
+}
+
+fn percent(share: f64) -> String {
+    if share >= 0.1 {
+        format!("{:.0} %", 100.0 * share)
+    } else {
+        format!("{:.2} %", 100.0 * share)
+    }
+}
+
+fn size(bytes: usize) -> String {
+    format!("{:.1} MB", bytes as f64 / 1e6)
+}
