@@ -22,9 +22,7 @@ use std::process::ExitCode;
 /// Touch elastic objects that are free to move: record a mesh once, then get contact forces at 1 kHz.
 #[derive(Parser)]
 #[command(name = "palpate", version, arg_required_else_help = true)]
-#[command(
-    after_help = "Start with `palpate demo`. `palpate VERB --help` tells more about each verb."
-)]
+#[command(after_help = "Start with `palpate demo`. `palpate VERB --help` tells more about each verb.")]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

@@ -13,8 +13,7 @@ pub struct DevicePath {
 impl DevicePath {
     /// Read a CSV file with the columns t, x, y, z; a header line and lines that start with # are passed over.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let text =
-            std::fs::read_to_string(path).map_err(|e| Failure::file("read the path", path, &e))?;
+        let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the path", path, &e))?;
         Self::parse(&text).map_err(|what| Failure(format!("path {}: {what}", path.display())))
     }
 
@@ -28,8 +27,7 @@ impl DevicePath {
             }
             let place = format!("line {}", at + 1);
             let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-            let numbers: Result<Vec<f64>, _> =
-                cells.iter().map(|cell| cell.parse::<f64>()).collect();
+            let numbers: Result<Vec<f64>, _> = cells.iter().map(|cell| cell.parse::<f64>()).collect();
             let header = std::mem::replace(&mut may_be_header, false);
             let numbers = match numbers {
                 Ok(numbers) => numbers,
@@ -45,10 +43,7 @@ impl DevicePath {
                 Err(_) => return Err(format!("{place}: {line:?} is not four numbers t,x,y,z")),
             };
             let [t, x, y, z] = numbers[..] else {
-                return Err(format!(
-                    "{place}: {} numbers, expected the four t,x,y,z",
-                    numbers.len()
-                ));
+                return Err(format!("{place}: {} numbers, expected the four t,x,y,z", numbers.len()));
             };
             if !numbers.iter().all(|number| number.is_finite()) {
                 return Err(format!("{place}: {line:?} is not finite"));
@@ -64,18 +59,10 @@ impl DevicePath {
         Ok(Self { rows })
     }
 
-    /// A path through the given rows; they must ascend in time.
-    pub fn from_rows(rows: Vec<(f64, DVec3)>) -> Self {
-        Self { rows }
-    }
-
     /// Position [m, world] at a time [s].
     pub fn at(&self, t: f64) -> DVec3 {
         let after = self.rows.partition_point(|(time, _)| *time <= t);
-        match (
-            after.checked_sub(1).map(|before| self.rows[before]),
-            self.rows.get(after),
-        ) {
+        match (after.checked_sub(1).map(|before| self.rows[before]), self.rows.get(after)) {
             (Some((t0, p0)), Some((t1, p1))) => p0 + (*p1 - p0) * ((t - t0) / (t1 - t0)),
             (Some((_, p)), None) => p,
             (None, first) => first.map_or(DVec3::ZERO, |(_, p)| *p),
@@ -105,25 +92,10 @@ mod tests {
     fn bad_rows_are_named_by_line() {
         let error = |text: &str| DevicePath::parse(text).err().unwrap_or_default();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z in s and m");
-        assert_eq!(
-            error("t,x,y\n"),
-            "line 1: the columns are t,x,y, expected t,x,y,z"
-        );
-        assert_eq!(
-            error("0,0,0,0\n1,2,NaN,0\n"),
-            "line 2: \"1,2,NaN,0\" is not finite"
-        );
-        assert_eq!(
-            error("0,0,0,0\n1,2,a,0\n"),
-            "line 2: \"1,2,a,0\" is not four numbers t,x,y,z"
-        );
-        assert_eq!(
-            error("0,0,0\n"),
-            "line 1: 3 numbers, expected the four t,x,y,z"
-        );
-        assert_eq!(
-            error("1,0,0,0\n1,0,0,0\n"),
-            "line 2: time 1 s does not come after 1 s"
-        );
+        assert_eq!(error("t,x,y\n"), "line 1: the columns are t,x,y, expected t,x,y,z");
+        assert_eq!(error("0,0,0,0\n1,2,NaN,0\n"), "line 2: \"1,2,NaN,0\" is not finite");
+        assert_eq!(error("0,0,0,0\n1,2,a,0\n"), "line 2: \"1,2,a,0\" is not four numbers t,x,y,z");
+        assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,x,y,z");
+        assert_eq!(error("1,0,0,0\n1,0,0,0\n"), "line 2: time 1 s does not come after 1 s");
     }
 }

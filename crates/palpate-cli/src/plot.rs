@@ -14,11 +14,7 @@ const HEIGHT: usize = 9;
 /// Draw curves over a common time axis from 0 to `duration_s`, each in a frame of its own scale.
 pub fn plot(curves: &[Curve], unit: &str, duration_s: f64) -> String {
     let mut out = String::new();
-    let finite = curves
-        .iter()
-        .flat_map(|curve| curve.values)
-        .copied()
-        .filter(|v| v.is_finite());
+    let finite = curves.iter().flat_map(|curve| curve.values).copied().filter(|v| v.is_finite());
     let high = finite.clone().fold(0.0, f64::max);
     let low = finite.fold(0.0, f64::min);
     let span = if high > low { high - low } else { 1.0 };
@@ -52,24 +48,14 @@ pub fn plot(curves: &[Curve], unit: &str, duration_s: f64) -> String {
                 _ => " ".repeat(9),
             };
             let axis = if at == zero { '┼' } else { '│' };
-            let text: String = line
-                .iter()
-                .map(|&bits| char::from_u32(0x2800 + u32::from(bits)).unwrap_or(' '))
-                .collect();
-            out.push_str(&format!(
-                "{label} {axis}{}\n",
-                text.trim_end_matches('\u{2800}')
-            ));
+            let text: String =
+                line.iter().map(|&bits| char::from_u32(0x2800 + u32::from(bits)).unwrap_or(' ')).collect();
+            out.push_str(&format!("{label} {axis}{}\n", text.trim_end_matches('\u{2800}')));
         }
     }
     let end = format!("{duration_s} s");
     let line = "─".repeat(WIDTH);
-    out.push_str(&format!(
-        "{:>9} └{line}\n{:>12}{end:>width$}\n",
-        "",
-        "0",
-        width = WIDTH - 1
-    ));
+    out.push_str(&format!("{:>9} └{line}\n{:>12}{end:>width$}\n", "", "0", width = WIDTH - 1));
     out
 }
 

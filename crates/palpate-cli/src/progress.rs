@@ -15,11 +15,7 @@ pub struct Bars {
 impl Bars {
     /// Nothing is shown until a stage begins.
     pub fn new() -> Self {
-        Self {
-            bar: None,
-            stage: None,
-            interactive: std::io::stderr().is_terminal(),
-        }
+        Self { bar: None, stage: None, interactive: std::io::stderr().is_terminal() }
     }
 
     /// The last stage is done.
@@ -38,8 +34,7 @@ impl Progress for Bars {
         self.finish();
         self.stage = Some((stage.to_string(), Instant::now()));
         if self.interactive {
-            let style =
-                ProgressStyle::with_template("  {msg:<24} {bar:30} {pos}/{len}, {eta} left");
+            let style = ProgressStyle::with_template("  {msg:<24} {bar:30} {pos}/{len}, {eta} left");
             let bar = ProgressBar::new(total);
             if let Ok(style) = style {
                 bar.set_style(style);

@@ -97,6 +97,9 @@ fn identity() -> [f64; 4] {
 /// How far from the surface a point to hold may be, as a share of the object's diagonal.
 const OFF_SURFACE: f64 = 0.05;
 
+/// Force error above which a recording gets a remark.
+const DOUBTFUL: f64 = 0.05;
+
 /// A hand that starts farther than this share of the diagonal from its point gets a remark.
 const FAR_START: f64 = 0.01;
 
@@ -108,17 +111,10 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn fail<T>(&self, span: Range<usize>, what: impl std::fmt::Display) -> Result<T, Failure> {
-        let line = self.text[..span.start.min(self.text.len())]
-            .lines()
-            .count()
-            .max(1);
+        let line = self.text[..span.start.min(self.text.len())].lines().count().max(1);
         // A span that starts a line counts that line itself.
         let starts_line = span.start > 0 && self.text[..span.start].ends_with('\n');
-        Err(Failure(format!(
-            "{}: line {}: {what}",
-            self.path.display(),
-            line + usize::from(starts_line)
-        )))
+        Err(Failure(format!("{}: line {}: {what}", self.path.display(), line + usize::from(starts_line))))
     }
 
     fn relative(&self, file: &Path) -> PathBuf {
@@ -128,60 +124,35 @@ impl Source<'_> {
 
 /// Read a scene file, its recordings and its paths.
 pub fn read(path: &Path) -> Result<Scene, Failure> {
-    let text =
-        std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
     let source = Source { path, text: &text };
     let file: SceneFile = toml::from_str(&text)
         .map_err(|e| Failure(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
     if file.object.is_empty() {
         return source.fail(0..0, "the scene has no [[object]]");
     }
-    let names = file
-        .object
-        .iter()
-        .map(|o| &o.get_ref().name)
-        .chain(file.device.iter().map(|d| &d.get_ref().name));
+    let names =
+        file.object.iter().map(|o| &o.get_ref().name).chain(file.device.iter().map(|d| &d.get_ref().name));
     check_names(&source, names)?;
 
     let mut objects = Vec::new();
     for entry in &file.object {
         objects.push(read_object(&source, entry)?);
     }
-    let object_names: Vec<String> = file
-        .object
-        .iter()
-        .map(|o| o.get_ref().name.get_ref().clone())
-        .collect();
+    let object_names: Vec<String> = file.object.iter().map(|o| o.get_ref().name.get_ref().clone()).collect();
     let mut remarks = Vec::new();
     let mut devices = Vec::new();
     for entry in &file.device {
-        devices.push(read_device(
-            &source,
-            entry.get_ref(),
-            &objects,
-            &object_names,
-            &mut remarks,
-        )?);
+        devices.push(read_device(&source, entry.get_ref(), &objects, &object_names, &mut remarks)?);
     }
     check_grasps(&source, &file, &devices)?;
-    remarks.extend(late_recordings(
-        &objects,
-        &object_names,
-        *file.step.get_ref(),
-    ));
+    remarks.extend(doubtful_recordings(&objects, &object_names));
 
-    let motion = match file
-        .motion
-        .as_ref()
-        .map(|m| (m.get_ref().as_str(), m.span()))
-    {
+    let motion = match file.motion.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
         None | Some(("exact", _)) => MotionRule::ExactHeld,
         Some(("paper", _)) => MotionRule::Paper,
         Some((other, span)) => {
-            return source.fail(
-                span,
-                format!("motion is {other:?}, expected \"exact\" or \"paper\""),
-            );
+            return source.fail(span, format!("motion is {other:?}, expected \"exact\" or \"paper\""));
         }
     };
     let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
@@ -191,43 +162,22 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
     };
     let step_s = *file.step.get_ref();
     if !(step_s > 0.0 && step_s <= 1.0) {
-        return source.fail(
-            file.step.span(),
-            format!("step is {step_s} s, expected above 0 and at most 1"),
-        );
+        return source.fail(file.step.span(), format!("step is {step_s} s, expected above 0 and at most 1"));
     }
     let gravity = DVec3::from_array(file.gravity);
-    let parameters = ModelParameters {
-        step_s,
-        gravity,
-        motion,
-        rigid_compliance,
-        devices: devices.len(),
-    };
-    let model =
-        Model::new(parameters, objects).map_err(|e| Failure(format!("{}: {e}", path.display())))?;
-    Ok(Scene {
-        model,
-        object_names,
-        devices,
-        remarks,
-    })
+    let parameters = ModelParameters { step_s, gravity, motion, rigid_compliance, devices: devices.len() };
+    let model = Model::new(parameters, objects).map_err(|e| Failure(format!("{}: {e}", path.display())))?;
+    Ok(Scene { model, object_names, devices, remarks })
 }
 
 /// Names stand in CSV headers: each once, and without separators.
-fn check_names<'a>(
-    source: &Source,
-    names: impl Iterator<Item = &'a Spanned<String>>,
-) -> Result<(), Failure> {
+fn check_names<'a>(source: &Source, names: impl Iterator<Item = &'a Spanned<String>>) -> Result<(), Failure> {
     let mut seen = std::collections::HashSet::new();
     for name in names {
         let text = name.get_ref();
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if text.is_empty() || !text.chars().all(plain) {
-            return source.fail(
-                name.span(),
-                format!("name is {text:?}, expected letters, digits, - and _"),
-            );
+            return source.fail(name.span(), format!("name is {text:?}, expected letters, digits, - and _"));
         }
         if !seen.insert(text) || text == "energy" || text == "t" {
             return source.fail(name.span(), format!("the name {text:?} is taken already"));
@@ -262,10 +212,7 @@ fn read_object(
     let recording = Arc::new(recording);
     if let Err(error) = Model::new(ModelParameters::default(), vec![(recording.clone(), start)]) {
         let what = error.to_string().replacen("object 0: ", "", 1);
-        return source.fail(
-            object.name.span(),
-            format!("object {:?}: {what}", object.name.get_ref()),
-        );
+        return source.fail(object.name.span(), format!("object {:?}: {what}", object.name.get_ref()));
     }
     Ok((recording, start))
 }
@@ -280,10 +227,7 @@ fn read_device(
     let name = device.name.get_ref().clone();
     if device.mode.get_ref() != "held" {
         let mode = device.mode.get_ref();
-        return source.fail(
-            device.mode.span(),
-            format!("mode is {mode:?}, expected \"held\""),
-        );
+        return source.fail(device.mode.span(), format!("mode is {mode:?}, expected \"held\""));
     }
     let wanted = device.attach.object.get_ref();
     let Some(object) = object_names.iter().position(|name| name == wanted) else {
@@ -296,11 +240,7 @@ fn read_device(
     let (recording, start) = &objects[object];
     let point_span = device.attach.point.span();
     let point = DVec3::from_array(*device.attach.point.get_ref());
-    let nearest = if point.is_finite() {
-        recording.surface.nearest(point)
-    } else {
-        None
-    };
+    let nearest = if point.is_finite() { recording.surface.nearest(point) } else { None };
     let diagonal = recording.surface.diagonal();
     let allowed = OFF_SURFACE * diagonal;
     let grasp = match nearest {
@@ -322,9 +262,7 @@ fn read_device(
         Err(failure) => return source.fail(file.span(), failure),
     };
     let first = path.at(0.0);
-    let held = start
-        .pose
-        .world_from_body(recording.surface.rest_position(&grasp.point));
+    let held = start.pose.world_from_body(recording.surface.rest_position(&grasp.point));
     let distance = (first - held).length();
     if distance > FAR_START * diagonal {
         remarks.push(format!(
@@ -338,38 +276,30 @@ fn read_device(
 /// No two devices may hold the same point: where they differ no force could satisfy both.
 fn check_grasps(source: &Source, file: &SceneFile, devices: &[SceneDevice]) -> Result<(), Failure> {
     for (at, device) in devices.iter().enumerate() {
-        if let Some(other) = devices[..at]
-            .iter()
-            .find(|other| other.grasp == device.grasp)
-        {
+        if let Some(other) = devices[..at].iter().find(|other| other.grasp == device.grasp) {
             let point = &file.device[at].get_ref().attach.point;
             return source.fail(
                 point.span(),
-                format!(
-                    "device {:?} holds the same point as {:?}",
-                    device.name, other.name
-                ),
+                format!("device {:?} holds the same point as {:?}", device.name, other.name),
             );
         }
     }
     Ok(())
 }
 
-/// A certificate is measured at one step size; a much shorter step excites what the recording left out.
-fn late_recordings<'a>(
+/// Recordings whose own certificate says that their forces can't be trusted.
+fn doubtful_recordings<'a>(
     objects: &'a [(Arc<Recording>, ObjectStart)],
     names: &'a [String],
-    step_s: f64,
 ) -> impl Iterator<Item = String> + 'a {
     objects.iter().zip(names).filter_map(move |((recording, _), name)| {
         let certificate = recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
-        (error > 0.05).then(|| {
+        (error > DOUBTFUL).then(|| {
             format!(
-                "the forces of {name:?} are off by up to {:.0} % (certificate of its recording, at steps of {} s; \
-                 this scene has {step_s} s)",
-                100.0 * error,
-                certificate.event.step_s
+                "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
+                 recording): record it with more modes",
+                100.0 * error
             )
         })
     })

@@ -7,9 +7,7 @@ use std::path::Path;
 /// Read or make a mesh.
 pub fn mesh(source: &str) -> Result<Mesh, Failure> {
     if let Some(text) = source.strip_prefix("box:") {
-        let parsed = text
-            .split_once('/')
-            .and_then(|(size, cells)| Some((triple(size)?, triple(cells)?)));
+        let parsed = text.split_once('/').and_then(|(size, cells)| Some((triple(size)?, triple(cells)?)));
         let Some((size, cells)) = parsed else {
             return Err(Failure(format!(
                 "{source:?} is no box; write box:LXxLYxLZ/NXxNYxNZ, as in box:0.1x0.1x0.1/12x12x12"
@@ -18,9 +16,7 @@ pub fn mesh(source: &str) -> Result<Mesh, Failure> {
         return Ok(box_mesh(size, cells)?);
     }
     if let Some(text) = source.strip_prefix("sphere:") {
-        let parsed = text
-            .split_once('/')
-            .and_then(|(r, n)| Some((r.parse().ok()?, n.parse().ok()?)));
+        let parsed = text.split_once('/').and_then(|(r, n)| Some((r.parse().ok()?, n.parse().ok()?)));
         let Some((radius, layers)) = parsed else {
             return Err(Failure(format!(
                 "{source:?} is no sphere; write sphere:RADIUS/N, as in sphere:0.05/8"
@@ -29,11 +25,7 @@ pub fn mesh(source: &str) -> Result<Mesh, Failure> {
         return Ok(ball_mesh(radius, layers)?);
     }
     let path = Path::new(source);
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "msh" => Ok(gmsh::read(path)?),
         "vtk" => Ok(vtk::read(path)?),
@@ -61,17 +53,12 @@ fn triple<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
 
 /// Nodes of the mesh that `--fix` means: a named group, or a condition like `x<0.001 & z>=0`.
 pub fn selected_nodes(mesh: &Mesh, selection: &str) -> Result<Vec<u32>, Failure> {
-    if let Some(NodeGroup { nodes, .. }) = mesh.groups.iter().find(|group| group.name == selection)
-    {
+    if let Some(NodeGroup { nodes, .. }) = mesh.groups.iter().find(|group| group.name == selection) {
         return Ok(nodes.clone());
     }
     let conditions: Option<Vec<Condition>> = selection.split('&').map(Condition::parse).collect();
     let Some(conditions) = conditions else {
-        let groups: Vec<&str> = mesh
-            .groups
-            .iter()
-            .map(|group| group.name.as_str())
-            .collect();
+        let groups: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
         let known = if groups.is_empty() {
             "the mesh names no groups".into()
         } else {
@@ -115,28 +102,17 @@ struct Condition {
 impl Condition {
     fn parse(text: &str) -> Option<Self> {
         let at = text.find(['<', '>'])?;
-        let axis = ["x", "y", "z"]
-            .iter()
-            .position(|axis| *axis == text[..at].trim())?;
+        let axis = ["x", "y", "z"].iter().position(|axis| *axis == text[..at].trim())?;
         let rest = &text[at + 1..];
         let or_equal = rest.starts_with('=');
         let bound: f64 = rest.trim_start_matches('=').trim().parse().ok()?;
-        Some(Self {
-            axis,
-            below: text[at..].starts_with('<'),
-            or_equal,
-            bound,
-        })
+        Some(Self { axis, below: text[at..].starts_with('<'), or_equal, bound })
     }
 
     fn holds(&self, position: [f64; 3]) -> bool {
         let value = position[self.axis];
         (self.or_equal && value == self.bound)
-            || if self.below {
-                value < self.bound
-            } else {
-                value > self.bound
-            }
+            || if self.below { value < self.bound } else { value > self.bound }
     }
 }
 
@@ -164,21 +140,10 @@ mod tests {
     #[test]
     fn conditions_and_groups_select_nodes() {
         let mut mesh = mesh("box:1x1x1/2x2x2").expect("a good box");
-        mesh.groups.push(NodeGroup {
-            name: "foot".into(),
-            nodes: vec![3, 4],
-        });
+        mesh.groups.push(NodeGroup { name: "foot".into(), nodes: vec![3, 4] });
         assert_eq!(selected_nodes(&mesh, "foot").ok(), Some(vec![3, 4]));
-        assert_eq!(
-            selected_nodes(&mesh, "x<-0.4").map(|n| n.len()).ok(),
-            Some(9)
-        );
-        assert_eq!(
-            selected_nodes(&mesh, "x<=-0.5 & y > 0.4")
-                .map(|n| n.len())
-                .ok(),
-            Some(3)
-        );
+        assert_eq!(selected_nodes(&mesh, "x<-0.4").map(|n| n.len()).ok(), Some(9));
+        assert_eq!(selected_nodes(&mesh, "x<=-0.5 & y > 0.4").map(|n| n.len()).ok(), Some(3));
         assert_eq!(
             text(selected_nodes(&mesh, "x<-4")),
             "--fix \"x<-4\" selects no node; the mesh spans x -0.500000 … 0.500000, y -0.500000 … 0.500000, z -0.500000 … 0.500000 m"

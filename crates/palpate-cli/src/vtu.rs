@@ -23,8 +23,7 @@ pub struct VtuSeries {
 impl VtuSeries {
     /// Make the folder.
     pub fn new(folder: &Path, names: Vec<String>) -> Result<Self, Failure> {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Failure::file("make the folder", folder, &e))?;
+        std::fs::create_dir_all(folder).map_err(|e| Failure::file("make the folder", folder, &e))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             names,
@@ -44,8 +43,7 @@ impl VtuSeries {
         let output = state.output();
         for (object, recording) in model.recordings().enumerate() {
             let surface = &recording.surface;
-            self.displacement
-                .resize(surface.positions.len(), DVec3::ZERO);
+            self.displacement.resize(surface.positions.len(), DVec3::ZERO);
             state.surface_displacement(model, object, &mut self.displacement);
             let pose = output.objects[object].pose;
             let deformed = surface.positions.iter().zip(&self.displacement);
@@ -61,8 +59,8 @@ impl VtuSeries {
                 .collect();
             let name = format!("{}_{:05}.vtu", self.names[object], self.frames);
             let path = self.folder.join(&name);
-            let text = document(&points, &displacement, &surface.triangles)
-                .map_err(|e| Failure(e.to_string()))?;
+            let text =
+                document(&points, &displacement, &surface.triangles).map_err(|e| Failure(e.to_string()))?;
             std::fs::write(&path, text).map_err(|e| Failure::file("write", &path, &e))?;
             self.written.push((output.time_s, object, name));
         }
@@ -76,9 +74,7 @@ impl VtuSeries {
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n",
         );
         for (time, object, name) in &self.written {
-            text.push_str(&format!(
-                "<DataSet timestep=\"{time}\" part=\"{object}\" file=\"{name}\"/>\n"
-            ));
+            text.push_str(&format!("<DataSet timestep=\"{time}\" part=\"{object}\" file=\"{name}\"/>\n"));
         }
         text.push_str("</Collection>\n</VTKFile>\n");
         let path = self.folder.join("scene.pvd");
@@ -88,24 +84,11 @@ impl VtuSeries {
 }
 
 /// One unstructured grid of triangles.
-fn document(
-    points: &[f32],
-    displacement: &[f32],
-    triangles: &[[u32; 3]],
-) -> Result<String, std::fmt::Error> {
+fn document(points: &[f32], displacement: &[f32], triangles: &[[u32; 3]]) -> Result<String, std::fmt::Error> {
     let floats = |values: &[f32]| encoded(values.iter().flat_map(|v| v.to_le_bytes()).collect());
-    let connectivity = encoded(
-        triangles
-            .iter()
-            .flatten()
-            .flat_map(|&n| i64::from(n).to_le_bytes())
-            .collect(),
-    );
-    let offsets = encoded(
-        (1..=triangles.len() as i64)
-            .flat_map(|i| (3 * i).to_le_bytes())
-            .collect(),
-    );
+    let connectivity =
+        encoded(triangles.iter().flatten().flat_map(|&n| i64::from(n).to_le_bytes()).collect());
+    let offsets = encoded((1..=triangles.len() as i64).flat_map(|i| (3 * i).to_le_bytes()).collect());
     let types = encoded(vec![5_u8; triangles.len()]);
     let mut text = String::new();
     let array = |name: &str, kind: &str, components: usize, data: &str| {
@@ -129,11 +112,7 @@ fn document(
         "<PointData Vectors=\"displacement\">{}</PointData>",
         array("displacement", "Float32", 3, &floats(displacement))
     )?;
-    writeln!(
-        text,
-        "<Points>{}</Points>",
-        array("Points", "Float32", 3, &floats(points))
-    )?;
+    writeln!(text, "<Points>{}</Points>", array("Points", "Float32", 3, &floats(points)))?;
     writeln!(
         text,
         "<Cells>{}{}{}</Cells>",

@@ -41,10 +41,7 @@ impl Assembly {
 
         // Pattern: elements of each node, then their nodes.
         let mut starts = vec![0_usize; n + 1];
-        discretisation
-            .elements
-            .iter()
-            .for_each(|&node| starts[node as usize + 1] += 1);
+        discretisation.elements.iter().for_each(|&node| starts[node as usize + 1] += 1);
         (0..n).for_each(|i| starts[i + 1] += starts[i]);
         let mut owners = vec![0_u32; discretisation.elements.len()];
         let mut fill = starts.clone();
@@ -64,9 +61,7 @@ impl Assembly {
             })
             .collect();
         let mut offsets = vec![0; n + 1];
-        rows.iter()
-            .enumerate()
-            .for_each(|(i, row)| offsets[i + 1] = offsets[i] + row.len());
+        rows.iter().enumerate().for_each(|(i, row)| offsets[i + 1] = offsets[i] + row.len());
         let columns = rows.concat();
 
         // Values.
@@ -74,23 +69,15 @@ impl Assembly {
             .iter()
             .map(|material| {
                 let (lambda, mu) = lame_constants(material);
-                Elasticity {
-                    lambda,
-                    mu,
-                    density: material.density_kg_m3,
-                }
+                Elasticity { lambda, mu, density: material.density_kg_m3 }
             })
             .collect();
         let mut stiffness = vec![DMat3::ZERO; columns.len()];
         let mut mass = vec![0.0; columns.len()];
         for (nodes, &region) in discretisation.element_nodes().zip(&discretisation.regions) {
             let corners = [0, 1, 2, 3].map(|at| discretisation.nodes[nodes[at] as usize]);
-            let ElementMatrices {
-                stiffness: k,
-                mass: m,
-            } = discretisation
-                .order
-                .matrices(corners, elasticities[region as usize]);
+            let ElementMatrices { stiffness: k, mass: m } =
+                discretisation.order.matrices(corners, elasticities[region as usize]);
             for (i, &node) in nodes.iter().enumerate() {
                 let row = offsets[node as usize]..offsets[node as usize + 1];
                 for (j, other) in nodes.iter().enumerate() {
@@ -101,12 +88,7 @@ impl Assembly {
                 }
             }
         }
-        Self {
-            offsets,
-            columns,
-            stiffness,
-            mass,
-        }
+        Self { offsets, columns, stiffness, mass }
     }
 
     /// Number of nodes.
@@ -117,28 +99,23 @@ impl Assembly {
     /// K·X or M·X for a block of columns with 3·nodes rows.
     pub fn multiply(&self, which: Which, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
-        y.par_col_iter_mut()
-            .zip(x.par_col_iter())
-            .for_each(|(mut out, column)| {
-                let at = |node: u32| {
-                    let base = 3 * node as usize;
-                    glam::DVec3::new(column[base], column[base + 1], column[base + 2])
+        y.par_col_iter_mut().zip(x.par_col_iter()).for_each(|(mut out, column)| {
+            let at = |node: u32| {
+                let base = 3 * node as usize;
+                glam::DVec3::new(column[base], column[base + 1], column[base + 2])
+            };
+            for node in 0..self.nodes() {
+                let row = self.offsets[node]..self.offsets[node + 1];
+                let nodes = self.columns[row.clone()].iter();
+                let sum: glam::DVec3 = match which {
+                    Which::Stiffness => nodes.zip(&self.stiffness[row]).map(|(&c, k)| *k * at(c)).sum(),
+                    Which::Mass => nodes.zip(&self.mass[row]).map(|(&c, &m)| at(c) * m).sum(),
                 };
-                for node in 0..self.nodes() {
-                    let row = self.offsets[node]..self.offsets[node + 1];
-                    let nodes = self.columns[row.clone()].iter();
-                    let sum: glam::DVec3 = match which {
-                        Which::Stiffness => nodes
-                            .zip(&self.stiffness[row])
-                            .map(|(&c, k)| *k * at(c))
-                            .sum(),
-                        Which::Mass => nodes.zip(&self.mass[row]).map(|(&c, &m)| at(c) * m).sum(),
-                    };
-                    for (axis, value) in sum.to_array().into_iter().enumerate() {
-                        out[3 * node + axis] = value;
-                    }
+                for (axis, value) in sum.to_array().into_iter().enumerate() {
+                    out[3 * node + axis] = value;
                 }
-            });
+            }
+        });
         y
     }
 }

@@ -1,22 +1,18 @@
 //! Force-error certificate: the recording against the unreduced finite element model.
 //!
-//! At sampled points and patches of the surface, three directions each, the model's response is compared
-//! with that of all modes. What the kept modes leave out of a load b, b' = b − M·Φ·Φᵀ·b, answers in the Krylov
-//! space of b' under (K + σM)⁻¹·M, started with the static answer G·b'. Projected on that space the
-//! equations of motion give a few dozen modes that stand for the thousands left out, exact in the static
-//! limit and converging geometrically in the number of blocks at a rate that does not depend on the mesh
-//! (rational Krylov moment matching; Grimme 1997). The certificate states how far the reference has
-//! converged.
+//! At sampled points and patches of the surface, three directions each, the recording's response is compared with that
+//! of all modes (see `reference`): R[0], static compliance, dynamic compliance over frequency, and the force of a press.
+//! The certificate states how far the reference itself has converged.
 
 use crate::factor::FactorError;
 use crate::modes::{Modes, ModesError};
 use crate::progress::Progress;
+use crate::reference::{LoadedMode, Reference};
 use crate::system::System;
-use faer::{Mat, Side};
+use faer::Mat;
 use glam::{DMat3, DVec3};
 use palpate::{
-    Certificate, CertificateEvent, Damping, HeldOscillator, Oscillation, ResidualCompliance,
-    Surface,
+    Certificate, CertificateEvent, Damping, HeldOscillator, Oscillation, ResidualCompliance, Surface,
 };
 
 /// Sampled points, and how many of them carry a patch as well.
@@ -28,8 +24,8 @@ const PATCHES: usize = 4;
 const PATCH_DIAGONAL: f64 = 0.03;
 const PATCH_EDGES: f64 = 2.0;
 
-/// Blocks of the Krylov space, and how many of the last are left out to see whether it has converged.
-const BLOCKS: usize = 14;
+/// Krylov blocks of the reference, and how many are left out to see whether it has converged.
+const BLOCKS: usize = 18;
 const LEFT_OUT: usize = 2;
 
 /// The dynamic compliance may be off by this share of the static one within the bandwidth.
@@ -53,25 +49,15 @@ struct Sample {
     radius: f64,
 }
 
-/// One mode of a sample: ω² and its three participations.
-struct SampleMode {
-    square: f64,
-    gain: DVec3,
-}
-
 /// A sample's responses, kept and left out.
 struct Response {
-    kept: Vec<SampleMode>,
-    left_out: Vec<SampleMode>,
+    kept: Vec<LoadedMode>,
+    left_out: Vec<LoadedMode>,
     residual: DMat3,
 }
 
 /// The press that forces are compared on.
-pub const EVENT: CertificateEvent = CertificateEvent {
-    step_s: 1e-3,
-    rise_s: 0.05,
-    duration_s: 0.5,
-};
+pub const EVENT: CertificateEvent = CertificateEvent { step_s: 1e-3, rise_s: 0.05, duration_s: 0.5 };
 
 /// Measure the certificate of a recording's parts.
 ///
@@ -89,7 +75,8 @@ pub fn certificate(
 ) -> Result<Certificate, CertificateError> {
     let samples = samples(surface);
     progress.begin("certificate", (BLOCKS + samples.len()) as u64);
-    let spaces = krylov_spaces(system, modes, surface_nodes, &samples, progress)?;
+    let loads = loads(system, surface_nodes, &samples);
+    let reference = Reference::new(system, modes, loads, EVENT.step_s, BLOCKS, progress)?;
     let mut worst = Certificate {
         force_error_max: 0.0,
         force_error_median: 0.0,
@@ -106,7 +93,7 @@ pub fn certificate(
     let mut force_errors = Vec::new();
     for (at, sample) in samples.iter().enumerate() {
         let kept = (0..modes.squares.len())
-            .map(|i| SampleMode {
+            .map(|i| LoadedMode {
                 square: modes.squares[i],
                 gain: weighted(sample, |node, axis| {
                     modes.shapes[(3 * surface_nodes[node] as usize + axis, i)]
@@ -115,15 +102,15 @@ pub fn certificate(
             .collect();
         let mut response = Response {
             kept,
-            left_out: reduced_modes(system, &spaces, at, samples.len(), BLOCKS - LEFT_OUT)?,
+            left_out: reference.left_out(system, at, BLOCKS - LEFT_OUT)?,
             residual: residual_at(residual, sample),
         };
-        let coarse = response.instantaneous(damping);
-        response.left_out = reduced_modes(system, &spaces, at, samples.len(), BLOCKS)?;
-        let fine = response.instantaneous(damping);
-        let change = relative(coarse, fine);
+        let coarse = (response.instantaneous(damping), response.presses(damping, true));
+        response.left_out = reference.left_out(system, at, BLOCKS)?;
+        let (instantaneous, exact) = (response.instantaneous(damping), response.presses(damping, true));
+        let change = relative(coarse.0, instantaneous).max(apart(&coarse.1, &exact));
 
-        let force_error = response.force_error(damping);
+        let force_error = apart(&response.presses(damping, false), &exact);
         if force_error >= worst.force_error_max {
             worst.force_error_max = force_error;
             worst.worst_at_m = sample.centre.to_array();
@@ -137,7 +124,7 @@ pub fn certificate(
         );
         raise(
             &mut worst.instantaneous_compliance_error_max,
-            relative(response.modelled_instantaneous(damping), fine),
+            relative(response.modelled_instantaneous(damping), instantaneous),
         );
         raise(&mut worst.reference_error, change);
         worst.bandwidth_hz = worst.bandwidth_hz.min(response.bandwidth_hz(damping));
@@ -154,17 +141,11 @@ fn samples(surface: &Surface) -> Vec<Sample> {
     let mut nearest: Vec<f64> = positions.iter().map(|p| p.length()).collect();
     let mut points = Vec::new();
     for _ in 0..POINTS.min(positions.len()) {
-        let farthest = (0..positions.len())
-            .max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]))
-            .unwrap_or(0);
+        let farthest = (0..positions.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])).unwrap_or(0);
         points.push(farthest);
         for (node, distance) in nearest.iter_mut().enumerate() {
             let new = (positions[node] - positions[farthest]).length();
-            *distance = if points.len() == 1 {
-                new
-            } else {
-                distance.min(new)
-            };
+            *distance = if points.len() == 1 { new } else { distance.min(new) };
         }
     }
     let areas = node_areas(surface);
@@ -174,19 +155,12 @@ fn samples(surface: &Surface) -> Vec<Sample> {
         let nodes: Vec<usize> = (0..positions.len()).filter(within).collect();
         let total: f64 = nodes.iter().map(|&node| areas[node]).sum();
         Sample {
-            nodes: nodes
-                .iter()
-                .map(|&node| (node, areas[node] / total))
-                .collect(),
+            nodes: nodes.iter().map(|&node| (node, areas[node] / total)).collect(),
             centre: positions[centre],
             radius,
         }
     };
-    let point = |&node: &usize| Sample {
-        nodes: vec![(node, 1.0)],
-        centre: positions[node],
-        radius: 0.0,
-    };
+    let point = |&node: &usize| Sample { nodes: vec![(node, 1.0)], centre: positions[node], radius: 0.0 };
     // Patches where the last points fell: those lie on faces rather than at corners.
     let patches = points.iter().rev().take(PATCHES).map(patch);
     points.iter().map(point).chain(patches).collect()
@@ -198,21 +172,13 @@ fn node_areas(surface: &Surface) -> Vec<f64> {
     for triangle in &surface.triangles {
         let [a, b, c] = triangle.map(|node| surface.positions[node as usize]);
         let third = (b - a).cross(c - a).length() / 6.0;
-        triangle
-            .iter()
-            .for_each(|&node| areas[node as usize] += third);
+        triangle.iter().for_each(|&node| areas[node as usize] += third);
     }
     areas
 }
 
 fn weighted(sample: &Sample, value: impl Fn(usize, usize) -> f64) -> DVec3 {
-    let part = |axis| {
-        sample
-            .nodes
-            .iter()
-            .map(|&(node, weight)| weight * value(node, axis))
-            .sum()
-    };
+    let part = |axis| sample.nodes.iter().map(|&(node, weight)| weight * value(node, axis)).sum();
     DVec3::new(part(0), part(1), part(2))
 }
 
@@ -226,125 +192,18 @@ fn residual_at(residual: &ResidualCompliance, sample: &Sample) -> DMat3 {
     sum
 }
 
-/// For all samples at once: the loads that the modes leave out, and the blocks of their Krylov spaces.
-struct Spaces {
-    loads: Mat<f64>,
-    blocks: Vec<Mat<f64>>,
-}
-
-fn krylov_spaces(
-    system: &System,
-    modes: &Modes,
-    surface_nodes: &[u32],
-    samples: &[Sample],
-    progress: &mut dyn Progress,
-) -> Result<Spaces, CertificateError> {
+/// Unit forces on the samples: three columns each.
+fn loads(system: &System, surface_nodes: &[u32], samples: &[Sample]) -> Mat<f64> {
     let mut loads = Mat::zeros(system.discretisation.dofs(), 3 * samples.len());
     for (at, sample) in samples.iter().enumerate() {
-        for (&(node, weight), axis) in sample
-            .nodes
-            .iter()
-            .flat_map(|n| (0..3).map(move |axis| (n, axis)))
-        {
+        for (&(node, weight), axis) in sample.nodes.iter().flat_map(|n| (0..3).map(move |axis| (n, axis))) {
             let dof = 3 * surface_nodes[node] as usize + axis;
             if !system.is_fixed(dof) {
                 loads[(dof, 3 * at + axis)] += weight;
             }
         }
     }
-    system.balance(&mut loads);
-    let share = modes.shapes.transpose() * &loads;
-    loads -= system.mass_times((&modes.shapes * share).as_ref());
-
-    // Between the last kept mode and the fastest that the step resolves, the two being far apart.
-    let last = modes.squares.last().copied().unwrap_or(1.0);
-    let fastest = (std::f64::consts::PI / EVENT.step_s).powi(2);
-    let factor = system.shifted_factor((last * fastest.max(4.0 * last)).sqrt())?;
-    let mut block = clean(system, modes, system.elastic_compliance(loads.clone()));
-    let mut blocks = vec![block.clone()];
-    progress.advance(1);
-    for _ in 1..BLOCKS {
-        block = system.mass_times(block.as_ref());
-        factor.solve(block.as_mut());
-        block = clean(system, modes, block);
-        // Sizes don't matter for the space, but must not underflow.
-        for j in 0..block.ncols() {
-            let size = block.col(j).norm_max();
-            if size > 0.0 {
-                (0..block.nrows()).for_each(|i| block[(i, j)] /= size);
-            }
-        }
-        blocks.push(block.clone());
-        progress.advance(1);
-    }
-    Ok(Spaces { loads, blocks })
-}
-
-/// Without rigid motions and kept modes, in M.
-fn clean(system: &System, modes: &Modes, mut block: Mat<f64>) -> Mat<f64> {
-    system.remove_rigid(&mut block);
-    let share = modes.shapes.transpose() * system.mass_times(block.as_ref());
-    block -= &modes.shapes * share;
-    block
-}
-
-/// Modes of the equations of motion projected on a sample's Krylov space.
-fn reduced_modes(
-    system: &System,
-    spaces: &Spaces,
-    sample: usize,
-    samples: usize,
-    blocks: usize,
-) -> Result<Vec<SampleMode>, ModesError> {
-    debug_assert_eq!(spaces.loads.ncols(), 3 * samples);
-    // M-orthonormal columns by Gram-Schmidt, twice; a column that adds nothing is dropped.
-    let n = spaces.loads.nrows();
-    let mut basis = Mat::<f64>::zeros(n, 0);
-    for block in &spaces.blocks[..blocks] {
-        for axis in 0..3 {
-            let mut column = block.subcols(3 * sample + axis, 1).to_owned();
-            let size = norm(system, &column);
-            for _ in 0..2 {
-                let share = basis.transpose() * system.mass_times(column.as_ref());
-                column -= &basis * share;
-            }
-            let left = norm(system, &column);
-            if left > 1e-10 * size {
-                let width = basis.ncols();
-                basis.resize_with(n, width + 1, |i, _| column[(i, 0)] / left);
-            }
-        }
-    }
-    let stiffness = basis.transpose()
-        * system
-            .assembly
-            .multiply(crate::assembly::Which::Stiffness, basis.as_ref());
-    let scale = stiffness.norm_max();
-    if basis.ncols() == 0 || scale == 0.0 {
-        return Ok(Vec::new());
-    }
-    let scaled = Mat::from_fn(basis.ncols(), basis.ncols(), |i, j| {
-        0.5 * (stiffness[(i, j)] + stiffness[(j, i)]) / scale
-    });
-    let eigen = scaled
-        .self_adjoint_eigen(Side::Lower)
-        .map_err(|e| ModesError::Dense(format!("{e:?}")))?;
-    let projected = basis.transpose() * spaces.loads.subcols(3 * sample, 3);
-    let gains = eigen.U().transpose() * projected;
-    let mode = |i: usize| SampleMode {
-        square: eigen.S()[i] * scale,
-        gain: DVec3::new(gains[(i, 0)], gains[(i, 1)], gains[(i, 2)]),
-    };
-    Ok((0..basis.ncols())
-        .map(mode)
-        .filter(|mode| mode.square > 0.0)
-        .collect())
-}
-
-fn norm(system: &System, column: &Mat<f64>) -> f64 {
-    (column.transpose() * system.mass_times(column.as_ref()))[(0, 0)]
-        .max(0.0)
-        .sqrt()
+    loads
 }
 
 fn outer(a: DVec3) -> DMat3 {
@@ -357,19 +216,20 @@ fn relative(a: DMat3, b: DMat3) -> f64 {
     norm(a - b) / norm(b)
 }
 
-impl SampleMode {
-    fn oscillator(&self, damping: Damping) -> HeldOscillator {
-        let omega = self.square.sqrt();
-        HeldOscillator::new(omega, damping.ratio(omega), EVENT.step_s)
-    }
+/// √(Σ|a − b|² / Σ|b|²).
+fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let difference: f64 = a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared()).sum();
+    (difference / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
+}
+
+fn oscillator(mode: &LoadedMode, damping: Damping) -> HeldOscillator {
+    let omega = mode.square.sqrt();
+    HeldOscillator::new(omega, damping.ratio(omega), EVENT.step_s)
 }
 
 impl Response {
-    fn sum(modes: &[SampleMode], weight: impl Fn(&SampleMode) -> f64) -> DMat3 {
-        modes
-            .iter()
-            .map(|mode| outer(mode.gain) * weight(mode))
-            .fold(DMat3::ZERO, |a, b| a + b)
+    fn sum(modes: &[LoadedMode], weight: impl Fn(&LoadedMode) -> f64) -> DMat3 {
+        modes.iter().map(|mode| outer(mode.gain) * weight(mode)).fold(DMat3::ZERO, |a, b| a + b)
     }
 
     fn exact_static(&self) -> DMat3 {
@@ -382,15 +242,13 @@ impl Response {
 
     /// R[0] of all modes.
     fn instantaneous(&self, damping: Damping) -> DMat3 {
-        let compliance = |m: &SampleMode| m.oscillator(damping).instantaneous_compliance();
+        let compliance = |m: &LoadedMode| oscillator(m, damping).instantaneous_compliance();
         Self::sum(&self.kept, compliance) + Self::sum(&self.left_out, compliance)
     }
 
     /// R[0] of the recording.
     fn modelled_instantaneous(&self, damping: Damping) -> DMat3 {
-        Self::sum(&self.kept, |m| {
-            m.oscillator(damping).instantaneous_compliance()
-        }) + self.residual
+        Self::sum(&self.kept, |m| oscillator(m, damping).instantaneous_compliance()) + self.residual
     }
 
     /// Up to where the left-out modes answer as if they were a spring. The kept ones are the same in both.
@@ -403,7 +261,7 @@ impl Response {
         let mut within = 0.0;
         while omega < last.max(2.0 * first) {
             // Σ γγᵀ/(ωᵢ² − ω² + 2iζωᵢω): real and imaginary part.
-            let parts = |m: &SampleMode| {
+            let parts = |m: &LoadedMode| {
                 let (a, b) = (
                     m.square - omega * omega,
                     2.0 * damping.ratio(m.square.sqrt()) * m.square.sqrt() * omega,
@@ -421,42 +279,26 @@ impl Response {
         within
     }
 
-    /// The force when the sample is moved by a smooth ramp along each axis in turn, the recording's against
-    /// that of all modes.
-    fn force_error(&self, damping: Damping) -> f64 {
+    /// Forces [N] when the sample is moved by a smooth ramp along each axis in turn, with all modes or as recorded.
+    fn presses(&self, damping: Damping, all: bool) -> Vec<DVec3> {
         let steps = (EVENT.duration_s / EVENT.step_s).round() as usize;
-        let (mut difference, mut size) = (0.0, 0.0);
-        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            let exact = self.press(damping, axis, steps, true);
-            let modelled = self.press(damping, axis, steps, false);
-            for (a, b) in modelled.iter().zip(&exact) {
-                difference += (*a - *b).length_squared();
-                size += b.length_squared();
-            }
-        }
-        (difference / size).sqrt()
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        axes.into_iter().flat_map(|axis| self.press(damping, axis, steps, all)).collect()
     }
 
     /// Forces [N] of a press of 1 m by equation (9), without rigid motion.
     fn press(&self, damping: Damping, axis: DVec3, steps: usize, all: bool) -> Vec<DVec3> {
         let modes = self.kept.iter().chain(self.left_out.iter().filter(|_| all));
-        let mut modes: Vec<_> = modes
-            .map(|m| (m.oscillator(damping), m.gain, Oscillation::default()))
-            .collect();
-        let compliance = if all {
-            self.instantaneous(damping)
-        } else {
-            self.modelled_instantaneous(damping)
-        };
+        let mut modes: Vec<_> =
+            modes.map(|m| (oscillator(m, damping), m.gain, Oscillation::default())).collect();
+        let compliance = if all { self.instantaneous(damping) } else { self.modelled_instantaneous(damping) };
         let inverse = compliance.inverse();
         (1..=steps)
             .map(|step| {
                 let share = (step as f64 * EVENT.step_s / EVENT.rise_s).min(1.0);
                 let target = axis * (0.5 - 0.5 * (std::f64::consts::PI * share).cos());
-                let free: DVec3 = modes
-                    .iter()
-                    .map(|(map, gain, state)| *gain * map.advance(*state, 0.0).q)
-                    .sum();
+                let free: DVec3 =
+                    modes.iter().map(|(map, gain, state)| *gain * map.advance(*state, 0.0).q).sum();
                 let force = inverse * (target - free);
                 for (map, gain, state) in &mut modes {
                     *state = map.advance(*state, gain.dot(force));

@@ -32,11 +32,7 @@ impl Discretisation {
             node_of_mesh[node as usize] = Some(0);
         }
         let (mut nodes, mut source_nodes) = (Vec::new(), Vec::new());
-        for (at, slot) in node_of_mesh
-            .iter_mut()
-            .enumerate()
-            .filter(|(_, slot)| slot.is_some())
-        {
+        for (at, slot) in node_of_mesh.iter_mut().enumerate().filter(|(_, slot)| slot.is_some()) {
             *slot = Some(nodes.len() as u32);
             nodes.push(mesh.nodes[at]);
             source_nodes.push(at as u32);
@@ -74,15 +70,7 @@ impl Discretisation {
             }
         }
         let regions = mesh.tet_regions.clone();
-        Self {
-            order,
-            nodes,
-            elements,
-            regions,
-            triangles,
-            source_nodes,
-            node_of_mesh,
-        }
+        Self { order, nodes, elements, regions, triangles, source_nodes, node_of_mesh }
     }
 
     /// Degrees of freedom, fixed ones included.

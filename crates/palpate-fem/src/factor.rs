@@ -57,37 +57,21 @@ impl Pattern {
     pub fn new(assembly: &Assembly) -> Result<Self, FactorError> {
         let n = assembly.nodes();
         let setup = |e: &dyn std::fmt::Debug| FactorError::Setup(format!("{e:?}"));
-        let order: Vec<usize> = if n < ORDER_FROM {
-            (0..n).collect()
-        } else {
-            nested_dissection(assembly)?
-        };
-        let forward: Vec<usize> = order
-            .iter()
-            .flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2])
-            .collect();
+        let order: Vec<usize> = if n < ORDER_FROM { (0..n).collect() } else { nested_dissection(assembly)? };
+        let forward: Vec<usize> =
+            order.iter().flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
         let mut inverse = vec![0; forward.len()];
-        forward
-            .iter()
-            .enumerate()
-            .for_each(|(new, &old)| inverse[old] = new);
-        let order = Perm::new_checked(
-            forward.into_boxed_slice(),
-            inverse.into_boxed_slice(),
-            3 * n,
-        );
+        forward.iter().enumerate().for_each(|(new, &old)| inverse[old] = new);
+        let order = Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), 3 * n);
         let matrix = lower_triangle(assembly, &vec![false; 3 * n], 0.0);
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..CholeskySymbolicParams::default()
         };
         let ordering = SymmetricOrdering::Custom(order.as_ref());
-        let symbolic =
-            factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, parameters)
-                .map_err(|e| setup(&e))?;
-        Ok(Self {
-            symbolic: Arc::new(symbolic),
-        })
+        let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, parameters)
+            .map_err(|e| setup(&e))?;
+        Ok(Self { symbolic: Arc::new(symbolic) })
     }
 
     /// Numbers that a factor on this pattern stores.
@@ -107,9 +91,7 @@ impl Pattern {
     ) -> Result<Factor, FactorError> {
         let matrix = lower_triangle(assembly, constrained, shift);
         let mut values = vec![0.0; self.symbolic.len_val()];
-        let scratch = self
-            .symbolic
-            .factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
+        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
         let mut memory = MemBuffer::new(scratch);
         self.symbolic
             .factorize_numeric_llt::<f64>(
@@ -126,31 +108,18 @@ impl Pattern {
                     FactorError::NotPositiveDefinite(index)
                 }
             })?;
-        let constrained = (0..constrained.len())
-            .filter(|&row| constrained[row])
-            .collect();
-        Ok(Factor {
-            symbolic: self.symbolic.clone(),
-            constrained,
-            values,
-        })
+        let constrained = (0..constrained.len()).filter(|&row| constrained[row]).collect();
+        Ok(Factor { symbolic: self.symbolic.clone(), constrained, values })
     }
 
     /// Number of eigenvalues of K·φ = ω²·M·φ with ω² < `below`, rigid motions included.
-    pub fn eigenvalues_below(
-        &self,
-        assembly: &Assembly,
-        constrained: &[bool],
-        below: f64,
-    ) -> usize {
+    pub fn eigenvalues_below(&self, assembly: &Assembly, constrained: &[bool], below: f64) -> usize {
         let matrix = lower_triangle(assembly, constrained, -below);
         let n = matrix.ncols();
         let mut values = vec![0.0; self.symbolic.len_val()];
-        let (mut subdiagonal, mut forward, mut inverse) =
-            (vec![0.0; n], vec![0_usize; n], vec![0_usize; n]);
-        let scratch = self
-            .symbolic
-            .factorize_numeric_intranode_lblt_scratch::<f64>(parallel(), Default::default());
+        let (mut subdiagonal, mut forward, mut inverse) = (vec![0.0; n], vec![0_usize; n], vec![0_usize; n]);
+        let scratch =
+            self.symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(parallel(), Default::default());
         let mut memory = MemBuffer::new(scratch);
         self.symbolic.factorize_numeric_intranode_lblt::<f64>(
             &mut values,
@@ -166,14 +135,8 @@ impl Pattern {
         let SymbolicCholeskyRaw::Supernodal(supernodal) = self.symbolic.raw() else {
             return 0;
         };
-        let permutation =
-            Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), n);
-        let factor = SupernodalIntranodeLbltRef::new(
-            supernodal,
-            &values,
-            &subdiagonal,
-            permutation.as_ref(),
-        );
+        let permutation = Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), n);
+        let factor = SupernodalIntranodeLbltRef::new(supernodal, &values, &subdiagonal, permutation.as_ref());
         let mut negative = 0;
         for supernode in (0..supernodal.n_supernodes()).map(|s| factor.supernode(s)) {
             let block = supernode.val();
@@ -185,11 +148,7 @@ impl Pattern {
                     j += 1;
                 } else {
                     let (a, c) = (block[(j, j)], block[(j + 1, j + 1)]);
-                    negative += if a * c < off * off {
-                        1
-                    } else {
-                        2 * usize::from(a < 0.0)
-                    };
+                    negative += if a * c < off * off { 1 } else { 2 * usize::from(a < 0.0) };
                     j += 2;
                 }
             }
@@ -218,11 +177,7 @@ impl Factor {
 }
 
 /// Lower triangle of K + `shift`·M in compressed columns.
-fn lower_triangle(
-    assembly: &Assembly,
-    constrained: &[bool],
-    shift: f64,
-) -> SparseColMat<usize, f64> {
+fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> SparseColMat<usize, f64> {
     let n = assembly.nodes();
     // Struck-out entries stay as zeros, so that one pattern serves every set of constraints; on the diagonal
     // they keep their own stiffness, so that scaling stays even.
@@ -266,11 +221,7 @@ fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, FactorError> {
     let mut neighbours = Vec::new();
     for node in 0..n {
         let row = &assembly.columns[assembly.offsets[node]..assembly.offsets[node + 1]];
-        neighbours.extend(
-            row.iter()
-                .filter(|&&other| other as usize != node)
-                .map(|&other| other as i32),
-        );
+        neighbours.extend(row.iter().filter(|&&other| other as usize != node).map(|&other| other as i32));
         starts.push(i32::try_from(neighbours.len()).map_err(too_large)?);
     }
     let mut count = i32::try_from(n).map_err(too_large)?;

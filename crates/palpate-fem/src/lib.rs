@@ -14,5 +14,6 @@ pub mod mesh;
 pub mod modes;
 pub mod progress;
 pub mod record;
+pub mod reference;
 pub mod residual;
 pub mod system;

@@ -27,9 +27,7 @@ pub enum MaterialError {
         known: String,
     },
     /// The file names a region that the mesh does not have.
-    #[error(
-        "the material file names region {region}, which the mesh does not have; it has: {known}"
-    )]
+    #[error("the material file names region {region}, which the mesh does not have; it has: {known}")]
     Unknown {
         /// Name or number.
         region: String,
@@ -50,26 +48,11 @@ pub fn lame_constants(material: &Material) -> (f64, f64) {
 /// # Errors
 /// Names the number and its range.
 pub fn check(material: &Material) -> Result<(), MaterialError> {
-    let Material {
-        region,
-        young_pa,
-        poisson,
-        density_kg_m3,
-    } = material;
-    let place = if region.is_empty() {
-        String::new()
-    } else {
-        format!("region {region}: ")
-    };
-    let range = |what: String| {
-        Err(MaterialError::Range {
-            what: format!("{place}{what}"),
-        })
-    };
+    let Material { region, young_pa, poisson, density_kg_m3 } = material;
+    let place = if region.is_empty() { String::new() } else { format!("region {region}: ") };
+    let range = |what: String| Err(MaterialError::Range { what: format!("{place}{what}") });
     if !(young_pa.is_finite() && *young_pa > 0.0) {
-        return range(format!(
-            "Young's modulus is {young_pa} Pa, expected a positive number"
-        ));
+        return range(format!("Young's modulus is {young_pa} Pa, expected a positive number"));
     }
     if *poisson >= 0.5 {
         return range(format!(
@@ -78,14 +61,10 @@ pub fn check(material: &Material) -> Result<(), MaterialError> {
         ));
     }
     if !(*poisson > -1.0 && poisson.is_finite()) {
-        return range(format!(
-            "Poisson's ratio is {poisson}, expected above -1 and below 0.5"
-        ));
+        return range(format!("Poisson's ratio is {poisson}, expected above -1 and below 0.5"));
     }
     if !(density_kg_m3.is_finite() && *density_kg_m3 > 0.0) {
-        return range(format!(
-            "density is {density_kg_m3} kg/m³, expected a positive number"
-        ));
+        return range(format!("density is {density_kg_m3} kg/m³, expected a positive number"));
     }
     Ok(())
 }
@@ -117,9 +96,7 @@ impl RegionKey {
     fn fits(&self, region: &Region) -> bool {
         match self {
             Self::Number(tag) => region.tag == *tag,
-            Self::Name(name) => {
-                region.name.as_ref() == Some(name) || region.tag.to_string() == *name
-            }
+            Self::Name(name) => region.name.as_ref() == Some(name) || region.tag.to_string() == *name,
         }
     }
 
@@ -133,10 +110,7 @@ impl RegionKey {
 
 /// A region's name, or its number where it has none.
 pub fn region_text(region: &Region) -> String {
-    region
-        .name
-        .clone()
-        .unwrap_or_else(|| region.tag.to_string())
+    region.name.clone().unwrap_or_else(|| region.tag.to_string())
 }
 
 /// One material per region of the mesh, in its order, from the text of a material file:
@@ -158,24 +132,13 @@ pub fn materials_from_toml(text: &str, mesh: &Mesh) -> Result<Vec<Material>, Mat
     for entry in &file.material {
         if !mesh.regions.iter().any(|region| entry.region.fits(region)) {
             let known = join(mesh.regions.iter().map(region_text).collect());
-            return Err(MaterialError::Unknown {
-                region: entry.region.text(),
-                known,
-            });
+            return Err(MaterialError::Unknown { region: entry.region.text(), known });
         }
     }
     let for_region = |region: &Region| {
         let Some(entry) = file.material.iter().find(|entry| entry.region.fits(region)) else {
-            let known = join(
-                file.material
-                    .iter()
-                    .map(|entry| entry.region.text())
-                    .collect(),
-            );
-            return Err(MaterialError::Missing {
-                region: region_text(region),
-                known,
-            });
+            let known = join(file.material.iter().map(|entry| entry.region.text()).collect());
+            return Err(MaterialError::Missing { region: region_text(region), known });
         };
         let material = Material {
             region: region_text(region),
@@ -193,67 +156,36 @@ mod tests {
     use super::*;
 
     fn jelly(poisson: f64) -> Material {
-        Material {
-            region: String::new(),
-            young_pa: 2000.0,
-            poisson,
-            density_kg_m3: 110.0,
-        }
+        Material { region: String::new(), young_pa: 2000.0, poisson, density_kg_m3: 110.0 }
     }
 
     #[test]
     fn lame_constants_of_the_papers_cube() {
         let (lambda, mu) = lame_constants(&jelly(0.49));
-        assert!(
-            (lambda - 32_885.9).abs() < 0.1 && (mu - 671.1).abs() < 0.1,
-            "{lambda} {mu}"
-        );
+        assert!((lambda - 32_885.9).abs() < 0.1 && (mu - 671.1).abs() < 0.1, "{lambda} {mu}");
     }
 
     #[test]
     fn impossible_numbers_are_named() {
         let text = check(&jelly(0.5)).map_err(|e| e.to_string());
         assert!(
-            text.as_ref()
-                .is_err_and(|t| t.starts_with("Poisson's ratio is 0.5, expected below 0.5")),
+            text.as_ref().is_err_and(|t| t.starts_with("Poisson's ratio is 0.5, expected below 0.5")),
             "{text:?}"
         );
         assert!(check(&jelly(f64::NAN)).is_err() && check(&jelly(-1.0)).is_err());
-        assert!(
-            check(&Material {
-                young_pa: 0.0,
-                ..jelly(0.3)
-            })
-            .is_err()
-        );
-        assert!(
-            check(&Material {
-                density_kg_m3: f64::INFINITY,
-                ..jelly(0.3)
-            })
-            .is_err()
-        );
+        assert!(check(&Material { young_pa: 0.0, ..jelly(0.3) }).is_err());
+        assert!(check(&Material { density_kg_m3: f64::INFINITY, ..jelly(0.3) }).is_err());
     }
 
     #[test]
     fn every_region_needs_a_material_and_every_material_a_region() {
-        let region = |tag, name: &str| Region {
-            tag,
-            name: Some(name.into()),
-        };
-        let mesh = Mesh {
-            regions: vec![region(1, "core"), region(2, "skin")],
-            ..Mesh::default()
-        };
-        let entry = |r: &str| {
-            format!("[[material]]\nregion = {r}\nyoung = 1e4\npoisson = 0.3\ndensity = 1e3\n")
-        };
+        let region = |tag, name: &str| Region { tag, name: Some(name.into()) };
+        let mesh = Mesh { regions: vec![region(1, "core"), region(2, "skin")], ..Mesh::default() };
+        let entry =
+            |r: &str| format!("[[material]]\nregion = {r}\nyoung = 1e4\npoisson = 0.3\ndensity = 1e3\n");
         let read = |text: String| materials_from_toml(&text, &mesh).map_err(|e| e.to_string());
         let both = read(entry("\"skin\"") + &entry("1")).expect("names and numbers both work");
-        assert_eq!(
-            both.iter().map(|m| m.region.as_str()).collect::<Vec<_>>(),
-            ["core", "skin"]
-        );
+        assert_eq!(both.iter().map(|m| m.region.as_str()).collect::<Vec<_>>(), ["core", "skin"]);
         assert_eq!(
             read(entry("1")).expect_err("skin is missing"),
             "region skin of the mesh has no material; the file has materials for: 1"

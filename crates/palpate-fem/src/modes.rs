@@ -99,11 +99,7 @@ pub fn lowest_modes(
     }
     // The Krylov basis needs room: several columns per mode.
     let dense = system.discretisation.dofs() <= DENSE_UP_TO || 3 * wanted + 8 * BLOCK > available;
-    let modes = if dense {
-        all_modes(system, wanted, progress)?
-    } else {
-        krylov(system, wanted, progress)?
-    };
+    let modes = if dense { all_modes(system, wanted, progress)? } else { krylov(system, wanted, progress)? };
     check_mechanism(system, &modes)?;
     Ok(modes)
 }
@@ -120,9 +116,7 @@ fn check_mechanism(system: &System, modes: &Modes) -> Result<(), ModesError> {
     let shape = modes.shapes.col(0);
     let size = |n: usize| DVec3::new(shape[3 * n], shape[3 * n + 1], shape[3 * n + 2]).length();
     let nodes = &system.discretisation.nodes;
-    let worst = (0..nodes.len())
-        .max_by(|&a, &b| size(a).total_cmp(&size(b)))
-        .unwrap_or(0);
+    let worst = (0..nodes.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
     let p = nodes[worst];
     Err(ModesError::Mechanism(format!(
         "the body has a motion without stiffness beside the rigid ones: a part near ({:.6}, {:.6}, {:.6}) m hangs \
@@ -131,18 +125,11 @@ fn check_mechanism(system: &System, modes: &Modes) -> Result<(), ModesError> {
     )))
 }
 
-fn krylov(
-    system: &System,
-    wanted: usize,
-    progress: &mut dyn Progress,
-) -> Result<Modes, ModesError> {
+fn krylov(system: &System, wanted: usize, progress: &mut dyn Progress) -> Result<Modes, ModesError> {
     let n = system.discretisation.dofs();
     let available = system.elastic_modes();
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let mut basis = Basis {
-        columns: Mat::zeros(n, 0),
-        projected: Vec::new(),
-    };
+    let mut basis = Basis { columns: Mat::zeros(n, 0), projected: Vec::new() };
     let mut block = random_block(system, &mut random);
     progress.begin("modes", wanted as u64);
     let (mut reported, mut checked_missing) = (0, 0);
@@ -161,11 +148,7 @@ fn krylov(
             continue;
         }
         let ritz = basis.ritz(system, &block)?;
-        let found = ritz
-            .residuals
-            .iter()
-            .take_while(|r| **r < TOLERANCE)
-            .count();
+        let found = ritz.residuals.iter().take_while(|r| **r < TOLERANCE).count();
         progress.advance((found.min(wanted) - reported) as u64);
         reported = found.min(wanted);
         // A gap at or above the last wanted mode, among those found.
@@ -188,28 +171,17 @@ fn krylov(
         checked_missing += 1;
         if checked_missing > 4 || counted < gap {
             let frequency_hz = bound.sqrt() / std::f64::consts::TAU;
-            return Err(ModesError::Missed {
-                counted,
-                found: gap,
-                frequency_hz,
-            });
+            return Err(ModesError::Missed { counted, found: gap, frequency_hz });
         }
         // Something hides from this Krylov space: fresh directions beside the next ones find it.
         let (fresh, _) = basis.orthogonalise(system, random_block(system, &mut random));
         let width = block.ncols();
-        block.resize_with(fresh.nrows(), width + fresh.ncols(), |i, j| {
-            fresh[(i, j - width)]
-        });
+        block.resize_with(fresh.nrows(), width + fresh.ncols(), |i, j| fresh[(i, j - width)]);
     }
 }
 
 fn no_convergence(found: usize, wanted: usize, basis: usize, residual: f64) -> ModesError {
-    ModesError::NoConvergence {
-        found,
-        wanted,
-        basis,
-        residual,
-    }
+    ModesError::NoConvergence { found, wanted, basis, residual }
 }
 
 /// M-orthonormal columns and the operator projected on them.
@@ -247,10 +219,7 @@ impl Basis {
         system.remove_rigid(&mut block);
         orthonormalise(system, &mut block)?;
         let old = self.len();
-        self.columns
-            .resize_with(block.nrows(), old + block.ncols(), |i, j| {
-                block[(i, j - old)]
-            });
+        self.columns.resize_with(block.nrows(), old + block.ncols(), |i, j| block[(i, j - old)]);
         Some(block)
     }
 
@@ -270,9 +239,7 @@ impl Basis {
         // faer's eigensolver wants entries near 1.
         let scale = h.norm_max();
         h *= faer::Scale(1.0 / scale);
-        let eigen = h
-            .self_adjoint_eigen(Side::Lower)
-            .map_err(|e| ModesError::Dense(format!("{e:?}")))?;
+        let eigen = h.self_adjoint_eigen(Side::Lower).map_err(|e| ModesError::Dense(format!("{e:?}")))?;
         let vectors = Mat::from_fn(dim, dim, |i, j| eigen.U()[(i, dim - 1 - j)]);
         let values: Vec<f64> = (0..dim).map(|j| eigen.S()[dim - 1 - j] * scale).collect();
         // |G·M·φ − θφ| = |next·(last rows of y)|, with the Gram matrix of `next`.
@@ -280,9 +247,7 @@ impl Basis {
         let last = vectors.subrows(dim - next.ncols(), next.ncols());
         let weighted = &gram * last;
         let residuals = (0..dim).map(|j| {
-            let square: f64 = (0..next.ncols())
-                .map(|i| last[(i, j)] * weighted[(i, j)])
-                .sum();
+            let square: f64 = (0..next.ncols()).map(|i| last[(i, j)] * weighted[(i, j)]).sum();
             square.max(0.0).sqrt() / values[j].abs()
         });
         Ok(Ritz {
@@ -298,20 +263,14 @@ fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
     for _ in 0..2 {
         // Columns to unit size first: Krylov blocks shrink by many orders.
         let gram = block.transpose() * system.mass_times(block.as_ref());
-        let sizes: Vec<f64> = (0..gram.ncols())
-            .map(|j| gram[(j, j)].max(0.0).sqrt())
-            .collect();
+        let sizes: Vec<f64> = (0..gram.ncols()).map(|j| gram[(j, j)].max(0.0).sqrt()).collect();
         if sizes.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
             return None;
         }
-        let unit = Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| {
-            gram[(i, j)] / (sizes[i] * sizes[j])
-        });
+        let unit = Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (sizes[i] * sizes[j]));
         let llt = unit.llt(Side::Lower).ok()?;
         // B ← B·D⁻¹·L⁻ᵀ.
-        let mut transposed = Mat::from_fn(block.ncols(), block.nrows(), |j, i| {
-            block[(i, j)] / sizes[j]
-        });
+        let mut transposed = Mat::from_fn(block.ncols(), block.nrows(), |j, i| block[(i, j)] / sizes[j]);
         faer::linalg::triangular_solve::solve_lower_triangular_in_place(
             llt.L(),
             transposed.as_mut(),
@@ -344,19 +303,13 @@ impl Random {
 ///
 /// # Errors
 /// [`ModesError::Dense`].
-pub fn all_modes(
-    system: &System,
-    wanted: usize,
-    progress: &mut dyn Progress,
-) -> Result<Modes, ModesError> {
+pub fn all_modes(system: &System, wanted: usize, progress: &mut dyn Progress) -> Result<Modes, ModesError> {
     progress.begin("all modes, densely", 1);
     let assembly = &system.assembly;
     let dofs = system.discretisation.dofs();
     let free: Vec<usize> = (0..dofs).filter(|&dof| !system.is_fixed(dof)).collect();
     let mut place = vec![usize::MAX; dofs];
-    free.iter()
-        .enumerate()
-        .for_each(|(at, &dof)| place[dof] = at);
+    free.iter().enumerate().for_each(|(at, &dof)| place[dof] = at);
     let n = free.len();
     let (mut k, mut m) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
     for node in 0..assembly.nodes() {
@@ -385,9 +338,7 @@ pub fn all_modes(
     lower_solve(&mut k);
     let scale = k.norm_max();
     let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) / scale);
-    let eigen = symmetric
-        .self_adjoint_eigen(Side::Lower)
-        .map_err(|e| dense(&e))?;
+    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|e| dense(&e))?;
     let skip = system.rigid_motions();
     let mut vectors = eigen.U().subcols(skip, wanted).to_owned();
     faer::linalg::triangular_solve::solve_upper_triangular_in_place(
@@ -401,18 +352,12 @@ pub fn all_modes(
     }
     system.remove_rigid(&mut shapes);
     progress.advance(1);
-    Ok(Modes {
-        squares: (0..wanted).map(|j| eigen.S()[skip + j] * scale).collect(),
-        shapes,
-    })
+    Ok(Modes { squares: (0..wanted).map(|j| eigen.S()[skip + j] * scale).collect(), shapes })
 }
 
 /// Largest entry of |ΦᵀMΦ − I|.
 pub fn orthonormality_error(system: &System, shapes: MatRef<'_, f64>) -> f64 {
     let gram = shapes.transpose() * system.mass_times(shapes);
     let error = |i: usize, j: usize| (gram[(i, j)] - f64::from(u8::from(i == j))).abs();
-    (0..gram.ncols())
-        .flat_map(|j| (0..=j).map(move |i| (i, j)))
-        .map(|(i, j)| error(i, j))
-        .fold(0.0, f64::max)
+    (0..gram.ncols()).flat_map(|j| (0..=j).map(move |i| (i, j))).map(|(i, j)| error(i, j)).fold(0.0, f64::max)
 }

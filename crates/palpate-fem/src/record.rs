@@ -12,8 +12,8 @@ use crate::residual::{ResidualChoice, gravity_response, residual_compliance};
 use crate::system::{System, SystemError};
 use glam::DVec3;
 use palpate::{
-    Certificate, Damping, FORMAT_VERSION, Material, MeshCounts, Metadata, ModalBasis, Provenance,
-    Recording, Support, Surface,
+    Certificate, Damping, FORMAT_VERSION, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording,
+    Support, Surface,
 };
 
 /// What is recorded and how.
@@ -80,9 +80,7 @@ pub fn record(
     check_parameters(&mesh, parameters)?;
     progress.begin("mesh, assembly, factor", 4);
     let mesh = check(mesh)?;
-    mesh.remarks
-        .iter()
-        .for_each(|remark| progress.remark(remark));
+    mesh.remarks.iter().for_each(|remark| progress.remark(remark));
     remark_on_locking(parameters, progress);
     progress.advance(1);
     let discretisation = Discretisation::new(&mesh, parameters.order);
@@ -110,15 +108,8 @@ pub fn record(
         parameters.residual,
         progress,
     );
-    let certificate = certificate(
-        &system,
-        &modes,
-        &surface,
-        &surface_nodes,
-        &residual,
-        parameters.damping,
-        progress,
-    )?;
+    let certificate =
+        certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)?;
     remark_on_certificate(&certificate, progress);
 
     let free = system.fixed_nodes.is_empty();
@@ -132,11 +123,7 @@ pub fn record(
         mesh: MeshCounts {
             nodes: system.discretisation.nodes.len() as u64,
             elements: mesh.tets.len() as u64,
-            order: if parameters.order == Order::Linear {
-                1
-            } else {
-                2
-            },
+            order: if parameters.order == Order::Linear { 1 } else { 2 },
             fixed_nodes: system.fixed_nodes.len() as u64,
         },
         mass: system.mass.clone(),
@@ -154,22 +141,14 @@ pub fn record(
         residual,
         gravity: (!free).then(|| gravity_response(&system, &modes, &surface_nodes)),
     };
-    Ok(Recorded {
-        recording,
-        system,
-        modes,
-    })
+    Ok(Recorded { recording, system, modes })
 }
 
 fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), RecordError> {
     let fail = |what: String| Err(RecordError::Option(what));
     parameters.materials.iter().try_for_each(material::check)?;
     if parameters.materials.len() != mesh.regions.len() {
-        return fail(format!(
-            "{} materials for {} regions",
-            parameters.materials.len(),
-            mesh.regions.len()
-        ));
+        return fail(format!("{} materials for {} regions", parameters.materials.len(), mesh.regions.len()));
     }
     if parameters.modes == 0 {
         return fail("0 modes are wanted, expected 1 or more".into());
@@ -177,9 +156,7 @@ fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), Re
     if let ResidualChoice::NearField(radius) = parameters.residual
         && !(radius.is_finite() && radius > 0.0)
     {
-        return fail(format!(
-            "residual radius is {radius} m, expected a positive number"
-        ));
+        return fail(format!("residual radius is {radius} m, expected a positive number"));
     }
     match parameters.damping {
         Damping::Rayleigh { alpha, beta }
@@ -189,19 +166,15 @@ fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), Re
                 "Rayleigh damping is {alpha} 1/s, {beta} s, expected two numbers that are not negative"
             ))
         }
-        Damping::Ratio(zeta) if !(zeta >= 0.0 && zeta.is_finite()) => fail(format!(
-            "damping ratio is {zeta}, expected a number that is not negative"
-        )),
+        Damping::Ratio(zeta) if !(zeta >= 0.0 && zeta.is_finite()) => {
+            fail(format!("damping ratio is {zeta}, expected a number that is not negative"))
+        }
         _ => Ok(()),
     }
 }
 
 fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
-    let stiffest = parameters
-        .materials
-        .iter()
-        .map(|m| m.poisson)
-        .fold(0.0, f64::max);
+    let stiffest = parameters.materials.iter().map(|m| m.poisson).fold(0.0, f64::max);
     if parameters.order == Order::Linear && stiffest > 0.45 {
         progress.remark(&format!(
             "linear elements lock at Poisson's ratio {stiffest}: frequencies come out some per cent too high; \
@@ -219,8 +192,8 @@ fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress)
     let error = certificate.force_error_max;
     if error > 0.05 {
         progress.remark(&format!(
-            "the force of this recording is off by up to {:.0} % (see the certificate): keep the residual \
-             compliance or more modes",
+            "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
+             certificate): keep the residual compliance and more modes",
             100.0 * error
         ));
     }
@@ -245,48 +218,27 @@ fn fixed_nodes(mesh: &Mesh, discretisation: &Discretisation, wanted: &[u32]) -> 
         }
     }
     debug_assert!(mesh.nodes.len() == discretisation.node_of_mesh.len());
-    (0..fixed.len())
-        .filter(|&node| fixed[node])
-        .map(|node| node as u32)
-        .collect()
+    (0..fixed.len()).filter(|&node| fixed[node]).map(|node| node as u32).collect()
 }
 
 fn surface(system: &System, surface_nodes: &[u32]) -> Surface {
     let discretisation = &system.discretisation;
     let centre = DVec3::from_array(system.mass.center_of_mass_m);
     let mut number = vec![0_u32; discretisation.nodes.len()];
-    surface_nodes
-        .iter()
-        .enumerate()
-        .for_each(|(at, &node)| number[node as usize] = at as u32);
+    surface_nodes.iter().enumerate().for_each(|(at, &node)| number[node as usize] = at as u32);
     Surface {
-        positions: surface_nodes
-            .iter()
-            .map(|&node| discretisation.nodes[node as usize] - centre)
-            .collect(),
-        triangles: discretisation
-            .triangles
-            .iter()
-            .map(|t| t.map(|node| number[node as usize]))
-            .collect(),
-        source_nodes: surface_nodes
-            .iter()
-            .map(|&node| discretisation.source_nodes[node as usize])
-            .collect(),
+        positions: surface_nodes.iter().map(|&node| discretisation.nodes[node as usize] - centre).collect(),
+        triangles: discretisation.triangles.iter().map(|t| t.map(|node| number[node as usize])).collect(),
+        source_nodes: surface_nodes.iter().map(|&node| discretisation.source_nodes[node as usize]).collect(),
     }
 }
 
 fn modal_basis(modes: &Modes, surface_nodes: &[u32], damping: Damping) -> ModalBasis {
     let angular_frequencies: Vec<f64> = modes.squares.iter().map(|square| square.sqrt()).collect();
-    let rows = surface_nodes
-        .iter()
-        .flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
+    let rows = surface_nodes.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
     let mode_shapes = rows.flat_map(|row| (0..modes.squares.len()).map(move |i| (row, i)));
     ModalBasis {
-        damping_ratios: angular_frequencies
-            .iter()
-            .map(|&omega| damping.ratio(omega))
-            .collect(),
+        damping_ratios: angular_frequencies.iter().map(|&omega| damping.ratio(omega)).collect(),
         angular_frequencies,
         mode_shapes: mode_shapes.map(|at| modes.shapes[at]).collect(),
     }
@@ -298,12 +250,8 @@ fn mesh_hash(mesh: &Mesh) -> String {
     mesh.nodes.iter().flat_map(|p| p.to_array()).for_each(|v| {
         hasher.update(&v.to_le_bytes());
     });
-    mesh.tets
-        .iter()
-        .flatten()
-        .chain(&mesh.tet_regions)
-        .for_each(|v| {
-            hasher.update(&v.to_le_bytes());
-        });
+    mesh.tets.iter().flatten().chain(&mesh.tet_regions).for_each(|v| {
+        hasher.update(&v.to_le_bytes());
+    });
     hasher.finalize().to_hex().to_string()
 }

@@ -51,19 +51,11 @@ pub fn residual_compliance(
     let touchable = 3 * surface_nodes.len();
     match choice {
         ResidualChoice::None => ResidualCompliance::None,
-        ResidualChoice::Automatic if touchable > WHOLE_UP_TO => near_field(
-            system,
-            modes,
-            surface_nodes,
-            NEAR_EDGES * mean_edge,
-            progress,
-        ),
-        ResidualChoice::NearField(radius) => {
-            near_field(system, modes, surface_nodes, radius, progress)
+        ResidualChoice::Automatic if touchable > WHOLE_UP_TO => {
+            near_field(system, modes, surface_nodes, NEAR_EDGES * mean_edge, progress)
         }
-        ResidualChoice::Automatic | ResidualChoice::Whole => {
-            whole(system, modes, surface_nodes, progress)
-        }
+        ResidualChoice::NearField(radius) => near_field(system, modes, surface_nodes, radius, progress),
+        ResidualChoice::Automatic | ResidualChoice::Whole => whole(system, modes, surface_nodes, progress),
     }
 }
 
@@ -91,9 +83,7 @@ fn columns(
     });
     solved -= &modes.shapes * shares;
     let at_surface = |column: usize| {
-        (0..3 * surface_nodes.len())
-            .map(|row| solved[(dof(surface_nodes, row), column)])
-            .collect()
+        (0..3 * surface_nodes.len()).map(|row| solved[(dof(surface_nodes, row), column)]).collect()
     };
     (0..range.len()).map(at_surface).collect()
 }
@@ -112,20 +102,10 @@ fn for_each_column(
     for batch in starts.chunks(rayon::current_num_threads()) {
         let solved: Vec<_> = batch
             .par_iter()
-            .map(|&start| {
-                columns(
-                    system,
-                    modes,
-                    surface_nodes,
-                    start..(start + COLUMNS).min(touchable),
-                )
-            })
+            .map(|&start| columns(system, modes, surface_nodes, start..(start + COLUMNS).min(touchable)))
             .collect();
         for (&start, block) in batch.iter().zip(&solved) {
-            block
-                .iter()
-                .enumerate()
-                .for_each(|(at, column)| visit(start + at, column));
+            block.iter().enumerate().for_each(|(at, column)| visit(start + at, column));
             progress.advance(block.len() as u64);
         }
     }
@@ -159,23 +139,15 @@ fn near_field(
     radius: f64,
     progress: &mut dyn Progress,
 ) -> ResidualCompliance {
-    let positions: Vec<DVec3> = surface_nodes
-        .iter()
-        .map(|&node| system.discretisation.nodes[node as usize])
-        .collect();
-    let mut near = NearField {
-        radius,
-        offsets: vec![0],
-        nodes: Vec::new(),
-        blocks: Vec::new(),
-    };
+    let positions: Vec<DVec3> =
+        surface_nodes.iter().map(|&node| system.discretisation.nodes[node as usize]).collect();
+    let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
     // S is symmetric: column j is row j. Blocks above the diagonal are copied from below at the end, so
     // that both triangles are the same numbers.
     for_each_column(system, modes, surface_nodes, progress, |j, column| {
         let (node, axis) = (j / 3, j % 3);
         if axis == 0 {
-            let within = (0..positions.len())
-                .filter(|&i| (positions[i] - positions[node]).length() < radius);
+            let within = (0..positions.len()).filter(|&i| (positions[i] - positions[node]).length() < radius);
             near.nodes.extend(within.map(|i| i as u32));
             near.blocks.resize(9 * near.nodes.len(), 0.0);
             near.offsets.push(near.nodes.len() as u32);
@@ -205,8 +177,7 @@ fn near_field(
             if let Ok(mirror) = near.nodes[row.clone()].binary_search(&(node as u32)) {
                 for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
                     if other < node || a > b {
-                        near.blocks[9 * (row.start + mirror) + 3 * b + a] =
-                            near.blocks[9 * at + 3 * a + b];
+                        near.blocks[9 * (row.start + mirror) + 3 * b + a] = near.blocks[9 * at + 3 * a + b];
                     }
                 }
             }
@@ -222,9 +193,7 @@ pub fn gravity_response(system: &System, modes: &Modes, surface_nodes: &[u32]) -
     let uniform = Mat::from_fn(n, 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
     let weight = system.mass_times(uniform.as_ref());
     let forces = modes.shapes.transpose() * &weight;
-    let shares = Mat::from_fn(modes.squares.len(), 3, |i, axis| {
-        forces[(i, axis)] / modes.squares[i]
-    });
+    let shares = Mat::from_fn(modes.squares.len(), 3, |i, axis| forces[(i, axis)] / modes.squares[i]);
     let residual = system.elastic_compliance(weight) - &modes.shapes * shares;
     GravityResponse {
         modal_forces: (0..3)

@@ -76,9 +76,7 @@ impl System {
             let weighted = assembly.multiply(Which::Mass, shapes.as_ref());
             rigid = Some(Rigid { shapes, weighted });
         } else {
-            let rows = fixed_nodes
-                .iter()
-                .flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
+            let rows = fixed_nodes.iter().flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
             let pivots = independent_rows(&shapes, rows);
             if pivots.len() < 6 || pivots[5].1 < 1e-9 * pivots[0].1 {
                 return Err(SystemError::Support(format!(
@@ -88,16 +86,7 @@ impl System {
             }
         }
         let factor = pattern.factor(&assembly, &held, 0.0)?;
-        Ok(Self {
-            discretisation,
-            assembly,
-            mass,
-            fixed_nodes,
-            pattern,
-            fixed,
-            factor,
-            rigid,
-        })
+        Ok(Self { discretisation, assembly, mass, fixed_nodes, pattern, fixed, factor, rigid })
     }
 
     /// Cholesky factor of K + `shift`·M with the fixed nodes struck out; `shift` > 0 for a free body.
@@ -195,11 +184,7 @@ fn mass_properties(discretisation: &Discretisation, assembly: &Assembly) -> Mass
 /// Three translations and three rotations about the principal axes through the centre of mass, orthonormal in M.
 fn rigid_shapes(discretisation: &Discretisation, mass: &MassProperties) -> Mat<f64> {
     let centre = DVec3::from_array(mass.center_of_mass_m);
-    let largest = mass
-        .inertia_kg_m2
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |a, b| a.max(b.abs()));
+    let largest = mass.inertia_kg_m2.iter().flatten().fold(0.0_f64, |a, b| a.max(b.abs()));
     let scaled = Mat::from_fn(3, 3, |i, j| mass.inertia_kg_m2[i][j] / largest);
     let mut shapes = Mat::zeros(discretisation.dofs(), 6);
     let principal = scaled.self_adjoint_eigen(faer::Side::Lower);
@@ -209,11 +194,7 @@ fn rigid_shapes(discretisation: &Discretisation, mass: &MassProperties) -> Mat<f
         }
         let Ok(principal) = &principal else { continue };
         for k in 0..3 {
-            let direction = DVec3::new(
-                principal.U()[(0, k)],
-                principal.U()[(1, k)],
-                principal.U()[(2, k)],
-            );
+            let direction = DVec3::new(principal.U()[(0, k)], principal.U()[(1, k)], principal.U()[(2, k)]);
             let inertia = principal.S()[k] * largest;
             let velocity = direction.cross(p - centre) / inertia.sqrt();
             for (axis, value) in velocity.to_array().into_iter().enumerate() {
@@ -226,20 +207,13 @@ fn rigid_shapes(discretisation: &Discretisation, mass: &MassProperties) -> Mat<f
 
 /// Up to six rows of an n×6 matrix that are linearly independent, with their pivots, by Gram-Schmidt with
 /// the largest remaining row each time.
-fn independent_rows(
-    shapes: &Mat<f64>,
-    candidates: impl Iterator<Item = usize>,
-) -> Vec<(usize, f64)> {
-    let mut rows: Vec<(usize, [f64; 6])> = candidates
-        .map(|row| (row, std::array::from_fn(|k| shapes[(row, k)])))
-        .collect();
+fn independent_rows(shapes: &Mat<f64>, candidates: impl Iterator<Item = usize>) -> Vec<(usize, f64)> {
+    let mut rows: Vec<(usize, [f64; 6])> =
+        candidates.map(|row| (row, std::array::from_fn(|k| shapes[(row, k)]))).collect();
     let dot = |a: &[f64; 6], b: &[f64; 6]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut taken = Vec::new();
     for _ in 0..6 {
-        let best = rows
-            .iter()
-            .copied()
-            .max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)));
+        let best = rows.iter().copied().max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)));
         let Some((row, pivot)) = best else { break };
         let size = dot(&pivot, &pivot);
         if size == 0.0 {
@@ -248,10 +222,7 @@ fn independent_rows(
         taken.push((row, size.sqrt()));
         for (_, other) in &mut rows {
             let share = dot(other, &pivot) / size;
-            other
-                .iter_mut()
-                .zip(pivot)
-                .for_each(|(o, p)| *o -= share * p);
+            other.iter_mut().zip(pivot).for_each(|(o, p)| *o -= share * p);
         }
     }
     taken

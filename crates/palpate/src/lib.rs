@@ -42,9 +42,8 @@ pub use energy::EnergyLedger;
 pub use error::Error;
 pub use motion::MotionRule;
 pub use recording::{
-    Certificate, CertificateEvent, Damping, FORMAT_VERSION, GravityResponse, MassProperties,
-    Material, MeshCounts, Metadata, ModalBasis, NearField, Provenance, Recording,
-    ResidualCompliance, Support,
+    Certificate, CertificateEvent, Damping, FORMAT_VERSION, GravityResponse, MassProperties, Material,
+    MeshCounts, Metadata, ModalBasis, NearField, Provenance, Recording, ResidualCompliance, Support,
 };
 pub use response::{HeldOscillator, Oscillation};
 pub use scene::{Model, ModelParameters, ObjectStart, RigidCompliance};

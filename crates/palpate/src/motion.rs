@@ -61,11 +61,7 @@ const MAX_REPETITIONS: usize = 60;
 
 impl Inertia {
     pub(crate) fn new(mass: f64, tensor: DMat3) -> Self {
-        Self {
-            mass,
-            tensor,
-            inverse: tensor.inverse(),
-        }
+        Self { mass, tensor, inverse: tensor.inverse() }
     }
 
     /// I⁻¹ [1/(kg·m²)] in world axes.
@@ -112,46 +108,21 @@ impl Inertia {
                 let position = start.pose.position + (start.velocity + velocity) * (0.5 * h);
                 let angular_momentum = start.angular_momentum + torque * h;
                 let (orientation, turn) = self.midpoint(start, h, angular_momentum);
-                let pose = Pose {
-                    position,
-                    orientation,
-                };
-                RigidStep {
-                    end: RigidState {
-                        pose,
-                        velocity,
-                        angular_momentum,
-                    },
-                    turn,
-                }
+                let pose = Pose { position, orientation };
+                RigidStep { end: RigidState { pose, velocity, angular_momentum }, turn }
             }
             MotionRule::Paper => {
                 let position = start.pose.position + velocity * h;
                 let inverse = self.inverse_in_world(start.pose.orientation);
                 let spin = inverse * (start.angular_momentum + torque * h);
-                let orientation =
-                    (DQuat::from_scaled_axis(spin * h) * start.pose.orientation).normalize();
+                let orientation = (DQuat::from_scaled_axis(spin * h) * start.pose.orientation).normalize();
                 let angular_momentum = self.angular_momentum(orientation, spin);
                 // Cayley vector of the same rotation: 2·tan(angle/2) along the axis.
                 let angle = spin.length() * h;
-                let scale = if angle < 1e-8 {
-                    1.0
-                } else {
-                    2.0 * libm::tan(0.5 * angle) / angle
-                };
-                let pose = Pose {
-                    position,
-                    orientation,
-                };
-                let end = RigidState {
-                    pose,
-                    velocity,
-                    angular_momentum,
-                };
-                RigidStep {
-                    end,
-                    turn: spin * (h * scale),
-                }
+                let scale = if angle < 1e-8 { 1.0 } else { 2.0 * libm::tan(0.5 * angle) / angle };
+                let pose = Pose { position, orientation };
+                let end = RigidState { pose, velocity, angular_momentum };
+                RigidStep { end, turn: spin * (h * scale) }
             }
         }
     }
@@ -202,29 +173,16 @@ mod tests {
 
     fn brick() -> (Inertia, RigidState) {
         let inertia = Inertia::new(2.0, DMat3::from_diagonal(DVec3::new(0.02, 0.05, 0.04)));
-        let pose = Pose {
-            position: DVec3::ZERO,
-            orientation: cayley(DVec3::new(0.3, 0.2, -0.5)),
-        };
-        let angular_momentum =
-            inertia.angular_momentum(pose.orientation, DVec3::new(1.0, 8.0, 0.5));
-        (
-            inertia,
-            RigidState {
-                pose,
-                velocity: DVec3::ZERO,
-                angular_momentum,
-            },
-        )
+        let pose = Pose { position: DVec3::ZERO, orientation: cayley(DVec3::new(0.3, 0.2, -0.5)) };
+        let angular_momentum = inertia.angular_momentum(pose.orientation, DVec3::new(1.0, 8.0, 0.5));
+        (inertia, RigidState { pose, velocity: DVec3::ZERO, angular_momentum })
     }
 
     fn spin_for(h: f64, duration: f64) -> (RigidState, f64) {
         let (inertia, start) = brick();
         let mut state = start;
         for _ in 0..(duration / h).round() as usize {
-            state = inertia
-                .advance(MotionRule::ExactHeld, &state, h, DVec3::ZERO, DVec3::ZERO)
-                .end;
+            state = inertia.advance(MotionRule::ExactHeld, &state, h, DVec3::ZERO, DVec3::ZERO).end;
         }
         let energy = inertia.kinetic_energy(&start);
         (state, inertia.kinetic_energy(&state) / energy - 1.0)
@@ -236,17 +194,11 @@ mod tests {
         let mut errors = [0.0; 2];
         for (error, h) in errors.iter_mut().zip([2e-3, 1e-3]) {
             let (state, energy_change) = spin_for(h, 1.0);
-            assert!(
-                energy_change.abs() < 1e-12,
-                "energy changes by {energy_change}"
-            );
+            assert!(energy_change.abs() < 1e-12, "energy changes by {energy_change}");
             *error = state.pose.orientation.angle_between(exact.pose.orientation);
         }
         let order = libm::log2(errors[0] / errors[1]);
-        assert!(
-            (order - 2.0).abs() < 0.05,
-            "observed order {order}, errors {errors:?}"
-        );
+        assert!((order - 2.0).abs() < 0.05, "observed order {order}, errors {errors:?}");
     }
 
     #[test]
@@ -264,12 +216,8 @@ mod tests {
         let (inertia, start) = brick();
         let (force, torque) = (DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.0, 0.1, 0.2));
         let gap = |h: f64| {
-            let a = inertia
-                .advance(MotionRule::ExactHeld, &start, h, force, torque)
-                .end;
-            let b = inertia
-                .advance(MotionRule::Paper, &start, h, force, torque)
-                .end;
+            let a = inertia.advance(MotionRule::ExactHeld, &start, h, force, torque).end;
+            let b = inertia.advance(MotionRule::Paper, &start, h, force, torque).end;
             (a.pose.position - b.pose.position).length()
                 + a.pose.orientation.angle_between(b.pose.orientation)
         };

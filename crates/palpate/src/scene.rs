@@ -88,24 +88,15 @@ impl Model {
     ) -> Result<Self, Error> {
         let h = parameters.step_s;
         if !(h > 0.0 && h <= 1.0) {
-            return Err(Error::Model(format!(
-                "step is {h} s, expected above 0 and at most 1"
-            )));
+            return Err(Error::Model(format!("step is {h} s, expected above 0 and at most 1")));
         }
         if !parameters.gravity.is_finite() {
-            return Err(Error::Model(format!(
-                "gravity is {}, expected finite numbers",
-                parameters.gravity
-            )));
+            return Err(Error::Model(format!("gravity is {}, expected finite numbers", parameters.gravity)));
         }
         let objects = objects.into_iter().enumerate();
-        let objects: Result<_, _> = objects
-            .map(|(at, (recording, start))| SceneObject::new(at, recording, start, h))
-            .collect();
-        Ok(Self {
-            parameters,
-            objects: objects?,
-        })
+        let objects: Result<_, _> =
+            objects.map(|(at, (recording, start))| SceneObject::new(at, recording, start, h)).collect();
+        Ok(Self { parameters, objects: objects? })
     }
 
     /// What holds for the whole scene.
@@ -130,19 +121,12 @@ impl Model {
 }
 
 impl SceneObject {
-    fn new(
-        at: usize,
-        recording: Arc<Recording>,
-        start: ObjectStart,
-        h: f64,
-    ) -> Result<Self, Error> {
+    fn new(at: usize, recording: Arc<Recording>, start: ObjectStart, h: f64) -> Result<Self, Error> {
         let ObjectStart { mut pose, twist } = start;
         let fail = |what| Err(Error::Model(format!("object {at}: {what}")));
         let norm = pose.orientation.length();
         if !(0.99..=1.01).contains(&norm) {
-            return fail(format!(
-                "orientation has length {norm}, expected a unit quaternion w, x, y, z"
-            ));
+            return fail(format!("orientation has length {norm}, expected a unit quaternion w, x, y, z"));
         }
         if !(pose.position.is_finite() && twist.linear.is_finite() && twist.angular.is_finite()) {
             return fail("position and velocities must be finite".into());
@@ -157,13 +141,7 @@ impl SceneObject {
         };
         let modes = SampledModes::new(&recording.modes, h);
         let radius = recording.surface.radius();
-        Ok(Self {
-            recording,
-            modes,
-            inertia,
-            start: ObjectStart { pose, twist },
-            radius,
-        })
+        Ok(Self { recording, modes, inertia, start: ObjectStart { pose, twist }, radius })
     }
 
     /// Gravity [m/s²] in body axes.

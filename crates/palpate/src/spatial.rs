@@ -18,10 +18,7 @@ pub struct Pose {
 
 impl Pose {
     /// The body frame on the world frame.
-    pub const IDENTITY: Self = Self {
-        position: DVec3::ZERO,
-        orientation: DQuat::IDENTITY,
-    };
+    pub const IDENTITY: Self = Self { position: DVec3::ZERO, orientation: DQuat::IDENTITY };
 
     /// A body point [m, body] in the world [m, world].
     pub fn world_from_body(&self, point_in_body: DVec3) -> DVec3 {
@@ -45,10 +42,7 @@ pub struct Twist {
 
 impl Twist {
     /// At rest.
-    pub const ZERO: Self = Self {
-        linear: DVec3::ZERO,
-        angular: DVec3::ZERO,
-    };
+    pub const ZERO: Self = Self { linear: DVec3::ZERO, angular: DVec3::ZERO };
 }
 
 /// Rotation cay(v) of the module's equation, for v [rad] = step times mean angular velocity.
@@ -58,11 +52,7 @@ pub fn cayley(v: DVec3) -> DQuat {
 
 /// Matrix v̂ with v̂·a = v × a.
 pub(crate) fn cross_matrix(v: DVec3) -> DMat3 {
-    DMat3::from_cols(
-        DVec3::new(0.0, v.z, -v.y),
-        DVec3::new(-v.z, 0.0, v.x),
-        DVec3::new(v.y, -v.x, 0.0),
-    )
+    DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
 }
 
 /// Inertia [kg·m²] in world axes: R·I·Rᵀ.
@@ -86,18 +76,13 @@ mod tests {
     #[test]
     fn cayley_turns_by_twice_the_arc_tangent_of_half_its_length() {
         let turned = cayley(DVec3::Z * 2.0) * DVec3::X;
-        assert!(
-            (turned - DVec3::Y).length() < 4.0 * f64::EPSILON,
-            "{turned}"
-        );
+        assert!((turned - DVec3::Y).length() < 4.0 * f64::EPSILON, "{turned}");
     }
 
     #[test]
     fn pose_maps_there_and_back() {
-        let pose = Pose {
-            position: DVec3::new(1.0, 2.0, 3.0),
-            orientation: cayley(DVec3::new(0.1, 0.2, 0.3)),
-        };
+        let pose =
+            Pose { position: DVec3::new(1.0, 2.0, 3.0), orientation: cayley(DVec3::new(0.1, 0.2, 0.3)) };
         let point = DVec3::new(-0.4, 0.5, 0.6);
         let back = pose.body_from_world(pose.world_from_body(point));
         assert!((back - point).length() < 1e-15);

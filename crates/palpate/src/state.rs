@@ -129,34 +129,19 @@ impl State {
     /// The scene at its start: undeformed, with all buffers that steps will need.
     pub fn new(model: &Model) -> Self {
         let devices = model.parameters.devices;
-        let most_modes = model
-            .objects
-            .iter()
-            .map(|o| o.modes.oscillators.len())
-            .max()
-            .unwrap_or(0);
-        let objects: Vec<_> = model
-            .objects
-            .iter()
-            .map(|o| ObjectState::new(o, model.parameters.gravity))
-            .collect();
-        let object_outputs =
-            model
-                .objects
-                .iter()
-                .zip(&objects)
-                .map(|(object, state)| ObjectOutput {
-                    pose: state.rigid.pose,
-                    twist: object.start.twist,
-                    energy: state.ledger,
-                });
+        let most_modes = model.objects.iter().map(|o| o.modes.oscillators.len()).max().unwrap_or(0);
+        let objects: Vec<_> =
+            model.objects.iter().map(|o| ObjectState::new(o, model.parameters.gravity)).collect();
+        let object_outputs = model.objects.iter().zip(&objects).map(|(object, state)| ObjectOutput {
+            pose: state.rigid.pose,
+            twist: object.start.twist,
+            energy: state.ledger,
+        });
         let output = Output {
             time_s: 0.0,
             devices: vec![DeviceOutput::default(); devices],
             objects: object_outputs.collect(),
-            energy: objects
-                .iter()
-                .fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
+            energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
             status: StepStatus::default(),
         };
         Self {
@@ -191,22 +176,12 @@ impl State {
     pub fn surface_displacement(&self, model: &Model, object: usize, out: &mut [DVec3]) {
         let scene_object = &model.objects[object];
         let recording = &*scene_object.recording;
-        assert_eq!(
-            out.len(),
-            recording.surface.positions.len(),
-            "one entry per surface node"
-        );
+        assert_eq!(out.len(), recording.surface.positions.len(), "one entry per surface node");
         let state = &self.objects[object];
         let gravity = scene_object.gravity_in_body(model.parameters.gravity, &state.rigid.pose);
         for (node, u) in out.iter_mut().enumerate() {
             let part = |axis: usize| -> f64 {
-                recording
-                    .modes
-                    .row(node, axis)
-                    .iter()
-                    .zip(&state.modes)
-                    .map(|(phi, mode)| phi * mode.q)
-                    .sum()
+                recording.modes.row(node, axis).iter().zip(&state.modes).map(|(phi, mode)| phi * mode.q).sum()
             };
             *u = DVec3::new(part(0), part(1), part(2));
             if let Some(response) = &recording.gravity {
@@ -227,15 +202,11 @@ impl ObjectState {
     fn new(object: &SceneObject, gravity: DVec3) -> Self {
         let twist = object.start.twist;
         let pose = object.start.pose;
-        let angular_momentum = object.inertia.map_or(DVec3::ZERO, |inertia| {
-            inertia.angular_momentum(pose.orientation, twist.angular)
-        });
+        let angular_momentum = object
+            .inertia
+            .map_or(DVec3::ZERO, |inertia| inertia.angular_momentum(pose.orientation, twist.angular));
         let mut state = Self {
-            rigid: RigidState {
-                pose,
-                velocity: twist.linear,
-                angular_momentum,
-            },
+            rigid: RigidState { pose, velocity: twist.linear, angular_momentum },
             modes: vec![Oscillation::default(); object.modes.oscillators.len()],
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
@@ -250,20 +221,14 @@ impl ObjectState {
     /// # Real time
     pub(crate) fn weigh(&mut self, object: &SceneObject, gravity: DVec3) {
         let (kinetic, elastic) = object.modes.energy(&self.modes);
-        let rigid = object
-            .inertia
-            .map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
+        let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
         let mut potential = -object.recording.mass() * gravity.dot(self.rigid.pose.position);
         if let Some(response) = &object.recording.gravity {
             let acceleration = object.gravity_in_body(gravity, &self.rigid.pose);
             let m = self.modes.len();
             for (axis, a) in acceleration.to_array().into_iter().enumerate() {
                 let loads = &response.modal_forces[axis * m..][..m];
-                let work: f64 = loads
-                    .iter()
-                    .zip(&self.modes)
-                    .map(|(p, mode)| p * mode.q)
-                    .sum();
+                let work: f64 = loads.iter().zip(&self.modes).map(|(p, mode)| p * mode.q).sum();
                 potential -= a * work;
             }
         }

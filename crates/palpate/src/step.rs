@@ -19,9 +19,7 @@ use crate::energy::EnergyLedger;
 use crate::motion::{RigidState, RigidStep};
 use crate::response::project_rows;
 use crate::scene::{Model, RigidCompliance, SceneObject};
-use crate::state::{
-    ActivePoint, DeviceInput, Input, ObjectState, Output, State, StepStatus, Workspace,
-};
+use crate::state::{ActivePoint, DeviceInput, Input, ObjectState, Output, State, StepStatus, Workspace};
 use glam::{DMat3, DVec3};
 
 /// The forces are found by Newton's method with the matrix of the free motion, which gains a factor
@@ -40,13 +38,7 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     state.output.status = StepStatus::default();
     take_grasps(model, state, input);
     for (at, object) in model.objects.iter().enumerate() {
-        let State {
-            objects,
-            held,
-            workspace,
-            output,
-            ..
-        } = &mut *state;
+        let State { objects, held, workspace, output, .. } = &mut *state;
         let own = &mut objects[at];
         gather(at, own, held, input, workspace);
         predict(model, object, own, held, workspace);
@@ -91,13 +83,7 @@ fn take_grasps(model: &Model, state: &mut State, input: &Input) {
             let object = &model.objects[grasp.object];
             let own = &state.objects[grasp.object];
             let sag = sag(model, object, own, &grasp);
-            state.held.hold(
-                device,
-                grasp,
-                object,
-                own.modes.iter().map(|mode| mode.q),
-                sag,
-            );
+            state.held.hold(device, grasp, object, own.modes.iter().map(|mode| mode.q), sag);
         }
     }
 }
@@ -109,20 +95,11 @@ fn sag(model: &Model, object: &SceneObject, own: &ObjectState, grasp: &Grasp) ->
     };
     let gravity = object.gravity_in_body(model.parameters.gravity, &own.rigid.pose);
     let corners = object.recording.surface.corners(&grasp.point);
-    corners
-        .iter()
-        .map(|&(node, weight)| response.residual_displacement(node, gravity) * weight)
-        .sum()
+    corners.iter().map(|&(node, weight)| response.residual_displacement(node, gravity) * weight).sum()
 }
 
 /// The held points of one object, with where their hands will be.
-fn gather(
-    at: usize,
-    own: &ObjectState,
-    held: &HeldPoints,
-    input: &Input,
-    workspace: &mut Workspace,
-) {
+fn gather(at: usize, own: &ObjectState, held: &HeldPoints, input: &Input, workspace: &mut Workspace) {
     workspace.active.clear();
     for (device, point) in held.points.iter().enumerate() {
         if point.grasp.is_some_and(|grasp| grasp.object == at) {
@@ -162,9 +139,7 @@ fn predict(
     object.modes.predict(&own.modes, forces, free_modes);
     for active in &mut workspace.active {
         let point = &held.points[active.device];
-        let sag = point
-            .grasp
-            .map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
+        let sag = point.grasp.map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
         active.free = project_rows(held.rows(active.device, m), free_modes.iter().copied()) + sag;
     }
 }
@@ -183,10 +158,7 @@ fn advance_rigid(
             let force = force + parameters.gravity * inertia.mass;
             inertia.advance(parameters.motion, start, parameters.step_s, force, torque)
         }
-        None => RigidStep {
-            end: *start,
-            turn: DVec3::ZERO,
-        },
+        None => RigidStep { end: *start, turn: DVec3::ZERO },
     }
 }
 
@@ -248,8 +220,7 @@ fn solve(
         let (force, torque) = wrench(active);
         end = advance_rigid(model, object, &own.rigid, force, torque);
         for point in active.iter_mut() {
-            point.end_arm =
-                end.end.pose.orientation * (held.points[point.device].rest + point.displacement);
+            point.end_arm = end.end.pose.orientation * (held.points[point.device].rest + point.displacement);
         }
     }
     end
@@ -271,10 +242,8 @@ fn evaluate(
     }
     for at in 0..active.len() {
         let device = active[at].device;
-        let elastic: DVec3 = active
-            .iter()
-            .map(|other| held.compliance(device, other.device) * other.force_in_body)
-            .sum();
+        let elastic: DVec3 =
+            active.iter().map(|other| held.compliance(device, other.device) * other.force_in_body).sum();
         let point = &mut active[at];
         point.displacement = point.free + elastic;
         point.end_arm = orientation * (held.points[device].rest + point.displacement);
@@ -298,10 +267,8 @@ fn evaluate(
 /// Force [N] and torque [N·m] about the centre of mass, with the mean of the arms before and after.
 fn wrench(active: &[ActivePoint]) -> (DVec3, DVec3) {
     let force = active.iter().map(|point| point.force).sum();
-    let torque = active
-        .iter()
-        .map(|point| ((point.start_arm + point.end_arm) * 0.5).cross(point.force))
-        .sum();
+    let torque =
+        active.iter().map(|point| ((point.start_arm + point.end_arm) * 0.5).cross(point.force)).sum();
     (force, torque)
 }
 
@@ -315,11 +282,7 @@ fn advance(
     end: &RigidStep,
 ) {
     let m = own.modes.len();
-    let Workspace {
-        modal_forces,
-        active,
-        ..
-    } = workspace;
+    let Workspace { modal_forces, active, .. } = workspace;
     let modal_forces = &mut modal_forces[..m];
 
     // p = Φᵀ·Jᵀ·g.
@@ -338,19 +301,13 @@ fn advance(
     let travel = end.end.pose.position - own.rigid.pose.position;
     for at in 0..active.len() {
         let (device, force) = (active[at].device, active[at].force_in_body);
-        let pushed: DVec3 = active
-            .iter()
-            .map(|other| held.residual(device, other.device) * other.force_in_body)
-            .sum();
+        let pushed: DVec3 =
+            active.iter().map(|other| held.residual(device, other.device) * other.force_in_body).sum();
         let held_point = &mut held.points[device];
-        let sag = held_point
-            .grasp
-            .map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
+        let sag = held_point.grasp.map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
         residual_work += force.dot(pushed + sag - held_point.residual);
         residual_energy += 0.5 * force.dot(pushed);
-        input += active[at]
-            .force
-            .dot(travel + (active[at].end_arm - active[at].start_arm));
+        input += active[at].force.dot(travel + (active[at].end_arm - active[at].start_arm));
         held_point.residual = pushed + sag;
         held_point.displacement = active[at].displacement;
         held_point.force = force;
@@ -363,20 +320,12 @@ fn advance(
     own.ledger.input += input;
     own.ledger.dissipated += dissipated;
     own.weigh(object, model.parameters.gravity);
-    let EnergyLedger {
-        input, dissipated, ..
-    } = own.ledger;
+    let EnergyLedger { input, dissipated, .. } = own.ledger;
     own.ledger.defect = own.ledger.stored() - own.stored_at_start - (input - dissipated);
 }
 
 fn write_output(model: &Model, state: &mut State, input: &Input) {
-    let State {
-        steps,
-        objects,
-        held,
-        workspace: _,
-        output,
-    } = state;
+    let State { steps, objects, held, workspace: _, output } = state;
     output.time_s = *steps as f64 * model.parameters.step_s;
     for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
         out.pose = own.rigid.pose;
@@ -385,9 +334,7 @@ fn write_output(model: &Model, state: &mut State, input: &Input) {
         }
         out.energy = own.ledger;
     }
-    output.energy = objects
-        .iter()
-        .fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));
+    output.energy = objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));
     for (device, out) in output.devices.iter_mut().enumerate() {
         let point = &held.points[device];
         match point.grasp {
@@ -398,10 +345,7 @@ fn write_output(model: &Model, state: &mut State, input: &Input) {
             }
             None => {
                 out.force_on_hand = DVec3::ZERO;
-                out.point = input
-                    .devices
-                    .get(device)
-                    .map_or(DVec3::ZERO, |device| device.position);
+                out.point = input.devices.get(device).map_or(DVec3::ZERO, |device| device.position);
             }
         }
     }

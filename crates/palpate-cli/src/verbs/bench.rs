@@ -7,8 +7,7 @@ use crate::verbs::{print, print_json};
 use clap::Args;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist,
-    step,
+    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist, step,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -48,74 +47,41 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure("--steps is 0, expected 1 or more".into()));
     }
     let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
-        Ok(Arc::new(
-            cached_cube(cells, modes, arguments.cache.as_deref())?.0,
-        ))
+        Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?.0))
     };
     let mut cases = Vec::new();
     for &cells in &arguments.cells {
         let recording = cube(cells, 200)?;
         let nodes = recording.metadata.mesh.nodes;
         let label = format!("{cells}³ cells, {nodes} nodes, 200 modes, 2 held points");
-        cases.push(Case {
-            label,
-            recording,
-            objects: 1,
-            points: 2,
-        });
+        cases.push(Case { label, recording, objects: 1, points: 2 });
     }
     let usual = cube(12, 200)?;
     for modes in [50, 400] {
         let label = format!("12³ cells, {modes} modes, 2 held points");
-        cases.push(Case {
-            label,
-            recording: cube(12, modes)?,
-            objects: 1,
-            points: 2,
-        });
+        cases.push(Case { label, recording: cube(12, modes)?, objects: 1, points: 2 });
     }
     for points in [1, 4, 8, 16] {
         let label = format!("12³ cells, 200 modes, {points} held points");
-        cases.push(Case {
-            label,
-            recording: usual.clone(),
-            objects: 1,
-            points,
-        });
+        cases.push(Case { label, recording: usual.clone(), objects: 1, points });
     }
     for objects in [4, 16] {
         let label = format!("{objects} cubes of 12³ cells, 200 modes, 2 held points each");
-        cases.push(Case {
-            label,
-            recording: usual.clone(),
-            objects,
-            points: 2,
-        });
+        cases.push(Case { label, recording: usual.clone(), objects, points: 2 });
     }
     let mut rows = Vec::new();
     if !arguments.json {
-        print(&format!(
-            "{:<58}{:>8}{:>8}{:>8}{:>9}\n",
-            "step time [µs]", "p50", "p99", "p99.9", "max"
-        ))?;
+        print(&format!("{:<58}{:>8}{:>8}{:>8}{:>9}\n", "step time [µs]", "p50", "p99", "p99.9", "max"))?;
     }
     for case in &cases {
         let times = measure(case, arguments.steps)?;
-        let [p50, p99, p999, max] =
-            [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));
+        let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));
         rows.push(json!({ "case": case.label, "p50": p50, "p99": p99, "p999": p999, "max": max }));
         if !arguments.json {
-            print(&format!(
-                "{:<58}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n",
-                case.label
-            ))?;
+            print(&format!("{:<58}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n", case.label))?;
         }
     }
-    if arguments.json {
-        print_json(&json!({ "step_time_us": Value::Array(rows) }))
-    } else {
-        Ok(())
-    }
+    if arguments.json { print_json(&json!({ "step_time_us": Value::Array(rows) })) } else { Ok(()) }
 }
 
 /// Sorted times [ns] of steps in which every held point moves.
@@ -129,49 +95,26 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
                 let height = 1.0 - 2.0 * share;
                 let angle = at as f64 * 2.4;
                 let around = (1.0 - height * height).sqrt();
-                let towards = DVec3::new(around * angle.cos(), around * angle.sin(), height)
-                    * surface.radius();
-                surface
-                    .nearest(towards)
-                    .map(|(point, _)| Grasp { object, point })
+                let towards =
+                    DVec3::new(around * angle.cos(), around * angle.sin(), height) * surface.radius();
+                surface.nearest(towards).map(|(point, _)| Grasp { object, point })
             })
         })
         .collect();
-    let start = ObjectStart {
-        pose: Pose::IDENTITY,
-        twist: Twist::ZERO,
-    };
-    let parameters = ModelParameters {
-        devices: held.len(),
-        ..ModelParameters::default()
-    };
-    let model = Model::new(
-        parameters,
-        vec![(case.recording.clone(), start); case.objects],
-    )?;
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let parameters = ModelParameters { devices: held.len(), ..ModelParameters::default() };
+    let model = Model::new(parameters, vec![(case.recording.clone(), start); case.objects])?;
     let mut state = State::new(&model);
-    let rest: Vec<DVec3> = held
-        .iter()
-        .map(|grasp| surface.rest_position(&grasp.point))
-        .collect();
-    let mut input = Input {
-        devices: Vec::new(),
-    };
+    let rest: Vec<DVec3> = held.iter().map(|grasp| surface.rest_position(&grasp.point)).collect();
+    let mut input = Input { devices: Vec::new() };
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps {
         let t = number as f64 * 1e-3;
-        let sway = DVec3::new(
-            0.03 * (12.0 * t).sin(),
-            0.01 * (5.0 * t).sin(),
-            0.005 * (7.0 * t).sin(),
-        );
+        let sway = DVec3::new(0.03 * (12.0 * t).sin(), 0.01 * (5.0 * t).sin(), 0.005 * (7.0 * t).sin());
         input.devices = held
             .iter()
             .zip(&rest)
-            .map(|(grasp, rest)| DeviceInput {
-                position: *rest * 0.98 + sway,
-                grasp: Some(*grasp),
-            })
+            .map(|(grasp, rest)| DeviceInput { position: *rest * 0.98 + sway, grasp: Some(*grasp) })
             .collect();
         let before = Instant::now();
         step(&model, &mut state, &input);

@@ -46,10 +46,7 @@ pub fn paper_cube(cells: u32, modes: usize) -> RecordParameters {
         }],
         order: Order::Linear,
         modes,
-        damping: Damping::Rayleigh {
-            alpha: 2.0,
-            beta: 2e-4,
-        },
+        damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"),
@@ -67,10 +64,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     inspect::print_for_person(&recording, &recording_path, bytes.len())?;
 
     for (name, side) in [("left", -1.0), ("right", 1.0)] {
-        write_whole(
-            &output.join(format!("{name}.csv")),
-            shake_path(side).as_bytes(),
-        )?;
+        write_whole(&output.join(format!("{name}.csv")), shake_path(side).as_bytes())?;
     }
     let scene_path = output.join("shake.toml");
     write_whole(&scene_path, SCENE.as_bytes())?;
@@ -90,20 +84,11 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
         2e3 * SQUEEZE_M,
         1e2 * AMPLITUDE_M
     ))?;
-    let forces: Vec<Vec<f64>> = summary
-        .forces
-        .iter()
-        .map(|f| f.iter().map(|force| force.x).collect())
-        .collect();
+    let forces: Vec<Vec<f64>> =
+        summary.forces.iter().map(|f| f.iter().map(|force| force.x).collect()).collect();
     let curves = [
-        Curve {
-            label: "force on the left hand, to the right",
-            values: &forces[0],
-        },
-        Curve {
-            label: "force on the right hand, to the right",
-            values: &forces[1],
-        },
+        Curve { label: "force on the left hand, to the right", values: &forces[0] },
+        Curve { label: "force on the right hand, to the right", values: &forces[1] },
     ];
     print(&plot(&curves, "N", DURATION_S))?;
     print("\n")?;
@@ -144,19 +129,14 @@ fn shake_path(side: f64) -> String {
     for millisecond in 0..=(DURATION_S * 1000.0) as u32 {
         let t = f64::from(millisecond) / 1000.0;
         let squeeze = SQUEEZE_M * smooth(t / 0.2);
-        let shake =
-            AMPLITUDE_M * smooth((t - 0.2) / 0.3) * (2.0 * PI * FREQUENCY_HZ * (t - 0.2)).sin();
+        let shake = AMPLITUDE_M * smooth((t - 0.2) / 0.3) * (2.0 * PI * FREQUENCY_HZ * (t - 0.2)).sin();
         text += &format!("{t},{},0,0\n", side * (0.05 - squeeze) + shake);
     }
     text
 }
 
 /// The paper's cube from the cache, or recorded into it. Gives the file's bytes too.
-pub fn cached_cube(
-    cells: u32,
-    modes: usize,
-    cache: Option<&Path>,
-) -> Result<(Recording, Vec<u8>), Failure> {
+pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<(Recording, Vec<u8>), Failure> {
     let folder = cache.map(Path::to_path_buf).or_else(cache_folder);
     let name = format!("cube-{cells}-{modes}-{}.palp", env!("CARGO_PKG_VERSION"));
     let path = folder.as_ref().map(|folder| folder.join(name));
@@ -177,10 +157,7 @@ pub fn cached_cube(
         && std::fs::create_dir_all(&folder).is_ok()
         && write_whole(&path, &bytes).is_err()
     {
-        eprintln!(
-            "warning: {} cannot be written, so the cube will be recorded again",
-            path.display()
-        );
+        eprintln!("warning: {} cannot be written, so the cube will be recorded again", path.display());
     }
     Ok((recording, bytes))
 }
@@ -199,14 +176,6 @@ impl Progress for Quiet {
 }
 
 fn cache_folder() -> Option<PathBuf> {
-    let folder = |name: &str| {
-        std::env::var_os(name)
-            .filter(|v| !v.is_empty())
-            .map(PathBuf::from)
-    };
-    Some(
-        folder("XDG_CACHE_HOME")
-            .or_else(|| Some(folder("HOME")?.join(".cache")))?
-            .join("palpate"),
-    )
+    let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    Some(folder("XDG_CACHE_HOME").or_else(|| Some(folder("HOME")?.join(".cache")))?.join("palpate"))
 }

@@ -29,12 +29,7 @@ pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn frequencies_hz(recording: &Recording) -> Vec<f64> {
-    recording
-        .modes
-        .angular_frequencies
-        .iter()
-        .map(|omega| omega / std::f64::consts::TAU)
-        .collect()
+    recording.modes.angular_frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect()
 }
 
 /// The recording as one JSON object.
@@ -81,41 +76,19 @@ pub fn print_for_person(recording: &Recording, path: &Path, bytes: usize) -> Res
 fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, std::fmt::Error> {
     let metadata = &recording.metadata;
     let mut out = String::new();
-    writeln!(
-        out,
-        "{} ({}), from {}",
-        path.display(),
-        size(bytes),
-        metadata.provenance.source
-    )?;
+    writeln!(out, "{} ({}), from {}", path.display(), size(bytes), metadata.provenance.source)?;
     let mesh = &metadata.mesh;
-    let kind = if mesh.order == 1 {
-        "linear"
-    } else {
-        "quadratic"
-    };
-    writeln!(
-        out,
-        "  mesh         {} nodes, {} {kind} tetrahedra",
-        mesh.nodes, mesh.elements
-    )?;
+    let kind = if mesh.order == 1 { "linear" } else { "quadratic" };
+    writeln!(out, "  mesh         {} nodes, {} {kind} tetrahedra", mesh.nodes, mesh.elements)?;
     let surface = &recording.surface;
-    writeln!(
-        out,
-        "  surface      {} nodes, {} triangles",
-        surface.positions.len(),
-        surface.triangles.len()
-    )?;
+    writeln!(out, "  surface      {} nodes, {} triangles", surface.positions.len(), surface.triangles.len())?;
     match metadata.support {
         Support::Free => writeln!(out, "  support      free in space")?,
         Support::Fixed => writeln!(out, "  support      {} nodes fixed", mesh.fixed_nodes)?,
     }
     for material in &metadata.materials {
-        let region = if material.region.is_empty() {
-            String::new()
-        } else {
-            format!("{}: ", material.region)
-        };
+        let region =
+            if material.region.is_empty() { String::new() } else { format!("{}: ", material.region) };
         writeln!(
             out,
             "  material     {region}E = {} Pa, ν = {}, ρ = {} kg/m³",
@@ -123,40 +96,25 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
         )?;
     }
     match metadata.damping {
-        Damping::Rayleigh { alpha, beta } => {
-            writeln!(out, "  damping      α = {alpha} 1/s, β = {beta} s")?
-        }
+        Damping::Rayleigh { alpha, beta } => writeln!(out, "  damping      α = {alpha} 1/s, β = {beta} s")?,
         Damping::Ratio(0.0) => writeln!(out, "  damping      none")?,
         Damping::Ratio(zeta) => writeln!(out, "  damping      ζ = {zeta}")?,
     }
     let mass = &metadata.mass;
-    let [x, y, z] = mass
-        .center_of_mass_m
-        .map(|v| if v.abs() < 1e-12 { 0.0 } else { v });
+    let [x, y, z] = mass.center_of_mass_m.map(|v| if v.abs() < 1e-12 { 0.0 } else { v });
     writeln!(
         out,
         "  mass         {:.6} kg, centre ({x:.6}, {y:.6}, {z:.6}) m in the mesh file",
         mass.mass_kg
     )?;
     let frequencies = frequencies_hz(recording);
-    let shown: Vec<String> = frequencies
-        .iter()
-        .take(8)
-        .map(|f| format!("{f:.4}"))
-        .collect();
+    let shown: Vec<String> = frequencies.iter().take(8).map(|f| format!("{f:.4}")).collect();
     let last = frequencies.last().copied().unwrap_or_default();
-    writeln!(
-        out,
-        "  modes        {} elastic, {} … {last:.4} Hz",
-        frequencies.len(),
-        shown.join(" ")
-    )?;
+    writeln!(out, "  modes        {} elastic, {} … {last:.4} Hz", frequencies.len(), shown.join(" "))?;
     match &recording.residual {
         ResidualCompliance::None => writeln!(out, "  residual     none")?,
         ResidualCompliance::Whole(_) => writeln!(out, "  residual     whole")?,
-        ResidualCompliance::NearField(near) => {
-            writeln!(out, "  residual     within {:.4} m", near.radius)?
-        }
+        ResidualCompliance::NearField(near) => writeln!(out, "  residual     within {:.4} m", near.radius)?,
     }
     match &metadata.certificate {
         None => writeln!(out, "  certificate  none")?,
@@ -166,12 +124,7 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
 }
 
 fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt::Result {
-    let Certificate {
-        event,
-        samples,
-        modes_of: [kept, all],
-        ..
-    } = certificate;
+    let Certificate { event, samples, modes_of: [kept, all], .. } = certificate;
     writeln!(
         out,
         "  certificate  against all {all} modes of the mesh, {kept} kept; {samples} points and patches"
@@ -179,7 +132,7 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     let ms = |s: f64| 1000.0 * s;
     writeln!(
         out,
-        "    force error          {} at most, {} in the median; pressed in {} ms, held to {} ms",
+        "    force error          {} at most, {} in the median: one place pressed smoothly in {} ms, held to {} ms",
         percent(certificate.force_error_max),
         percent(certificate.force_error_median),
         ms(event.rise_s),
@@ -187,12 +140,12 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     )?;
     writeln!(
         out,
-        "    static compliance    {} at most",
+        "    static compliance    {} at most, at rest",
         percent(certificate.static_compliance_error_max)
     )?;
     writeln!(
         out,
-        "    R[0] at {} ms step   {} at most: a jump of the hand within one step feels too soft by so much",
+        "    R[0] at {} ms step   {} at most: only a jump of the hand within one step feels it",
         ms(event.step_s),
         percent(certificate.instantaneous_compliance_error_max)
     )?;
@@ -201,18 +154,14 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
         "    bandwidth            {:.1} Hz (dynamic compliance within 5 % of the static)",
         certificate.bandwidth_hz
     )?;
-    writeln!(
-        out,
-        "    the reference itself is known to {}",
-        percent(certificate.reference_error)
-    )
+    writeln!(out, "    reference            known to {}", percent(certificate.reference_error))
 }
 
 fn percent(share: f64) -> String {
-    if share >= 0.1 {
-        format!("{:.0} %", 100.0 * share)
-    } else {
-        format!("{:.2} %", 100.0 * share)
+    match 100.0 * share {
+        percent if percent >= 10.0 => format!("{percent:.0} %"),
+        percent if percent >= 0.005 => format!("{percent:.2} %"),
+        _ => "below 0.01 %".into(),
     }
 }
 

@@ -39,11 +39,7 @@ pub struct Arguments {
     #[arg(long, value_name = "PA", required_unless_present = "materials")]
     pub young: Option<f64>,
     /// Poisson's ratio, below 0.5
-    #[arg(
-        long,
-        allow_negative_numbers = true,
-        required_unless_present = "materials"
-    )]
+    #[arg(long, allow_negative_numbers = true, required_unless_present = "materials")]
     pub poisson: Option<f64>,
     /// Density [kg/m³]
     #[arg(long, value_name = "KG/M³", required_unless_present = "materials")]
@@ -73,7 +69,7 @@ pub struct Arguments {
     /// Multiply the file's coordinates to come to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
-    /// Fix nodes: a named group of the mesh, or a condition in metres such as 'x<0.001' or 'y>0.1 & z<=0'; may be repeated
+    /// Fix nodes: a named group of the mesh, or a condition in metres such as 'x<0.001' or 'y>0.1 & z<=0'; may be repeated. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
     #[arg(long, value_name = "GROUP|CONDITION")]
     pub fix: Vec<String>,
     /// Make nodes that lie on the same point one node
@@ -124,10 +120,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Fail before the work, not after it.
 fn check_output(output: &Path) -> Result<(), Failure> {
-    let folder = output
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return Err(Failure(format!(
             "cannot write {}: there is no folder {}",
@@ -136,51 +129,30 @@ fn check_output(output: &Path) -> Result<(), Failure> {
         )));
     }
     if output.is_dir() {
-        return Err(Failure(format!(
-            "cannot write {}: it is a folder",
-            output.display()
-        )));
+        return Err(Failure(format!("cannot write {}: it is a folder", output.display())));
     }
-    tempfile::tempfile_in(folder)
-        .map(drop)
-        .map_err(|e| Failure::file("write into", folder, &e))
+    tempfile::tempfile_in(folder).map(drop).map_err(|e| Failure::file("write into", folder, &e))
 }
 
 fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Failure> {
-    let materials = match (
-        &arguments.materials,
-        arguments.young,
-        arguments.poisson,
-        arguments.density,
-    ) {
+    let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
         (Some(path), ..) => {
-            let text = std::fs::read_to_string(path)
-                .map_err(|e| Failure::file("read the materials", path, &e))?;
-            materials_from_toml(&text, mesh)
-                .map_err(|e| Failure(format!("{}: {e}", path.display())))?
+            let text =
+                std::fs::read_to_string(path).map_err(|e| Failure::file("read the materials", path, &e))?;
+            materials_from_toml(&text, mesh).map_err(|e| Failure(format!("{}: {e}", path.display())))?
         }
         (None, Some(young_pa), Some(poisson), Some(density_kg_m3)) => {
-            let material = Material {
-                region: String::new(),
-                young_pa,
-                poisson,
-                density_kg_m3,
-            };
+            let material = Material { region: String::new(), young_pa, poisson, density_kg_m3 };
             vec![material; mesh.regions.len()]
         }
         _ => {
-            return Err(Failure(
-                "give --young, --poisson and --density, or --materials".into(),
-            ));
+            return Err(Failure("give --young, --poisson and --density, or --materials".into()));
         }
     };
     let damping = match (arguments.rayleigh.as_deref(), arguments.damping_ratio) {
         (Some(&[alpha, beta]), _) => Damping::Rayleigh { alpha, beta },
         (Some(other), _) => {
-            return Err(Failure(format!(
-                "--rayleigh has {} numbers, expected ALPHA,BETA",
-                other.len()
-            )));
+            return Err(Failure(format!("--rayleigh has {} numbers, expected ALPHA,BETA", other.len())));
         }
         (None, ratio) => Damping::Ratio(ratio.unwrap_or(0.0)),
     };
@@ -190,11 +162,7 @@ fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Fa
     }
     Ok(RecordParameters {
         materials,
-        order: if arguments.order == 1 {
-            Order::Linear
-        } else {
-            Order::Quadratic
-        },
+        order: if arguments.order == 1 { Order::Linear } else { Order::Quadratic },
         modes: arguments.modes,
         damping,
         residual: arguments.residual,

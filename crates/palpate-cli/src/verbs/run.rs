@@ -57,16 +57,9 @@ const MOST_STEPS: f64 = 1e8;
 /// Run the verb.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = scene_file::read(&arguments.scene)?;
-    scene
-        .remarks
-        .iter()
-        .for_each(|remark| eprintln!("warning: {remark}"));
+    scene.remarks.iter().for_each(|remark| eprintln!("warning: {remark}"));
     let summary = simulate(&scene, arguments)?;
-    if arguments.json {
-        print_json(&summary.json(&scene))
-    } else {
-        print(&summary.text(&scene))
-    }
+    if arguments.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
 }
 
 /// What a run came to.
@@ -86,16 +79,8 @@ pub struct Summary {
 /// Run a scene to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
     let step_s = scene.model.parameters().step_s;
-    let longest = scene
-        .devices
-        .iter()
-        .map(|device| device.path.end())
-        .fold(0.0, f64::max);
-    let duration = arguments.duration.unwrap_or(if longest > 0.0 {
-        longest
-    } else {
-        DEFAULT_DURATION_S
-    });
+    let longest = scene.devices.iter().map(|device| device.path.end()).fold(0.0, f64::max);
+    let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });
     let steps = (duration / step_s).round();
     if !(duration.is_finite() && duration > 0.0 && steps >= 1.0) {
         return Err(Failure(format!(
@@ -108,31 +93,18 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         )));
     }
     if !(arguments.fps.is_finite() && arguments.fps > 0.0) {
-        return Err(Failure(format!(
-            "--fps is {}, expected a positive number",
-            arguments.fps
-        )));
+        return Err(Failure(format!("--fps is {}, expected a positive number", arguments.fps)));
     }
     let steps = steps as usize;
     let mut state = State::new(&scene.model);
-    let mut csv = arguments
-        .csv
-        .as_deref()
-        .map(|path| CsvWriter::new(path, scene))
-        .transpose()?;
-    let mut series = arguments
-        .vtu
-        .as_deref()
-        .map(|dir| VtuSeries::new(dir, scene.object_names.clone()))
-        .transpose()?;
+    let mut csv = arguments.csv.as_deref().map(|path| CsvWriter::new(path, scene)).transpose()?;
+    let mut series =
+        arguments.vtu.as_deref().map(|dir| VtuSeries::new(dir, scene.object_names.clone())).transpose()?;
     let mut input = Input {
         devices: scene
             .devices
             .iter()
-            .map(|device| DeviceInput {
-                position: device.path.at(0.0),
-                grasp: Some(device.grasp),
-            })
+            .map(|device| DeviceInput { position: device.path.at(0.0), grasp: Some(device.grasp) })
             .collect(),
     };
     let mut summary = Summary {
@@ -154,16 +126,13 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         }
         let before = Instant::now();
         let output = step(&scene.model, &mut state, &input);
-        summary
-            .times_ns
-            .push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
+        summary.times_ns.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
         summary.take(output);
         if let Some(csv) = &mut csv {
             csv.write(&input, output)?;
         }
-        if let Some(series) = series
-            .as_mut()
-            .filter(|series| time * arguments.fps >= series.frames() as f64 - 1e-9)
+        if let Some(series) =
+            series.as_mut().filter(|series| time * arguments.fps >= series.frames() as f64 - 1e-9)
         {
             series.write_frame(&scene.model, &state)?;
         }
@@ -258,12 +227,7 @@ impl Summary {
     /// The same for a person.
     pub fn text(&self, scene: &Scene) -> String {
         let step_s = scene.model.parameters().step_s;
-        let mut out = format!(
-            "{} steps of {} ms = {:.4} s\n",
-            self.steps,
-            1000.0 * step_s,
-            self.last.time_s
-        );
+        let mut out = format!("{} steps of {} ms = {:.4} s\n", self.steps, 1000.0 * step_s, self.last.time_s);
         for (device, forces) in scene.devices.iter().zip(&self.forces) {
             let last = forces.last().copied().unwrap_or_default();
             out += &format!(
@@ -282,7 +246,7 @@ impl Summary {
         }
         let energy = &self.last.energy;
         out += &format!(
-            "  energy       {:+.3e} J stored = {:+.3e} J from the hands - {:.3e} J damped (sum closes to {:.0e} J)\n",
+            "  energy       {:+.3e} J stored = {:+.3e} J from the hands - {:.3e} J lost (sum closes to {:.0e} J)\n",
             energy.stored() - self.start_energy,
             energy.input,
             energy.dissipated,
@@ -311,16 +275,11 @@ impl Summary {
 /// Time [µs] at a share of sorted times [ns].
 pub fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
     let at = (share * sorted_ns.len() as f64).ceil() as usize;
-    sorted_ns
-        .get(at.clamp(1, sorted_ns.len().max(1)) - 1)
-        .map_or(0.0, |ns| f64::from(*ns) / 1000.0)
+    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
 }
 
 fn largest(forces: &[DVec3]) -> f64 {
-    forces
-        .iter()
-        .map(|force| force.length())
-        .fold(0.0, f64::max)
+    forces.iter().map(|force| force.length()).fold(0.0, f64::max)
 }
 
 /// Every step as a line of numbers that read back to the same bits.
@@ -332,30 +291,16 @@ struct CsvWriter {
 impl CsvWriter {
     fn new(path: &Path, scene: &Scene) -> Result<Self, Failure> {
         let file = File::create(path).map_err(|e| Failure::file("write", path, &e))?;
-        let mut writer = Self {
-            file: BufWriter::new(file),
-            path: path.to_path_buf(),
-        };
+        let mut writer = Self { file: BufWriter::new(file), path: path.to_path_buf() };
         let mut columns = vec!["t".to_string()];
         for device in &scene.devices {
-            columns
-                .extend(["x", "y", "z", "fx", "fy", "fz"].map(|c| format!("{}.{c}", device.name)));
+            columns.extend(["x", "y", "z", "fx", "fy", "fz"].map(|c| format!("{}.{c}", device.name)));
         }
         for name in &scene.object_names {
-            let parts = [
-                "px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz",
-            ];
+            let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
             columns.extend(parts.map(|c| format!("{name}.{c}")));
         }
-        let energies = [
-            "kinetic",
-            "elastic",
-            "residual",
-            "potential",
-            "input",
-            "dissipated",
-            "defect",
-        ];
+        let energies = ["kinetic", "elastic", "residual", "potential", "input", "dissipated", "defect"];
         columns.extend(energies.map(|c| format!("energy.{c}")));
         writer.line(&columns.join(","))?;
         Ok(writer)
@@ -379,22 +324,12 @@ impl CsvWriter {
             numbers.extend(object.twist.angular.to_array());
         }
         let e = &output.energy;
-        numbers.extend([
-            e.kinetic,
-            e.elastic,
-            e.residual,
-            e.potential,
-            e.input,
-            e.dissipated,
-            e.defect,
-        ]);
+        numbers.extend([e.kinetic, e.elastic, e.residual, e.potential, e.input, e.dissipated, e.defect]);
         let cells: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
         self.line(&cells.join(","))
     }
 
     fn finish(mut self) -> Result<(), Failure> {
-        self.file
-            .flush()
-            .map_err(|e| Failure::file("write", &self.path, &e))
+        self.file.flush().map_err(|e| Failure::file("write", &self.path, &e))
     }
 }

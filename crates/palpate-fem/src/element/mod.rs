@@ -83,11 +83,7 @@ mod tests {
         DVec3::new(0.2, 0.9, 0.1),
         DVec3::new(0.0, 0.3, 1.4),
     ];
-    const RUBBER: Elasticity = Elasticity {
-        lambda: 3.0,
-        mu: 0.7,
-        density: 2.0,
-    };
+    const RUBBER: Elasticity = Elasticity { lambda: 3.0, mu: 0.7, density: 2.0 };
 
     fn nodes(order: Order) -> Vec<DVec3> {
         let mut nodes = CORNERS.to_vec();
@@ -101,9 +97,7 @@ mod tests {
         let (k, nodes) = (order.matrices(CORNERS, RUBBER).stiffness, nodes(order));
         let n = nodes.len();
         let u: Vec<_> = nodes.iter().map(|&x| displacement(x)).collect();
-        (0..n * n)
-            .map(|at| 0.5 * u[at / n].dot(k[at] * u[at % n]))
-            .sum()
+        (0..n * n).map(|at| 0.5 * u[at / n].dot(k[at] * u[at % n])).sum()
     }
 
     fn volume() -> f64 {
@@ -122,17 +116,13 @@ mod tests {
 
     #[test]
     fn uniform_strain_stores_its_exact_energy() {
-        let strain =
-            DMat3::from_cols_array_2d(&[[0.1, 0.2, -0.1], [0.2, -0.3, 0.4], [-0.1, 0.4, 0.5]]);
+        let strain = DMat3::from_cols_array_2d(&[[0.1, 0.2, -0.1], [0.2, -0.3, 0.4], [-0.1, 0.4, 0.5]]);
         let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
         let squares: f64 = strain.to_cols_array().iter().map(|e| e * e).sum();
         let exact = volume() * (0.5 * RUBBER.lambda * trace * trace + RUBBER.mu * squares);
         for order in [Order::Linear, Order::Quadratic] {
             let stored = energy(order, |x| strain * x);
-            assert!(
-                (stored / exact - 1.0).abs() < 1e-13,
-                "{order:?}: {stored} {exact}"
-            );
+            assert!((stored / exact - 1.0).abs() < 1e-13, "{order:?}: {stored} {exact}");
         }
     }
 
@@ -142,8 +132,7 @@ mod tests {
         // V/20·(Σx_i² + (Σx_i)²).
         let x: Vec<f64> = CORNERS.iter().map(|c| c.x).collect();
         let (sum, squares): (f64, f64) = (x.iter().sum(), x.iter().map(|x| x * x).sum());
-        let exact =
-            2.0 * (RUBBER.lambda + 2.0 * RUBBER.mu) * volume() / 20.0 * (squares + sum * sum);
+        let exact = 2.0 * (RUBBER.lambda + 2.0 * RUBBER.mu) * volume() / 20.0 * (squares + sum * sum);
         let stored = energy(Order::Quadratic, |x| DVec3::X * x.x * x.x);
         assert!((stored / exact - 1.0).abs() < 1e-13, "{stored} {exact}");
     }
@@ -153,18 +142,13 @@ mod tests {
         // ∫ρ·x·y by the closed form for a tetrahedron, from M alone.
         let (x, y): (Vec<f64>, Vec<f64>) = CORNERS.iter().map(|c| (c.x, c.y)).unzip();
         let cross: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
-        let exact = RUBBER.density * volume() / 20.0
-            * (cross + x.iter().sum::<f64>() * y.iter().sum::<f64>());
+        let exact =
+            RUBBER.density * volume() / 20.0 * (cross + x.iter().sum::<f64>() * y.iter().sum::<f64>());
         for order in [Order::Linear, Order::Quadratic] {
             let (mass, nodes) = (order.matrices(CORNERS, RUBBER).mass, nodes(order));
             let n = nodes.len();
-            let got: f64 = (0..n * n)
-                .map(|at| nodes[at / n].x * mass[at] * nodes[at % n].y)
-                .sum();
-            assert!(
-                (got / exact - 1.0).abs() < 1e-13,
-                "{order:?}: {got} {exact}"
-            );
+            let got: f64 = (0..n * n).map(|at| nodes[at / n].x * mass[at] * nodes[at % n].y).sum();
+            assert!((got / exact - 1.0).abs() < 1e-13, "{order:?}: {got} {exact}");
             assert!((mass.iter().sum::<f64>() / (RUBBER.density * volume()) - 1.0).abs() < 1e-14);
         }
     }

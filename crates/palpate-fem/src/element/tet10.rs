@@ -58,21 +58,11 @@ fn mass_shares() -> [[f64; 10]; 10] {
 pub(super) fn matrices(corners: [DVec3; 4], elasticity: Elasticity) -> ElementMatrices {
     static SHARES: std::sync::LazyLock<[[f64; 10]; 10]> = std::sync::LazyLock::new(mass_shares);
     let (gradients, volume) = gradients(corners);
-    let Elasticity {
-        lambda,
-        mu,
-        density,
-    } = elasticity;
+    let Elasticity { lambda, mu, density } = elasticity;
 
     // ∇N_i = Σ_a λ_a·slopes[i][a].
-    let slopes = forms().map(|form| {
-        form.map(|row| {
-            row.iter()
-                .zip(gradients)
-                .map(|(q, g)| g * (2.0 * q))
-                .sum::<DVec3>()
-        })
-    });
+    let slopes = forms()
+        .map(|form| form.map(|row| row.iter().zip(gradients).map(|(q, g)| g * (2.0 * q)).sum::<DVec3>()));
     let mut matrices = ElementMatrices::default();
     for (i, j) in (0..10).flat_map(|i| (0..10).map(move |j| (i, j))) {
         let mut stiffness = DMat3::ZERO;

@@ -16,19 +16,11 @@ pub fn gradients([a, b, c, d]: [DVec3; 4]) -> ([DVec3; 4], f64) {
 
 pub(super) fn matrices(corners: [DVec3; 4], elasticity: Elasticity) -> ElementMatrices {
     let (gradients, volume) = gradients(corners);
-    let Elasticity {
-        lambda,
-        mu,
-        density,
-    } = elasticity;
+    let Elasticity { lambda, mu, density } = elasticity;
     let mut matrices = ElementMatrices::default();
     for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
-        matrices
-            .stiffness
-            .push(block(gradients[i], gradients[j], lambda, mu) * volume);
-        matrices
-            .mass
-            .push(density * volume / 20.0 * if i == j { 2.0 } else { 1.0 });
+        matrices.stiffness.push(block(gradients[i], gradients[j], lambda, mu) * volume);
+        matrices.mass.push(density * volume / 20.0 * if i == j { 2.0 } else { 1.0 });
     }
     matrices
 }

@@ -55,9 +55,7 @@ fn faces(tets: &[[u32; 4]]) -> Vec<Face> {
 /// their sorted nodes.
 pub fn boundary(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
     let faces = faces(tets);
-    let lone = faces
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(|same| same.len() == 1);
+    let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
     lone.map(|same| {
         let ([a, b, c], even, _) = same[0];
         if even { [a, b, c] } else { [a, c, b] }
@@ -73,9 +71,7 @@ pub fn boundary(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
 pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
     let unusable = |what: String| Err(MeshError::Unusable(what));
     if mesh.tets.is_empty() {
-        return unusable(
-            "the mesh has no tetrahedra; palpate needs a volume mesh, not a surface".into(),
-        );
+        return unusable("the mesh has no tetrahedra; palpate needs a volume mesh, not a surface".into());
     }
     let mut used = vec![false; mesh.nodes.len()];
     for (number, tet) in mesh.tets.iter().enumerate() {
@@ -99,9 +95,7 @@ pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
     let (low, high) = extent(&mesh, &used);
     let unused = used.iter().filter(|used| !**used).count();
     if unused > 0 {
-        mesh.remarks.push(format!(
-            "{unused} nodes belong to no tetrahedron and are left out"
-        ));
+        mesh.remarks.push(format!("{unused} nodes belong to no tetrahedron and are left out"));
     }
     turn_upright(&mut mesh)?;
     let faces = faces(&mesh.tets);
@@ -131,22 +125,14 @@ pub fn merge_nodes(mesh: &mut Mesh) -> usize {
     for (a, b) in pairs {
         first[b as usize] = first[a as usize];
     }
-    let renumber = |nodes: &mut [u32]| {
-        nodes
-            .iter_mut()
-            .for_each(|node| *node = first[*node as usize])
-    };
+    let renumber = |nodes: &mut [u32]| nodes.iter_mut().for_each(|node| *node = first[*node as usize]);
     mesh.tets.iter_mut().for_each(|tet| renumber(tet));
     for group in &mut mesh.groups {
         renumber(&mut group.nodes);
         group.nodes.sort_unstable();
         group.nodes.dedup();
     }
-    first
-        .iter()
-        .enumerate()
-        .filter(|(at, first)| *at as u32 != **first)
-        .count()
+    first.iter().enumerate().filter(|(at, first)| *at as u32 != **first).count()
 }
 
 fn place(p: DVec3) -> String {
@@ -154,25 +140,12 @@ fn place(p: DVec3) -> String {
 }
 
 fn centre(mesh: &Mesh, tet: u32) -> DVec3 {
-    mesh.tets[tet as usize]
-        .iter()
-        .map(|&n| mesh.nodes[n as usize])
-        .sum::<DVec3>()
-        * 0.25
+    mesh.tets[tet as usize].iter().map(|&n| mesh.nodes[n as usize]).sum::<DVec3>() * 0.25
 }
 
 fn extent(mesh: &Mesh, used: &[bool]) -> (DVec3, DVec3) {
-    let points = || {
-        mesh.nodes
-            .iter()
-            .zip(used)
-            .filter(|(p, used)| **used && p.is_finite())
-            .map(|(p, _)| *p)
-    };
-    (
-        points().reduce(DVec3::min).unwrap_or_default(),
-        points().reduce(DVec3::max).unwrap_or_default(),
-    )
+    let points = || mesh.nodes.iter().zip(used).filter(|(p, used)| **used && p.is_finite()).map(|(p, _)| *p);
+    (points().reduce(DVec3::min).unwrap_or_default(), points().reduce(DVec3::max).unwrap_or_default())
 }
 
 /// Swap two corners where the volume is negative; refuse flat tetrahedra.
@@ -221,12 +194,8 @@ fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
         })
         .collect();
     sorted.sort_unstable();
-    doubled.extend(
-        sorted
-            .windows(2)
-            .filter(|pair| pair[0].0 == pair[1].0)
-            .map(|pair| (pair[0].1, pair[1].1)),
-    );
+    doubled
+        .extend(sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| (pair[0].1, pair[1].1)));
     for same in faces.chunk_by(|a, b| a.0 == b.0) {
         match same {
             [_] => {}
@@ -247,10 +216,7 @@ fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
         return report(&doubled, "tetrahedra are duplicated (the same four nodes)");
     }
     if !crowded.is_empty() {
-        return report(
-            &crowded,
-            "faces belong to more than two tetrahedra: parts of the mesh overlap",
-        );
+        return report(&crowded, "faces belong to more than two tetrahedra: parts of the mesh overlap");
     }
     if !folded.is_empty() {
         return report(
@@ -262,11 +228,7 @@ fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
 }
 
 /// All tetrahedra must hang together through faces.
-fn check_connected(
-    mesh: &Mesh,
-    faces: &[Face],
-    coincident: Option<(u32, u32)>,
-) -> Result<(), MeshError> {
+fn check_connected(mesh: &Mesh, faces: &[Face], coincident: Option<(u32, u32)>) -> Result<(), MeshError> {
     let mut parent: Vec<u32> = (0..mesh.tets.len() as u32).collect();
     fn root(parent: &mut [u32], mut at: u32) -> u32 {
         while parent[at as usize] != at {
@@ -275,10 +237,7 @@ fn check_connected(
         }
         at
     }
-    for same in faces
-        .chunk_by(|a, b| a.0 == b.0)
-        .filter(|same| same.len() == 2)
-    {
+    for same in faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 2) {
         let (a, b) = (root(&mut parent, same[0].2), root(&mut parent, same[1].2));
         parent[a.max(b) as usize] = a.min(b);
     }
@@ -318,8 +277,7 @@ fn coincident_pairs(mesh: &Mesh, used: &[bool], tolerance: f64) -> Vec<(u32, u32
         .filter(|&n| used[n as usize] && mesh.nodes[n as usize].is_finite())
         .collect();
     let key = |n: u32| mesh.nodes[n as usize].to_array();
-    let compare =
-        |a: &[f64; 3], b: &[f64; 3]| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal);
+    let compare = |a: &[f64; 3], b: &[f64; 3]| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal);
     // Round to the tolerance first, so that equal points sort next to each other in y and z too.
     let rounded = |n: u32| key(n).map(|v| (v / (8.0 * tolerance)).round());
     order.sort_by(|&a, &b| compare(&rounded(a), &rounded(b)).then(a.cmp(&b)));
@@ -336,13 +294,10 @@ fn remark_on_size(mesh: &mut Mesh, extent: DVec3) {
     let largest = extent.max_element();
     let [small, large] = USUAL_EXTENT;
     if largest > large {
-        mesh.remarks.push(format!(
-            "the body is {largest} m large; if the file is in millimetres, use --scale 0.001"
-        ));
+        mesh.remarks
+            .push(format!("the body is {largest} m large; if the file is in millimetres, use --scale 0.001"));
     } else if largest < small {
-        mesh.remarks.push(format!(
-            "the body is only {largest} m large; is the scale right? (--scale)"
-        ));
+        mesh.remarks.push(format!("the body is only {largest} m large; is the scale right? (--scale)"));
     }
 }
 
@@ -356,16 +311,9 @@ fn remark_on_quality(mesh: &mut Mesh) {
             .sum();
         12.0 * (3.0 * tet_volume(&mesh.nodes, tet)).powf(2.0 / 3.0) / squares
     };
-    let worst = mesh
-        .tets
-        .iter()
-        .enumerate()
-        .map(|(number, tet)| (number, quality(tet)));
+    let worst = mesh.tets.iter().enumerate().map(|(number, tet)| (number, quality(tet)));
     let poor = worst.clone().filter(|(_, q)| *q < POOR_BELOW).count();
-    if let Some((number, q)) = worst
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|_| poor > 0)
-    {
+    if let Some((number, q)) = worst.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| poor > 0) {
         mesh.remarks.push(format!(
             "{poor} tetrahedra are slivers, the worst is {number} near {} with quality {q:.4} (1 is regular): \
              responses are too stiff there",

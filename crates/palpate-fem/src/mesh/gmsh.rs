@@ -29,10 +29,7 @@ use super::{Mesh, MeshError};
 /// When the file cannot be opened, is damaged or of another version, or holds solid elements
 /// other than tetrahedra.
 pub fn read(path: &Path) -> Result<Mesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read {
-        path: path.to_path_buf(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
     parse(&bytes, path)
 }
 
@@ -183,12 +180,5 @@ fn assemble(
         ));
     }
     remarks.extend(joined);
-    Ok(Mesh {
-        nodes: nodes.positions,
-        tets: elements.tets,
-        tet_regions,
-        regions,
-        groups,
-        remarks,
-    })
+    Ok(Mesh { nodes: nodes.positions, tets: elements.tets, tet_regions, regions, groups, remarks })
 }

@@ -58,9 +58,7 @@ impl Mesh {
     /// When the factor is not a positive number.
     pub fn scale(&mut self, factor: f64) -> Result<(), MeshError> {
         if !(factor.is_finite() && factor > 0.0) {
-            return Err(MeshError::Unusable(format!(
-                "scale is {factor}, expected a positive number"
-            )));
+            return Err(MeshError::Unusable(format!("scale is {factor}, expected a positive number")));
         }
         self.nodes.iter_mut().for_each(|node| *node *= factor);
         Ok(())

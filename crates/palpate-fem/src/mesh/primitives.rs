@@ -8,13 +8,7 @@ const MOST_TETRAHEDRA: u64 = 20_000_000;
 
 fn body(nodes: Vec<DVec3>, tets: Vec<[u32; 4]>) -> Mesh {
     let tet_regions = vec![0; tets.len()];
-    Mesh {
-        nodes,
-        tets,
-        tet_regions,
-        regions: vec![Region { tag: 0, name: None }],
-        ..Mesh::default()
-    }
+    Mesh { nodes, tets, tet_regions, regions: vec![Region { tag: 0, name: None }], ..Mesh::default() }
 }
 
 /// A box of the given size [m] about the origin, each of its cells in five tetrahedra.
@@ -26,14 +20,9 @@ fn body(nodes: Vec<DVec3>, tets: Vec<[u32; 4]>) -> Mesh {
 /// # Errors
 /// When a size is not positive or the number of cells is 0 or too large.
 pub fn box_mesh(size: [f64; 3], cells: [u32; 3]) -> Result<Mesh, MeshError> {
-    let count = cells
-        .iter()
-        .try_fold(5_u64, |n, &c| n.checked_mul(u64::from(c)))
-        .unwrap_or(u64::MAX);
+    let count = cells.iter().try_fold(5_u64, |n, &c| n.checked_mul(u64::from(c))).unwrap_or(u64::MAX);
     if size.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        return Err(MeshError::Unusable(format!(
-            "box size is {size:?} m, expected three positive numbers"
-        )));
+        return Err(MeshError::Unusable(format!("box size is {size:?} m, expected three positive numbers")));
     }
     if count == 0 || count > MOST_TETRAHEDRA {
         return Err(MeshError::Unusable(format!(
@@ -51,8 +40,7 @@ pub fn box_mesh(size: [f64; 3], cells: [u32; 3]) -> Result<Mesh, MeshError> {
                     f64::from(j) / f64::from(ny),
                     f64::from(k) / f64::from(nz),
                 ];
-                nodes
-                    .push((DVec3::from_array(share) - DVec3::splat(0.5)) * DVec3::from_array(size));
+                nodes.push((DVec3::from_array(share) - DVec3::splat(0.5)) * DVec3::from_array(size));
             }
         }
     }
@@ -87,14 +75,9 @@ pub fn box_mesh(size: [f64; 3], cells: [u32; 3]) -> Result<Mesh, MeshError> {
 /// When the radius is not positive or the number of layers is 0 or too large.
 pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
     if !(radius.is_finite() && radius > 0.0) {
-        return Err(MeshError::Unusable(format!(
-            "sphere radius is {radius} m, expected a positive number"
-        )));
+        return Err(MeshError::Unusable(format!("sphere radius is {radius} m, expected a positive number")));
     }
-    let count = u64::from(layers)
-        .checked_pow(3)
-        .and_then(|n| n.checked_mul(20))
-        .unwrap_or(u64::MAX);
+    let count = u64::from(layers).checked_pow(3).and_then(|n| n.checked_mul(20)).unwrap_or(u64::MAX);
     if layers == 0 || count > MOST_TETRAHEDRA {
         return Err(MeshError::Unusable(format!(
             "sphere of {layers} layers has {count} tetrahedra, expected 1 layer or more and at most {MOST_TETRAHEDRA} tetrahedra"
@@ -112,11 +95,7 @@ pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
             shares[q] += b - c;
             shares[r] += c;
             *numbers.entry(shares).or_insert_with(|| {
-                let sum: DVec3 = shares
-                    .iter()
-                    .zip(corners)
-                    .map(|(&s, corner)| corner * f64::from(s))
-                    .sum();
+                let sum: DVec3 = shares.iter().zip(corners).map(|(&s, corner)| corner * f64::from(s)).sum();
                 let shell = radius * f64::from(a) / f64::from(layers);
                 mesh.nodes.push(sum.normalize_or_zero() * shell);
                 mesh.nodes.len() as u32 - 1
@@ -148,14 +127,7 @@ pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
 }
 
 /// The six paths along the axes from (0,0,0) to (1,1,1): Kuhn's split of a cell.
-const KUHN: [[usize; 3]; 6] = [
-    [0, 1, 2],
-    [0, 2, 1],
-    [1, 0, 2],
-    [1, 2, 0],
-    [2, 0, 1],
-    [2, 1, 0],
-];
+const KUHN: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 fn lattice(n: u32) -> impl Iterator<Item = [u32; 3]> {
     (0..n).flat_map(move |a| (0..=a).flat_map(move |b| (0..=b).map(move |c| [a, b, c])))
@@ -199,35 +171,18 @@ mod tests {
         assert_eq!((mesh.nodes.len(), mesh.tets.len()), (2197, 8640));
         let boundary = crate::mesh::boundary(&mesh.tets);
         assert_eq!(boundary.len(), 1728);
-        let corners = mesh
-            .nodes
-            .iter()
-            .enumerate()
-            .filter(|(_, p)| p.abs().min_element() > 0.0499);
+        let corners = mesh.nodes.iter().enumerate().filter(|(_, p)| p.abs().min_element() > 0.0499);
         for (corner, _) in corners {
-            let owners = mesh
-                .tets
-                .iter()
-                .filter(|tet| tet.contains(&(corner as u32)))
-                .count();
+            let owners = mesh.tets.iter().filter(|tet| tet.contains(&(corner as u32))).count();
             assert_eq!(owners, 1, "corner {corner}");
         }
     }
 
     #[test]
     fn boxes_of_odd_cell_counts_fill_their_volume() {
-        let mesh =
-            check(box_mesh([1.0, 2.0, 3.0], [3, 1, 2]).expect("a good box")).expect("a sound mesh");
-        let volume: f64 = mesh
-            .tets
-            .iter()
-            .map(|tet| tet_volume(&mesh.nodes, tet))
-            .sum();
-        assert!(
-            (volume - 6.0).abs() < 1e-14 && mesh.remarks.is_empty(),
-            "{volume} {:?}",
-            mesh.remarks
-        );
+        let mesh = check(box_mesh([1.0, 2.0, 3.0], [3, 1, 2]).expect("a good box")).expect("a sound mesh");
+        let volume: f64 = mesh.tets.iter().map(|tet| tet_volume(&mesh.nodes, tet)).sum();
+        assert!((volume - 6.0).abs() < 1e-14 && mesh.remarks.is_empty(), "{volume} {:?}", mesh.remarks);
     }
 
     #[test]
@@ -235,11 +190,7 @@ mod tests {
         let missing = |layers: u32| {
             let mesh = check(ball_mesh(0.5, layers).expect("a good ball")).expect("a sound mesh");
             assert_eq!(mesh.tets.len() as u32, 20 * layers.pow(3));
-            let volume: f64 = mesh
-                .tets
-                .iter()
-                .map(|tet| tet_volume(&mesh.nodes, tet))
-                .sum();
+            let volume: f64 = mesh.tets.iter().map(|tet| tet_volume(&mesh.nodes, tet)).sum();
             1.0 - volume / (std::f64::consts::PI / 6.0)
         };
         let order = (missing(4) / missing(8)).log2();
@@ -249,16 +200,11 @@ mod tests {
     #[test]
     fn impossible_primitives_are_refused() {
         assert!(
-            box_mesh([0.0, 1.0, 1.0], [1; 3]).is_err()
-                && box_mesh([f64::NAN, 1.0, 1.0], [1; 3]).is_err()
+            box_mesh([0.0, 1.0, 1.0], [1; 3]).is_err() && box_mesh([f64::NAN, 1.0, 1.0], [1; 3]).is_err()
         );
+        assert!(box_mesh([1.0; 3], [0, 1, 1]).is_err() && box_mesh([1.0; 3], [u32::MAX; 3]).is_err());
         assert!(
-            box_mesh([1.0; 3], [0, 1, 1]).is_err() && box_mesh([1.0; 3], [u32::MAX; 3]).is_err()
-        );
-        assert!(
-            ball_mesh(-1.0, 3).is_err()
-                && ball_mesh(1.0, 0).is_err()
-                && ball_mesh(1.0, u32::MAX).is_err()
+            ball_mesh(-1.0, 3).is_err() && ball_mesh(1.0, 0).is_err() && ball_mesh(1.0, u32::MAX).is_err()
         );
     }
 }

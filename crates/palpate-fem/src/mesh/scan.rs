@@ -62,18 +62,8 @@ pub(super) struct Scan<'a> {
 impl<'a> Scan<'a> {
     /// At the start of a file, as text, past a byte-order mark.
     pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
-        let at = if bytes.starts_with(b"\xef\xbb\xbf") {
-            3
-        } else {
-            0
-        };
-        Self {
-            bytes,
-            at,
-            begun: at,
-            path,
-            encoding: Encoding::Text,
-        }
+        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        Self { bytes, at, begun: at, path, encoding: Encoding::Text }
     }
 
     pub fn is_text(&self) -> bool {
@@ -103,21 +93,13 @@ impl<'a> Scan<'a> {
     pub fn error_at(&self, at: usize, message: impl Into<String>) -> MeshError {
         let place = if self.is_text() {
             let before = self.bytes.get(..at).unwrap_or(self.bytes);
-            let before = if at < self.bytes.len() {
-                before
-            } else {
-                before.trim_ascii_end()
-            };
+            let before = if at < self.bytes.len() { before } else { before.trim_ascii_end() };
             let lines_before = before.iter().filter(|&&byte| byte == b'\n').count();
             format!("line {}", lines_before + 1)
         } else {
             format!("byte {at}")
         };
-        MeshError::Format {
-            path: self.path.to_path_buf(),
-            place,
-            message: message.into(),
-        }
+        MeshError::Format { path: self.path.to_path_buf(), place, message: message.into() }
     }
 
     /// [`Scan::error`] as a result.
@@ -224,11 +206,7 @@ impl<'a> Scan<'a> {
 
     /// As [`Scan::end_of_line`] in a text file; a binary one has no lines.
     pub fn end_of_row(&mut self) -> Result<(), MeshError> {
-        if self.is_text() {
-            self.end_of_line()
-        } else {
-            Ok(())
-        }
+        if self.is_text() { self.end_of_line() } else { Ok(()) }
     }
 
     /// Goes to the next line that is not blank in a text file; a binary one has no lines.
@@ -241,10 +219,8 @@ impl<'a> Scan<'a> {
     /// Goes past `mark`, which stands at the start of a line in a text file.
     pub fn skip_past(&mut self, mark: &[u8]) -> Result<(), MeshError> {
         let mut from = self.at;
-        while let Some(distance) = self
-            .bytes
-            .get(from..)
-            .and_then(|rest| rest.windows(mark.len()).position(|window| window == mark))
+        while let Some(distance) =
+            self.bytes.get(from..).and_then(|rest| rest.windows(mark.len()).position(|window| window == mark))
         {
             let (start, end) = (from + distance, from + distance + mark.len());
             let starts_line = start == 0 || self.bytes.get(start - 1) == Some(&b'\n');
@@ -365,35 +341,22 @@ impl OtherSolids {
         if self.counts.is_empty() {
             return Ok(());
         }
-        let list: Vec<_> = self
-            .counts
-            .iter()
-            .map(|(k, n)| format!("{k} ({n})"))
-            .collect();
-        let message = format!(
-            "only tetrahedra are supported, and the file also has {}",
-            list.join(", ")
-        );
+        let list: Vec<_> = self.counts.iter().map(|(k, n)| format!("{k} ({n})")).collect();
+        let message = format!("only tetrahedra are supported, and the file also has {}", list.join(", "));
         Err(scan.error_at(self.first_at, message))
     }
 }
 
 /// The regions that tetrahedra with these tags need, by ascending tag, and the position of each
 /// tetrahedron's region among them.
-pub(super) fn regions(
-    tet_tags: &[i64],
-    name: impl Fn(i64) -> Option<String>,
-) -> (Vec<Region>, Vec<u32>) {
+pub(super) fn regions(tet_tags: &[i64], name: impl Fn(i64) -> Option<String>) -> (Vec<Region>, Vec<u32>) {
     let mut tags = tet_tags.to_vec();
     tags.dedup();
     tags.sort_unstable();
     tags.dedup();
     let position = |tag| tags.partition_point(|&other| other < tag) as u32;
     let tet_regions = tet_tags.iter().map(|&tag| position(tag)).collect();
-    let region = |&tag: &i64| Region {
-        tag,
-        name: name(tag),
-    };
+    let region = |&tag: &i64| Region { tag, name: name(tag) };
     (tags.iter().map(region).collect(), tet_regions)
 }
 

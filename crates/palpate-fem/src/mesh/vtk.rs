@@ -42,10 +42,7 @@ pub const REGION_ARRAYS: [&str; 11] = [
 /// # Errors
 /// When the file cannot be opened, is damaged, or holds solid cells other than tetrahedra.
 pub fn read(path: &Path) -> Result<Mesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read {
-        path: path.to_path_buf(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
     parse(&bytes, path)
 }
 
@@ -156,14 +153,10 @@ impl<'a> Reader<'a> {
         }
         let stated = self.scan.text_number("the number of points")?;
         let number = self.number_type()?;
-        let count = self
-            .scan
-            .count(stated, 3 * self.least_bytes(number), "points")?;
+        let count = self.scan.count(stated, 3 * self.least_bytes(number), "points")?;
         self.scan.end_of_line()?;
         if u32::try_from(count).is_err() {
-            return self
-                .scan
-                .fail(format!("{count} points are more than can be numbered"));
+            return self.scan.fail(format!("{count} points are more than can be numbered"));
         }
         let mut points = Vec::with_capacity(count);
         for _ in 0..count {
@@ -199,12 +192,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Each cell as the number of its points, then the points; `size` counts all these numbers.
-    fn read_sized_cells(
-        &mut self,
-        rows: u64,
-        size: u64,
-        point_count: usize,
-    ) -> Result<Cells, MeshError> {
+    fn read_sized_cells(&mut self, rows: u64, size: u64, point_count: usize) -> Result<Cells, MeshError> {
         let bytes_each = self.least_bytes(Number::I32);
         let rows = self.scan.count(rows, bytes_each, "cells")?;
         let size = self.scan.count(size, bytes_each, "numbers in cells")?;
@@ -260,9 +248,7 @@ impl<'a> Reader<'a> {
 
         self.scan.expect_keyword("CONNECTIVITY")?;
         let number = self.number_type()?;
-        let size = self
-            .scan
-            .count(size, self.least_bytes(number), "points of cells")?;
+        let size = self.scan.count(size, self.least_bytes(number), "points of cells")?;
         self.scan.end_of_line()?;
         let mut points = Vec::with_capacity(size);
         for _ in 0..size {
@@ -277,9 +263,7 @@ impl<'a> Reader<'a> {
         let point = self.integer(number, "a point of a cell")?;
         match u32::try_from(point) {
             Ok(point) if (point as usize) < point_count => Ok(point),
-            _ => self.scan.fail(format!(
-                "a cell has point {point}, and the file has {point_count} points"
-            )),
+            _ => self.scan.fail(format!("a cell has point {point}, and the file has {point_count} points")),
         }
     }
 
@@ -319,9 +303,7 @@ impl<'a> Reader<'a> {
                     tets.cells.push(cell);
                     curved |= points.len() > 4;
                 }
-                (Shape::Tetrahedron, None) => {
-                    other_solids.add(scan, "tetrahedra with under 4 points")
-                }
+                (Shape::Tetrahedron, None) => other_solids.add(scan, "tetrahedra with under 4 points"),
                 (Shape::Flat, _) => flat_cells += 1,
                 (Shape::Solid(name), _) => other_solids.add(scan, name),
             }
@@ -346,9 +328,7 @@ impl<'a> Reader<'a> {
             (b"POINT_DATA", Some(points), _) => ("points", points, ArraysOf::Points(points)),
             (b"CELL_DATA", _, Some(cells)) => ("cells", cells, ArraysOf::Cells(cells)),
             _ => {
-                return self
-                    .scan
-                    .fail("data comes before the points or cells it is of");
+                return self.scan.fail("data comes before the points or cells it is of");
             }
         };
         let stated: usize = self.scan.text_number("the number of tuples")?;
@@ -375,9 +355,7 @@ impl<'a> Reader<'a> {
             ArraysOf::Points(count) | ArraysOf::Cells(count) => count as u64,
             ArraysOf::File if matches!(keyword, b"FIELD" | b"LOOKUP_TABLE") => 0,
             ArraysOf::File => {
-                return self
-                    .scan
-                    .fail("an array comes before POINT_DATA and CELL_DATA");
+                return self.scan.fail("an array comes before POINT_DATA and CELL_DATA");
             }
         };
         let name = self.scan.word_in_line();
@@ -405,11 +383,7 @@ impl<'a> Reader<'a> {
             }
             b"COLOR_SCALARS" | b"LOOKUP_TABLE" => {
                 let stated = self.scan.text_number("the number of colours")?;
-                let number = if self.scan.is_text() {
-                    Number::F32
-                } else {
-                    Number::U8
-                };
+                let number = if self.scan.is_text() { Number::F32 } else { Number::U8 };
                 match keyword {
                     b"LOOKUP_TABLE" => (number, fixed_components, stated),
                     _ => (number, stated, tuples),
@@ -488,16 +462,9 @@ impl<'a> Reader<'a> {
     }
 
     /// The numbers of an array; empty for one that is not of integers.
-    fn read_numbers(
-        &mut self,
-        number: Number,
-        components: u64,
-        tuples: u64,
-    ) -> Result<Vec<i64>, MeshError> {
+    fn read_numbers(&mut self, number: Number, components: u64, tuples: u64) -> Result<Vec<i64>, MeshError> {
         let count = components.saturating_mul(tuples);
-        let count = self
-            .scan
-            .count(count, self.least_bytes(number), "numbers")?;
+        let count = self.scan.count(count, self.least_bytes(number), "numbers")?;
         if !number.is_integer() {
             for _ in 0..count {
                 self.scan.start_of_row();
@@ -520,11 +487,7 @@ impl<'a> Reader<'a> {
 
     /// How few bytes such a number takes.
     fn least_bytes(&self, number: Number) -> usize {
-        if self.scan.is_text() {
-            2
-        } else {
-            number.bytes()
-        }
+        if self.scan.is_text() { 2 } else { number.bytes() }
     }
 
     /// The name of a number type.

@@ -8,13 +8,8 @@ use super::parse;
 use crate::mesh::scan::tests::XorShift;
 use crate::mesh::{Mesh, MeshError, NodeGroup, Region};
 
-const POSITIONS: [[f64; 3]; 5] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.25, -2.5e-3, 1.0],
-    [1.0, 1.0, 1.5],
-];
+const POSITIONS: [[f64; 3]; 5] =
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.25, -2.5e-3, 1.0], [1.0, 1.0, 1.5]];
 /// Cell types and points.
 const CELLS: [(i32, &[i32]); 3] = [(5, &[2, 0, 1]), (10, &[0, 1, 2, 3]), (10, &[1, 2, 3, 4])];
 
@@ -30,14 +25,8 @@ fn expected() -> Mesh {
         tet_regions: vec![1, 0],
         regions: vec![region(-3), region(7)],
         groups: vec![
-            NodeGroup {
-                name: "left side".to_owned(),
-                nodes: vec![0, 2],
-            },
-            NodeGroup {
-                name: "top".to_owned(),
-                nodes: vec![4],
-            },
+            NodeGroup { name: "left side".to_owned(), nodes: vec![0, 2] },
+            NodeGroup { name: "top".to_owned(), nodes: vec![4] },
         ],
         remarks: vec!["cells of dimension 0 to 2 are ignored: 1".to_owned()],
     }
@@ -97,15 +86,10 @@ const VARIANTS: [(bool, bool); 4] = [(false, true), (false, false), (true, true)
 
 /// The file in one of its variants: with `OFFSETS` or sizes, text or binary.
 fn file(has_offsets: bool, is_text: bool) -> Vec<u8> {
-    let mut w = Writer {
-        is_text,
-        bytes: Vec::new(),
-    };
+    let mut w = Writer { is_text, bytes: Vec::new() };
     let version = if has_offsets { "5.1" } else { "3.0" };
     let encoding = if is_text { "ASCII" } else { "BINARY" };
-    w.text(&format!(
-        "# vtk DataFile Version {version}\nPOINTS 1\n{encoding}\n"
-    ));
+    w.text(&format!("# vtk DataFile Version {version}\nPOINTS 1\n{encoding}\n"));
     w.text("DATASET UNSTRUCTURED_GRID\nFIELD FieldData 1\nTIME 1 1 double\n");
     w.doubles(&[0.5]);
     w.text("\nPOINTS 5 double\n");
@@ -201,13 +185,8 @@ fn line_ends_blank_lines_case_and_a_byte_order_mark_change_nothing() {
     let text = String::from_utf8(file(true, true)).unwrap();
     let (first, rest) = text.split_once("ASCII\n").unwrap();
     let (first, rest) = (first.replace('\n', "\r\n"), rest.replace('\n', " \r\n"));
-    let rest = rest
-        .replace("POINTS", "points")
-        .replace("DATASET", "\r\n\r\n Dataset");
-    assert_eq!(
-        read(format!("\u{feff}{first}ascii\r\n{rest}")).unwrap(),
-        expected()
-    );
+    let rest = rest.replace("POINTS", "points").replace("DATASET", "\r\n\r\n Dataset");
+    assert_eq!(read(format!("\u{feff}{first}ascii\r\n{rest}")).unwrap(), expected());
     assert_eq!(read(text.trim_end()).unwrap(), expected());
 }
 
@@ -233,8 +212,7 @@ fn without_a_region_array_there_is_one_region() {
 
 #[test]
 fn region_arrays_with_fractions_are_remarked_and_the_first_other_is_taken() {
-    let arrays =
-        "CELL_DATA 1\nFIELD f 3\nRegion 1 1 float\n2\npart 1 1 short\n5\nregion 1 1 int\n6\n";
+    let arrays = "CELL_DATA 1\nFIELD f 3\nRegion 1 1 float\n2\npart 1 1 short\n5\nregion 1 1 int\n6\n";
     let mesh = read(format!("{SHORT}{arrays}")).unwrap();
     assert_eq!(mesh.regions, [region(5)]);
     let remark = "cell array 'Region' is ignored: its type is no integer";
@@ -246,17 +224,12 @@ fn strings_in_text_are_skipped_and_in_binary_refused() {
     let field = "FIELD f 2\nnote 1 3 string\na b\n\nPOINTS 3\nx 1 1 int\n1\nPOINTS";
     assert!(read(SHORT.replace("POINTS", field)).is_ok());
     let binary = SHORT.replace("ASCII", "BINARY").replace("POINTS", field);
-    assert_eq!(
-        message(binary),
-        "m.vtk: byte 80: arrays of type 'string' cannot be read: save as ASCII"
-    );
+    assert_eq!(message(binary), "m.vtk: byte 80: arrays of type 'string' cannot be read: save as ASCII");
 }
 
 #[test]
 fn quadratic_tetrahedra_give_their_corners_and_a_remark() {
-    let file = SHORT
-        .replace("1 5\n4 0 1 2 3", "1 11\n10 3 2 1 0 0 0 0 0 0 0")
-        .replace("\n10\n", "\n24\n");
+    let file = SHORT.replace("1 5\n4 0 1 2 3", "1 11\n10 3 2 1 0 0 0 0 0 0 0").replace("\n10\n", "\n24\n");
     let mesh = read(file).unwrap();
     assert_eq!(mesh.tets, [[3, 2, 1, 0]]);
     let remark = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
@@ -291,27 +264,11 @@ fn what_is_no_unstructured_grid_in_a_legacy_file_is_refused() {
         assert_eq!(message(file), format!("m.vtk: {expected}"));
     }
     for (from, to, expected) in [
-        (
-            "ASCII",
-            "TEXT",
-            "line 3: expected ASCII or BINARY, found 'TEXT'",
-        ),
+        ("ASCII", "TEXT", "line 3: expected ASCII or BINARY, found 'TEXT'"),
         ("DATASET", "DATA", "line 4: expected DATASET, found 'DATA'"),
-        (
-            "UNSTRUCTURED_GRID",
-            "POLYDATA",
-            "line 4: expected UNSTRUCTURED_GRID, found 'POLYDATA'",
-        ),
-        (
-            "float",
-            "half",
-            "line 5: expected a number type such as double, found 'half'",
-        ),
-        (
-            "CELLS 1",
-            "VERTS 1",
-            "line 9: expected a keyword such as POINT_DATA, found 'VERTS'",
-        ),
+        ("UNSTRUCTURED_GRID", "POLYDATA", "line 4: expected UNSTRUCTURED_GRID, found 'POLYDATA'"),
+        ("float", "half", "line 5: expected a number type such as double, found 'half'"),
+        ("CELLS 1", "VERTS 1", "line 9: expected a keyword such as POINT_DATA, found 'VERTS'"),
     ] {
         assert_message(SHORT, from, to, expected);
     }
@@ -320,56 +277,20 @@ fn what_is_no_unstructured_grid_in_a_legacy_file_is_refused() {
 #[test]
 fn counts_that_lie_are_found() {
     for (from, to, expected) in [
-        (
-            "POINTS 4",
-            "POINTS 5",
-            "line 9: expected a coordinate, found 'CELLS'",
-        ),
-        (
-            "POINTS 4",
-            "POINTS -4",
-            "line 5: expected the number of points, found '-4'",
-        ),
-        (
-            "POINTS 4",
-            "POINTS 3",
-            "line 8: expected a keyword such as POINT_DATA, found '0'",
-        ),
+        ("POINTS 4", "POINTS 5", "line 9: expected a coordinate, found 'CELLS'"),
+        ("POINTS 4", "POINTS -4", "line 5: expected the number of points, found '-4'"),
+        ("POINTS 4", "POINTS 3", "line 8: expected a keyword such as POINT_DATA, found '0'"),
         (
             "POINTS 4",
             "POINTS 400",
             "line 5: the file states 400 points, more than its remaining 61 bytes can hold",
         ),
-        (
-            "CELLS 1 5",
-            "CELLS 1 4",
-            "line 10: a cell has 4 points, and CELLS leaves it 3 of 4 numbers",
-        ),
-        (
-            "CELLS 1 5",
-            "CELLS 1 6",
-            "line 10: the cells take 5 numbers, and CELLS states 6",
-        ),
-        (
-            "CELLS 1 5",
-            "CELLS 2 6",
-            "line 11: expected the number of points of a cell, found 'CELL_TYPES'",
-        ),
-        (
-            "4 0 1 2 3",
-            "-1 0 1 2 3",
-            "line 10: a cell has -1 points, and CELLS leaves it 4 of 5 numbers",
-        ),
-        (
-            "TYPES 1",
-            "TYPES 2",
-            "line 11: 2 cell types are stated for 1 cells",
-        ),
-        (
-            "\n10\n",
-            "\n10\nCELL_DATA 2\n",
-            "line 13: data of 2 cells is stated, and there are 1",
-        ),
+        ("CELLS 1 5", "CELLS 1 4", "line 10: a cell has 4 points, and CELLS leaves it 3 of 4 numbers"),
+        ("CELLS 1 5", "CELLS 1 6", "line 10: the cells take 5 numbers, and CELLS states 6"),
+        ("CELLS 1 5", "CELLS 2 6", "line 11: expected the number of points of a cell, found 'CELL_TYPES'"),
+        ("4 0 1 2 3", "-1 0 1 2 3", "line 10: a cell has -1 points, and CELLS leaves it 4 of 5 numbers"),
+        ("TYPES 1", "TYPES 2", "line 11: 2 cell types are stated for 1 cells"),
+        ("\n10\n", "\n10\nCELL_DATA 2\n", "line 13: data of 2 cells is stated, and there are 1"),
         (
             "\n10\n",
             "\n10\nPOINT_DATA 4\nFIELD f 1\na 1 3 int\n1 1 1\n",
@@ -394,41 +315,13 @@ fn counts_that_lie_are_found() {
 #[test]
 fn offsets_that_lie_are_found() {
     for (from, to, expected) in [
-        (
-            "\n0 4\n",
-            "\n1 4\n",
-            "line 11: offset 1 after 0: expected to rise from 0",
-        ),
-        (
-            "\n0 4\n",
-            "\n0 -4\n",
-            "line 11: offset -4 after 0: expected to rise from 0",
-        ),
-        (
-            "\n0 4\n",
-            "\n0 3\n",
-            "line 11: the last offset is 3, and CELLS states 4 points",
-        ),
-        (
-            "CONNECTIVITY",
-            "X",
-            "line 12: expected CONNECTIVITY, found 'X'",
-        ),
-        (
-            "vtktypeint64",
-            "double",
-            "line 10: expected an offset, found a type with fractions",
-        ),
-        (
-            "0 1 2 3\n",
-            "0 1 2 4\n",
-            "line 13: a cell has point 4, and the file has 4 points",
-        ),
-        (
-            "CELLS 2",
-            "CELLS 1",
-            "line 11: the last offset is 0, and CELLS states 4 points",
-        ),
+        ("\n0 4\n", "\n1 4\n", "line 11: offset 1 after 0: expected to rise from 0"),
+        ("\n0 4\n", "\n0 -4\n", "line 11: offset -4 after 0: expected to rise from 0"),
+        ("\n0 4\n", "\n0 3\n", "line 11: the last offset is 3, and CELLS states 4 points"),
+        ("CONNECTIVITY", "X", "line 12: expected CONNECTIVITY, found 'X'"),
+        ("vtktypeint64", "double", "line 10: expected an offset, found a type with fractions"),
+        ("0 1 2 3\n", "0 1 2 4\n", "line 13: a cell has point 4, and the file has 4 points"),
+        ("CELLS 2", "CELLS 1", "line 11: the last offset is 0, and CELLS states 4 points"),
     ] {
         assert_message(SHORT_OFFSETS, from, to, expected);
     }
@@ -443,44 +336,16 @@ fn wrong_cells_and_orders_are_found() {
             "line 12: only tetrahedra are supported, and the file also has tetrahedra with under \
              4 points (1)",
         ),
-        (
-            "4 0 1 2 3",
-            "4 0 1 2 -3",
-            "line 10: a cell has point -3, and the file has 4 points",
-        ),
+        ("4 0 1 2 3", "4 0 1 2 -3", "line 10: a cell has point -3, and the file has 4 points"),
         ("\n10\n", "\n5\n", "line 12: cell 0 has type 5 and 4 points"),
         ("\n10\n", "\n99\n", "line 12: unknown cell type 99"),
-        (
-            "\n10\n",
-            "\n",
-            "line 11: expected a cell type, found the end of the file",
-        ),
-        (
-            "CELL_TYPES 1\n10\n",
-            "",
-            "line 10: the file has no CELL_TYPES",
-        ),
-        (
-            "CELLS 1 5\n4 0 1 2 3\n",
-            "",
-            "line 9: CELL_TYPES comes before CELLS",
-        ),
-        (
-            "POINTS",
-            "CELLS 1 5\nPOINTS",
-            "line 5: CELLS comes before POINTS",
-        ),
+        ("\n10\n", "\n", "line 11: expected a cell type, found the end of the file"),
+        ("CELL_TYPES 1\n10\n", "", "line 10: the file has no CELL_TYPES"),
+        ("CELLS 1 5\n4 0 1 2 3\n", "", "line 9: CELL_TYPES comes before CELLS"),
+        ("POINTS", "CELLS 1 5\nPOINTS", "line 5: CELLS comes before POINTS"),
         ("CELLS 1", "POINTS 1", "line 9: POINTS is in the file twice"),
-        (
-            "POINTS",
-            "POINT_DATA 4\nPOINTS",
-            "line 5: data comes before the points or cells it is of",
-        ),
-        (
-            "\n10\n",
-            "\n10\nSCALARS a int\n",
-            "line 13: an array comes before POINT_DATA and CELL_DATA",
-        ),
+        ("POINTS", "POINT_DATA 4\nPOINTS", "line 5: data comes before the points or cells it is of"),
+        ("\n10\n", "\n10\nSCALARS a int\n", "line 13: an array comes before POINT_DATA and CELL_DATA"),
     ] {
         assert_message(SHORT, from, to, expected);
     }
@@ -494,10 +359,7 @@ fn errors_in_a_binary_file_say_the_byte() {
     damaged[cells + 7] = 9;
     assert_eq!(
         message(damaged),
-        format!(
-            "m.vtk: byte {}: a cell has point 9, and the file has 5 points",
-            cells + 4
-        )
+        format!("m.vtk: byte {}: a cell has point 9, and the file has 5 points", cells + 4)
     );
 }
 

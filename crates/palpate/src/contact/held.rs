@@ -27,12 +27,7 @@ pub(crate) struct HeldSystem {
 impl HeldSystem {
     pub(crate) fn new(capacity: usize) -> Self {
         let n = 3 * capacity;
-        Self {
-            factor: vec![0.0; n * n],
-            reciprocal: vec![0.0; n],
-            solution: vec![0.0; n],
-            extent: 0,
-        }
+        Self { factor: vec![0.0; n * n], reciprocal: vec![0.0; n], solution: vec![0.0; n], extent: 0 }
     }
 
     /// Factor W, given by its 3×3 blocks on and below the diagonal. Gives the number of dependent rows.
@@ -78,11 +73,7 @@ impl HeldSystem {
             residual(point).write_to_slice(&mut self.solution[3 * point..]);
         }
         for j in 0..n {
-            let dot: f64 = self.factor[j * n..j * n + j]
-                .iter()
-                .zip(&self.solution)
-                .map(|(x, y)| x * y)
-                .sum();
+            let dot: f64 = self.factor[j * n..j * n + j].iter().zip(&self.solution).map(|(x, y)| x * y).sum();
             self.solution[j] = (self.solution[j] - dot) * self.reciprocal[j];
         }
         for j in (0..n).rev() {
@@ -118,9 +109,7 @@ mod tests {
         system.solve(|i| rho[i]);
         let f = [system.force(0), system.force(1)];
         for (i, wanted) in rho.into_iter().enumerate() {
-            let back: DVec3 = (0..2)
-                .map(|j| blocks(false)(i.max(j), i.min(j)) * f[j])
-                .sum();
+            let back: DVec3 = (0..2).map(|j| blocks(false)(i.max(j), i.min(j)) * f[j]).sum();
             assert!((back - wanted).length() < 1e-14, "{back} {wanted}");
         }
     }

@@ -128,10 +128,7 @@ impl HeldPoints {
         // C with every point that is held on the same object.
         let devices = self.points.len();
         for other in 0..devices {
-            if let Some(held) = self.points[other]
-                .grasp
-                .filter(|held| held.object == grasp.object)
-            {
+            if let Some(held) = self.points[other].grasp.filter(|held| held.object == grasp.object) {
                 let s = residual_between(object, &grasp, &held);
                 let c = compliance(&object.modes, self.rows(device, m), self.rows(other, m)) + s;
                 self.residual[device * devices + other] = s;

@@ -51,28 +51,16 @@ impl View for &Tensor {
 }
 
 fn tensor_f64(shape: &[usize], values: impl Iterator<Item = f64>) -> Tensor {
-    Tensor {
-        dtype: Dtype::F64,
-        shape: shape.to_vec(),
-        bytes: values.flat_map(f64::to_le_bytes).collect(),
-    }
+    Tensor { dtype: Dtype::F64, shape: shape.to_vec(), bytes: values.flat_map(f64::to_le_bytes).collect() }
 }
 
 fn tensor_f32(shape: &[usize], values: &[f32]) -> Tensor {
     let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    Tensor {
-        dtype: Dtype::F32,
-        shape: shape.to_vec(),
-        bytes,
-    }
+    Tensor { dtype: Dtype::F32, shape: shape.to_vec(), bytes }
 }
 
 fn tensor_u32(shape: &[usize], values: impl Iterator<Item = u32>) -> Tensor {
-    Tensor {
-        dtype: Dtype::U32,
-        shape: shape.to_vec(),
-        bytes: values.flat_map(u32::to_le_bytes).collect(),
-    }
+    Tensor { dtype: Dtype::U32, shape: shape.to_vec(), bytes: values.flat_map(u32::to_le_bytes).collect() }
 }
 
 /// Hash over the metadata's JSON and every tensor, in the order of their names.
@@ -105,10 +93,7 @@ impl Recording {
         let mut tensors = vec![
             (
                 "surface.positions",
-                tensor_f64(
-                    &[n, 3],
-                    self.surface.positions.iter().flat_map(|p| p.to_array()),
-                ),
+                tensor_f64(&[n, 3], self.surface.positions.iter().flat_map(|p| p.to_array())),
             ),
             (
                 "surface.triangles",
@@ -117,22 +102,10 @@ impl Recording {
                     self.surface.triangles.iter().flatten().copied(),
                 ),
             ),
-            (
-                "surface.source_nodes",
-                tensor_u32(&[n], self.surface.source_nodes.iter().copied()),
-            ),
-            (
-                "modes.angular_frequencies",
-                tensor_f64(&[m], self.modes.angular_frequencies.iter().copied()),
-            ),
-            (
-                "modes.damping_ratios",
-                tensor_f64(&[m], self.modes.damping_ratios.iter().copied()),
-            ),
-            (
-                "modes.mode_shapes",
-                tensor_f64(&[3 * n, m], self.modes.mode_shapes.iter().copied()),
-            ),
+            ("surface.source_nodes", tensor_u32(&[n], self.surface.source_nodes.iter().copied())),
+            ("modes.angular_frequencies", tensor_f64(&[m], self.modes.angular_frequencies.iter().copied())),
+            ("modes.damping_ratios", tensor_f64(&[m], self.modes.damping_ratios.iter().copied())),
+            ("modes.mode_shapes", tensor_f64(&[3 * n, m], self.modes.mode_shapes.iter().copied())),
         ];
         match &self.residual {
             ResidualCompliance::None => {}
@@ -140,29 +113,14 @@ impl Recording {
                 tensors.push(("residual.packed", tensor_f32(&[packed.len()], packed)));
             }
             ResidualCompliance::NearField(near) => {
-                tensors.push((
-                    "residual.radius",
-                    tensor_f64(&[1], [near.radius].into_iter()),
-                ));
-                tensors.push((
-                    "residual.offsets",
-                    tensor_u32(&[n + 1], near.offsets.iter().copied()),
-                ));
-                tensors.push((
-                    "residual.nodes",
-                    tensor_u32(&[near.nodes.len()], near.nodes.iter().copied()),
-                ));
-                tensors.push((
-                    "residual.blocks",
-                    tensor_f32(&[near.nodes.len(), 3, 3], &near.blocks),
-                ));
+                tensors.push(("residual.radius", tensor_f64(&[1], [near.radius].into_iter())));
+                tensors.push(("residual.offsets", tensor_u32(&[n + 1], near.offsets.iter().copied())));
+                tensors.push(("residual.nodes", tensor_u32(&[near.nodes.len()], near.nodes.iter().copied())));
+                tensors.push(("residual.blocks", tensor_f32(&[near.nodes.len(), 3, 3], &near.blocks)));
             }
         }
         if let Some(gravity) = &self.gravity {
-            tensors.push((
-                "gravity.modal_forces",
-                tensor_f64(&[3, m], gravity.modal_forces.iter().copied()),
-            ));
+            tensors.push(("gravity.modal_forces", tensor_f64(&[3, m], gravity.modal_forces.iter().copied())));
             tensors.push((
                 "gravity.residual_displacements",
                 tensor_f64(&[3 * n, 3], gravity.residual_displacements.iter().copied()),
@@ -175,14 +133,9 @@ impl Recording {
             .map_err(|e| Error::Recording(format!("metadata cannot be written: {e}")))?;
         let content_hash = content_hash(
             metadata.get(),
-            tensors
-                .iter()
-                .map(|(name, t)| (*name, t.shape.as_slice(), t.bytes.as_slice())),
+            tensors.iter().map(|(name, t)| (*name, t.shape.as_slice(), t.bytes.as_slice())),
         );
-        let header = Header {
-            metadata,
-            content_hash,
-        };
+        let header = Header { metadata, content_hash };
         let header = [("palpate".to_string(), json(serde_json::to_string(&header))?)];
         let views = tensors.iter().map(|(name, tensor)| (*name, tensor));
         safetensors::serialize(views, Some(header.into_iter().collect()))
@@ -196,19 +149,12 @@ impl Recording {
     /// damaged, or inconsistent.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let container = |e: safetensors::SafeTensorError| {
-            Error::Recording(format!(
-                "the file is damaged, truncated or of another kind ({e})"
-            ))
+            Error::Recording(format!("the file is damaged, truncated or of another kind ({e})"))
         };
         let (_, raw_header) = SafeTensors::read_metadata(bytes).map_err(container)?;
-        let json = raw_header
-            .metadata()
-            .as_ref()
-            .and_then(|entries| entries.get("palpate"));
+        let json = raw_header.metadata().as_ref().and_then(|entries| entries.get("palpate"));
         let Some(json) = json else {
-            return Err(Error::Recording(
-                "a safetensors file, but without the metadata of palpate".into(),
-            ));
+            return Err(Error::Recording("a safetensors file, but without the metadata of palpate".into()));
         };
         let header: Header = parse(json)?;
         let VersionOnly { format_version } = parse(header.metadata.get())?;
@@ -220,13 +166,12 @@ impl Recording {
         }
         let file = SafeTensors::deserialize(bytes).map_err(container)?;
         let views: Vec<_> = file.iter().collect();
-        let hash = content_hash(
-            header.metadata.get(),
-            views.iter().map(|(name, v)| (*name, v.shape(), v.data())),
-        );
+        let hash =
+            content_hash(header.metadata.get(), views.iter().map(|(name, v)| (*name, v.shape(), v.data())));
         if hash != header.content_hash {
             return Err(Error::Recording(
-                "its content does not fit its hash: the file was damaged or changed after it was written".into(),
+                "its content does not fit its hash: the file was damaged or changed after it was written"
+                    .into(),
             ));
         }
         let recording = Self::from_tensors(parse(header.metadata.get())?, &Tensors(&file))?;
@@ -236,11 +181,7 @@ impl Recording {
 
     fn from_tensors(metadata: Metadata, tensors: &Tensors) -> Result<Self, Error> {
         let surface = Surface {
-            positions: tensors
-                .f64("surface.positions")?
-                .chunks_exact(3)
-                .map(DVec3::from_slice)
-                .collect(),
+            positions: tensors.f64("surface.positions")?.chunks_exact(3).map(DVec3::from_slice).collect(),
             triangles: tensors
                 .u32("surface.triangles")?
                 .chunks_exact(3)
@@ -257,11 +198,7 @@ impl Recording {
             ResidualCompliance::Whole(tensors.f32("residual.packed")?)
         } else if tensors.has("residual.blocks") {
             ResidualCompliance::NearField(NearField {
-                radius: tensors
-                    .f64("residual.radius")?
-                    .first()
-                    .copied()
-                    .unwrap_or(f64::NAN),
+                radius: tensors.f64("residual.radius")?.first().copied().unwrap_or(f64::NAN),
                 offsets: tensors.u32("residual.offsets")?,
                 nodes: tensors.u32("residual.nodes")?,
                 blocks: tensors.f32("residual.blocks")?,
@@ -277,13 +214,7 @@ impl Recording {
         } else {
             None
         };
-        Ok(Self {
-            metadata,
-            surface,
-            modes,
-            residual,
-            gravity,
-        })
+        Ok(Self { metadata, surface, modes, residual, gravity })
     }
 }
 
@@ -293,8 +224,7 @@ struct VersionOnly {
 }
 
 fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, Error> {
-    serde_json::from_str(json)
-        .map_err(|e| Error::Recording(format!("its metadata cannot be read: {e}")))
+    serde_json::from_str(json).map_err(|e| Error::Recording(format!("its metadata cannot be read: {e}")))
 }
 
 /// Typed access to the tensors of a file.
@@ -306,46 +236,26 @@ impl Tensors<'_> {
     }
 
     fn bytes(&self, name: &str, dtype: Dtype) -> Result<&[u8], Error> {
-        let tensor = self
-            .0
-            .tensor(name)
-            .map_err(|_| Error::Recording(format!("the tensor {name} is missing")))?;
+        let tensor =
+            self.0.tensor(name).map_err(|_| Error::Recording(format!("the tensor {name} is missing")))?;
         if tensor.dtype() != dtype {
-            return Err(Error::Recording(format!(
-                "{name} holds {:?}, expected {dtype:?}",
-                tensor.dtype()
-            )));
+            return Err(Error::Recording(format!("{name} holds {:?}, expected {dtype:?}", tensor.dtype())));
         }
         Ok(tensor.data())
     }
 
     fn f64(&self, name: &str) -> Result<Vec<f64>, Error> {
         let bytes = self.bytes(name, Dtype::F64)?;
-        Ok(bytes
-            .as_chunks::<8>()
-            .0
-            .iter()
-            .map(|b| f64::from_le_bytes(*b))
-            .collect())
+        Ok(bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
     }
 
     fn f32(&self, name: &str) -> Result<Vec<f32>, Error> {
         let bytes = self.bytes(name, Dtype::F32)?;
-        Ok(bytes
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|b| f32::from_le_bytes(*b))
-            .collect())
+        Ok(bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
     }
 
     fn u32(&self, name: &str) -> Result<Vec<u32>, Error> {
         let bytes = self.bytes(name, Dtype::U32)?;
-        Ok(bytes
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|b| u32::from_le_bytes(*b))
-            .collect())
+        Ok(bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect())
     }
 }

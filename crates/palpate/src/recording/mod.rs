@@ -6,8 +6,8 @@ mod residual;
 
 pub use file::FORMAT_VERSION;
 pub use metadata::{
-    Certificate, CertificateEvent, Damping, MassProperties, Material, MeshCounts, Metadata,
-    Provenance, Support,
+    Certificate, CertificateEvent, Damping, MassProperties, Material, MeshCounts, Metadata, Provenance,
+    Support,
 };
 pub use residual::{NearField, ResidualCompliance};
 
@@ -75,13 +75,8 @@ impl ModalBasis {
 impl GravityResponse {
     /// Displacement [m] of a node under an acceleration [m/s²], the part that modes miss.
     pub fn residual_displacement(&self, node: usize, acceleration: DVec3) -> DVec3 {
-        let row =
-            |axis: usize| DVec3::from_slice(&self.residual_displacements[(3 * node + axis) * 3..]);
-        DVec3::new(
-            row(0).dot(acceleration),
-            row(1).dot(acceleration),
-            row(2).dot(acceleration),
-        )
+        let row = |axis: usize| DVec3::from_slice(&self.residual_displacements[(3 * node + axis) * 3..]);
+        DVec3::new(row(0).dot(acceleration), row(1).dot(acceleration), row(2).dot(acceleration))
     }
 }
 
@@ -105,24 +100,12 @@ impl Recording {
             return fail("the surface is empty".into());
         }
         if self.surface.source_nodes.len() != nodes {
-            return fail(format!(
-                "{} source nodes for {nodes} nodes",
-                self.surface.source_nodes.len()
-            ));
+            return fail(format!("{} source nodes for {nodes} nodes", self.surface.source_nodes.len()));
         }
-        if let Some(t) = self
-            .surface
-            .triangles
-            .iter()
-            .position(|t| t.iter().any(|&n| n as usize >= nodes))
-        {
-            return fail(format!(
-                "triangle {t} names a node beyond the surface's {nodes} nodes"
-            ));
+        if let Some(t) = self.surface.triangles.iter().position(|t| t.iter().any(|&n| n as usize >= nodes)) {
+            return fail(format!("triangle {t} names a node beyond the surface's {nodes} nodes"));
         }
-        if self.modes.damping_ratios.len() != modes
-            || self.modes.mode_shapes.len() != 3 * nodes * modes
-        {
+        if self.modes.damping_ratios.len() != modes || self.modes.mode_shapes.len() != 3 * nodes * modes {
             return fail(format!(
                 "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
                 self.modes.mode_shapes.len(),
@@ -140,12 +123,7 @@ impl Recording {
         if !frequencies.iter().all(|w| w.is_finite() && *w > 0.0) || !frequencies.is_sorted() {
             return fail("angular frequencies must be positive, finite and ascending".into());
         }
-        if !self
-            .modes
-            .damping_ratios
-            .iter()
-            .all(|z| z.is_finite() && *z >= 0.0)
-        {
+        if !self.modes.damping_ratios.iter().all(|z| z.is_finite() && *z >= 0.0) {
             return fail("damping ratios must be finite and not negative".into());
         }
         self.residual.validate(nodes)?;
@@ -158,11 +136,7 @@ impl Recording {
             .to_cols_array()
             .iter()
             .all(|v| v.abs() <= 1e-12 * inertia.x_axis.x);
-        if !(inertia.is_finite()
-            && symmetric
-            && inertia.determinant() > 0.0
-            && inertia.x_axis.x > 0.0)
-        {
+        if !(inertia.is_finite() && symmetric && inertia.determinant() > 0.0 && inertia.x_axis.x > 0.0) {
             return fail("the inertia tensor is not symmetric and positive definite".into());
         }
         match (&self.gravity, self.metadata.support) {

@@ -105,13 +105,8 @@ impl ResidualCompliance {
 impl NearField {
     fn block(&self, at: usize) -> DMat3 {
         let b = &self.blocks[9 * at..9 * at + 9];
-        let row = |r: usize| {
-            DVec3::new(
-                f64::from(b[3 * r]),
-                f64::from(b[3 * r + 1]),
-                f64::from(b[3 * r + 2]),
-            )
-        };
+        let row =
+            |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
     }
 

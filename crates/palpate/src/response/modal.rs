@@ -88,17 +88,7 @@ impl HeldOscillator {
             d12 = -0.5 * (stiffness * a11 * a12 + a21 * a22);
             d22 = 0.5 * (1.0 - stiffness * a12 * a12 - a22 * a22);
         }
-        Self {
-            a11,
-            a12,
-            a21,
-            a22,
-            b: gain / stiffness,
-            d11,
-            d12,
-            d22,
-            stiffness,
-        }
+        Self { a11, a12, a21, a22, b: gain / stiffness, d11, d12, d22, stiffness }
     }
 
     /// Displacement at the end of a step in which a unit force is held [m²·kg/(N·…)]: the mode's
@@ -123,10 +113,7 @@ impl HeldOscillator {
 
     /// Kinetic and elastic energy [J] of a state.
     pub fn energy(&self, state: Oscillation) -> (f64, f64) {
-        (
-            0.5 * state.v * state.v,
-            0.5 * self.stiffness * state.q * state.q,
-        )
+        (0.5 * state.v * state.v, 0.5 * self.stiffness * state.q * state.q)
     }
 }
 
@@ -139,11 +126,7 @@ pub(crate) struct SampledModes {
 impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
-        Self {
-            oscillators: pairs
-                .map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s))
-                .collect(),
-        }
+        Self { oscillators: pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect() }
     }
 
     /// Advance every mode in place with its held force; gives the energy [J] taken by damping.
@@ -164,9 +147,7 @@ impl SampledModes {
     ///
     /// # Real time
     pub(crate) fn predict(&self, states: &[Oscillation], forces: &[f64], free: &mut [f64]) {
-        for (((oscillator, &state), &p), q) in
-            self.oscillators.iter().zip(states).zip(forces).zip(free)
-        {
+        for (((oscillator, &state), &p), q) in self.oscillators.iter().zip(states).zip(forces).zip(free) {
             *q = oscillator.advance(state, p).q;
         }
     }
@@ -189,13 +170,8 @@ impl SampledModes {
 /// # Real time
 pub(crate) fn project_rows(rows: &[f64], q: impl Iterator<Item = f64> + Clone) -> glam::DVec3 {
     let modes = rows.len() / 3;
-    let axis = |a: usize| {
-        rows[a * modes..(a + 1) * modes]
-            .iter()
-            .zip(q.clone())
-            .map(|(r, q)| r * q)
-            .sum::<f64>()
-    };
+    let axis =
+        |a: usize| rows[a * modes..(a + 1) * modes].iter().zip(q.clone()).map(|(r, q)| r * q).sum::<f64>();
     glam::DVec3::new(axis(0), axis(1), axis(2))
 }
 
@@ -225,14 +201,9 @@ mod tests {
         let n = 40_000;
         let dt = h / f64::from(n);
         let rate = |s: [f64; 3]| {
-            [
-                s[1],
-                p - 2.0 * zeta * omega * s[1] - omega * omega * s[0],
-                2.0 * zeta * omega * s[1] * s[1],
-            ]
+            [s[1], p - 2.0 * zeta * omega * s[1] - omega * omega * s[0], 2.0 * zeta * omega * s[1] * s[1]]
         };
-        let add =
-            |s: [f64; 3], k: [f64; 3], f: f64| [s[0] + f * k[0], s[1] + f * k[1], s[2] + f * k[2]];
+        let add = |s: [f64; 3], k: [f64; 3], f: f64| [s[0] + f * k[0], s[1] + f * k[1], s[2] + f * k[2]];
         let mut s = [start.q, start.v, 0.0];
         for _ in 0..n {
             let k1 = rate(s);
@@ -265,20 +236,11 @@ mod tests {
             let (p, scale) = (2000.0, 0.01);
             let (expected, lost) = integrated(omega, zeta, 1e-3, start, p);
             let got = map.advance(start, p);
-            assert!(
-                (got.q - expected.q).abs() < 1e-11 * scale,
-                "{omega} {zeta}: {got:?} {expected:?}"
-            );
-            assert!(
-                (got.v - expected.v).abs() < 1e-11 * scale * omega,
-                "{omega} {zeta}"
-            );
+            assert!((got.q - expected.q).abs() < 1e-11 * scale, "{omega} {zeta}: {got:?} {expected:?}");
+            assert!((got.v - expected.v).abs() < 1e-11 * scale * omega, "{omega} {zeta}");
             let energy = 0.5 * 9.0 + 0.5 * (omega * scale).powi(2);
             let dissipated = map.dissipation(start, p);
-            assert!(
-                (dissipated - lost).abs() < 1e-10 * energy,
-                "{omega} {zeta}: {dissipated} {lost}"
-            );
+            assert!((dissipated - lost).abs() < 1e-10 * energy, "{omega} {zeta}: {dissipated} {lost}");
         }
     }
 
@@ -292,14 +254,10 @@ mod tests {
                 let next = map.advance(state, p);
                 let (k0, e0) = map.energy(state);
                 let (k1, e1) = map.energy(next);
-                let balance =
-                    p * (next.q - state.q) - (k1 + e1 - k0 - e0) - map.dissipation(state, p);
+                let balance = p * (next.q - state.q) - (k1 + e1 - k0 - e0) - map.dissipation(state, p);
                 // A dozen roundings of terms of this size.
                 let size = k0 + e0 + k1 + e1 + (p * next.q).abs() + (p / omega).powi(2);
-                assert!(
-                    balance.abs() < 12.0 * f64::EPSILON * size,
-                    "{omega} {zeta} {step}: {balance}"
-                );
+                assert!(balance.abs() < 12.0 * f64::EPSILON * size, "{omega} {zeta} {step}: {balance}");
                 assert!(map.dissipation(state, p) >= -4.0 * f64::EPSILON * size);
                 state = next;
             }

@@ -38,34 +38,18 @@ impl Surface {
 
     /// Rest position of a surface point [m, body frame].
     pub fn rest_position(&self, point: &SurfacePoint) -> DVec3 {
-        self.corners(point)
-            .iter()
-            .map(|&(node, weight)| self.positions[node] * weight)
-            .sum()
+        self.corners(point).iter().map(|&(node, weight)| self.positions[node] * weight).sum()
     }
 
     /// Radius [m] of the smallest sphere about the body frame's origin that holds the surface.
     pub fn radius(&self) -> f64 {
-        self.positions
-            .iter()
-            .map(|p| p.length())
-            .fold(0.0, f64::max)
+        self.positions.iter().map(|p| p.length()).fold(0.0, f64::max)
     }
 
     /// Diagonal [m] of the bounding box at rest.
     pub fn diagonal(&self) -> f64 {
-        let low = self
-            .positions
-            .iter()
-            .copied()
-            .reduce(DVec3::min)
-            .unwrap_or_default();
-        let high = self
-            .positions
-            .iter()
-            .copied()
-            .reduce(DVec3::max)
-            .unwrap_or_default();
+        let low = self.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
+        let high = self.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
         (high - low).length()
     }
 
@@ -90,13 +74,7 @@ impl Surface {
             let nearest: DVec3 = corners.iter().zip(weights).map(|(&c, w)| c * w).sum();
             let distance = (nearest - point_in_body).length();
             if best.is_none_or(|(_, least)| distance < least) {
-                best = Some((
-                    SurfacePoint {
-                        triangle: triangle as u32,
-                        weights,
-                    },
-                    distance,
-                ));
+                best = Some((SurfacePoint { triangle: triangle as u32, weights }, distance));
             }
         }
         best
@@ -170,10 +148,7 @@ mod tests {
                 let sample = DVec3::new(f64::from(i), f64::from(j), 0.0) / f64::from(n);
                 sampled = sampled.min((sample - query).length());
             }
-            assert!(
-                distance <= sampled && sampled - distance < 0.01,
-                "{query}: {distance} {sampled}"
-            );
+            assert!(distance <= sampled && sampled - distance < 0.01, "{query}: {distance} {sampled}");
             assert!((surface.rest_position(&point) - query).length() - distance < 1e-15);
             assert!(point.weights.iter().all(|w| (0.0..=1.0).contains(w)));
         }

@@ -106,26 +106,10 @@ mod tests {
         type Family = (Shape, fn(usize) -> usize, [i64; 9]);
         let families: [Family; 6] = [
             (Shape::Line, line, [1, 8, 26, 27, 28, 62, 63, 64, 65]),
-            (
-                Shape::Triangle,
-                triangle,
-                [2, 9, 21, 23, 25, 42, 43, 44, 45],
-            ),
-            (
-                Shape::Quadrilateral,
-                |p| (p + 1).pow(2),
-                [3, 10, 36, 37, 38, 47, 48, 49, 50],
-            ),
-            (
-                Shape::Tetrahedron,
-                |p| (p + 1) * (p + 2) * (p + 3) / 6,
-                [4, 11, 29, 30, 31, 71, 72, 73, 74],
-            ),
-            (
-                Shape::Hexahedron,
-                |p| (p + 1).pow(3),
-                [5, 12, 92, 93, 94, 95, 96, 97, 98],
-            ),
+            (Shape::Triangle, triangle, [2, 9, 21, 23, 25, 42, 43, 44, 45]),
+            (Shape::Quadrilateral, |p| (p + 1).pow(2), [3, 10, 36, 37, 38, 47, 48, 49, 50]),
+            (Shape::Tetrahedron, |p| (p + 1) * (p + 2) * (p + 3) / 6, [4, 11, 29, 30, 31, 71, 72, 73, 74]),
+            (Shape::Hexahedron, |p| (p + 1).pow(3), [5, 12, 92, 93, 94, 95, 96, 97, 98]),
             (
                 Shape::Pyramid,
                 |p| (p + 1) * (p + 2) * (2 * p + 3) / 6,

@@ -77,11 +77,8 @@ impl Elements {
                 scan.unsigned(I32, "an element number")?;
             }
             let (shape, node_count) = read_type(scan)?;
-            let run = if scan.is_text() {
-                1
-            } else {
-                scan.unsigned(I32, "the number of elements that follow")?
-            };
+            let run =
+                if scan.is_text() { 1 } else { scan.unsigned(I32, "the number of elements that follow")? };
             if run > (count - seen) as u64 {
                 let message = format!("more elements follow than the {count} stated");
                 return scan.fail(message);
@@ -98,13 +95,8 @@ impl Elements {
                         physical = tag.saturating_abs();
                     }
                 }
-                let block = Block {
-                    shape,
-                    node_count,
-                    entity: physical,
-                    tag: physical,
-                    in_groups: physical != 0,
-                };
+                let block =
+                    Block { shape, node_count, entity: physical, tag: physical, in_groups: physical != 0 };
                 self.read_element(scan, nodes, &block)?;
             }
             seen += run as usize;
@@ -113,12 +105,7 @@ impl Elements {
     }
 
     /// Blocks, one per entity and element type: a row `number nodes…` per element.
-    fn read_v4(
-        &mut self,
-        scan: &mut Scan,
-        nodes: &Nodes,
-        labels: &Labels,
-    ) -> Result<usize, MeshError> {
+    fn read_v4(&mut self, scan: &mut Scan, nodes: &Nodes, labels: &Labels) -> Result<usize, MeshError> {
         let number_bytes = if scan.is_text() { 2 } else { 8 };
         scan.start_of_row();
         let blocks = scan.unsigned(U64, "the number of element blocks")?;
@@ -176,12 +163,7 @@ impl Elements {
     }
 
     /// The nodes of one element, to the end of its row.
-    fn read_element(
-        &mut self,
-        scan: &mut Scan,
-        nodes: &Nodes,
-        block: &Block,
-    ) -> Result<(), MeshError> {
+    fn read_element(&mut self, scan: &mut Scan, nodes: &Nodes, block: &Block) -> Result<(), MeshError> {
         self.row.clear();
         for _ in 0..block.node_count {
             let number = nodes.read_number(scan)?;

@@ -10,13 +10,8 @@ use crate::mesh::{Mesh, MeshError, NodeGroup, Region};
 
 /// Node numbers, far apart and in no order.
 const NUMBERS: [u64; 5] = [10, 3, 70_000, 4, 11];
-const POSITIONS: [[f64; 3]; 5] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.25, -2.5e-3, 1.0],
-    [1.0, 1.0, 1.5],
-];
+const POSITIONS: [[f64; 3]; 5] =
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.25, -2.5e-3, 1.0], [1.0, 1.0, 1.5]];
 /// Type, dimension, entity, physical tag, and positions in [`NUMBERS`].
 const ELEMENTS: [(i32, i32, i32, i32, &[usize]); 5] = [
     (15, 0, 1, 5, &[0]),
@@ -27,17 +22,11 @@ const ELEMENTS: [(i32, i32, i32, i32, &[usize]); 5] = [
 ];
 
 fn group(name: &str, nodes: &[u32]) -> NodeGroup {
-    NodeGroup {
-        name: name.to_owned(),
-        nodes: nodes.to_vec(),
-    }
+    NodeGroup { name: name.to_owned(), nodes: nodes.to_vec() }
 }
 
 fn region(tag: i64, name: Option<&str>) -> Region {
-    Region {
-        tag,
-        name: name.map(str::to_owned),
-    }
+    Region { tag, name: name.map(str::to_owned) }
 }
 
 /// What all variants of the file say.
@@ -65,14 +54,8 @@ enum Encoding {
 }
 use Encoding::{Big, Little, Text};
 
-const VARIANTS: [(bool, Encoding); 6] = [
-    (false, Text),
-    (false, Little),
-    (false, Big),
-    (true, Text),
-    (true, Little),
-    (true, Big),
-];
+const VARIANTS: [(bool, Encoding); 6] =
+    [(false, Text), (false, Little), (false, Big), (true, Text), (true, Little), (true, Big)];
 
 /// Writes rows of numbers as text or binary.
 struct Writer {
@@ -121,10 +104,7 @@ impl Writer {
     }
 
     fn start(encoding: Encoding, version: &str) -> Self {
-        let mut writer = Self {
-            encoding,
-            bytes: Vec::new(),
-        };
+        let mut writer = Self { encoding, bytes: Vec::new() };
         let file_type = i32::from(encoding != Text);
         writer.text(&format!("$MeshFormat\n{version} {file_type} 8\n"));
         if encoding != Text {
@@ -140,11 +120,7 @@ impl Writer {
 
 /// The file in one of its variants.
 fn file(is_v4: bool, encoding: Encoding) -> Vec<u8> {
-    if is_v4 {
-        file_v4(encoding)
-    } else {
-        file_v2(encoding)
-    }
+    if is_v4 { file_v4(encoding) } else { file_v2(encoding) }
 }
 
 fn file_v2(encoding: Encoding) -> Vec<u8> {
@@ -176,13 +152,8 @@ fn file_v4(encoding: Encoding) -> Vec<u8> {
     w.text("$Entities\n");
     w.sizes(&[1, 1, 1, 2]);
     w.end_row();
-    let entities: [(_, _, &[i32]); 5] = [
-        (0, 1, &[5]),
-        (1, 1, &[]),
-        (2, 1, &[-1]),
-        (3, 1, &[7]),
-        (3, 2, &[3]),
-    ];
+    let entities: [(_, _, &[i32]); 5] =
+        [(0, 1, &[5]), (1, 1, &[]), (2, 1, &[-1]), (3, 1, &[7]), (3, 2, &[3])];
     for (dimension, tag, physical) in entities {
         w.ints(&[tag]);
         let box_size = if dimension == 0 { 3 } else { 6 };
@@ -292,10 +263,7 @@ fn quadratic_tetrahedra_give_their_corners_and_a_remark() {
     let elements = v2_with(&["1 11 1 6 4 3 2 1 1 1 1 1 1 1", "2 9 1 2 1 2 3 1 2 3"]);
     let mesh = read(elements).unwrap();
     assert_eq!(mesh.tets, [[3, 2, 1, 0]]);
-    assert_eq!(
-        mesh.groups,
-        [group("2", &[0, 1, 2]), group("6", &[0, 1, 2, 3])]
-    );
+    assert_eq!(mesh.groups, [group("2", &[0, 1, 2]), group("6", &[0, 1, 2, 3])]);
     let remark = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
                   straight";
     assert_eq!(mesh.remarks, [remark]);
@@ -384,34 +352,16 @@ fn what_is_no_mesh_of_these_versions_is_refused() {
         (" \r\n\n", format!("line 1: {begin} the end of the file")),
         ("\n$NOD\n", format!("line 2: {begin} '$NOD'")),
         ("solid x\n", format!("line 1: {begin} 'solid'")),
-        (
-            "\u{1}\u{2}'",
-            format!("line 1: {begin} '\\u{{1}}\\u{{2}}\\''"),
-        ),
-        (
-            "$MeshFormat\n4 0 8\n",
-            format!("line 2: MSH version '4' {convert}"),
-        ),
-        (
-            "$MeshFormat\n1.0 0 8\n",
-            format!("line 2: MSH version '1.0' {convert}"),
-        ),
-        (
-            "$MeshFormat\n2.2 2 8\n",
-            "line 2: file type '2', expected 0 or 1".to_owned(),
-        ),
-        (
-            "$MeshFormat\n2.2 0 4\n",
-            "line 2: data size '4', expected 8".to_owned(),
-        ),
+        ("\u{1}\u{2}'", format!("line 1: {begin} '\\u{{1}}\\u{{2}}\\''")),
+        ("$MeshFormat\n4 0 8\n", format!("line 2: MSH version '4' {convert}")),
+        ("$MeshFormat\n1.0 0 8\n", format!("line 2: MSH version '1.0' {convert}")),
+        ("$MeshFormat\n2.2 2 8\n", "line 2: file type '2', expected 0 or 1".to_owned()),
+        ("$MeshFormat\n2.2 0 4\n", "line 2: data size '4', expected 8".to_owned()),
         (
             "$MeshFormat\n2.2 1 8\n\u{2}\0\0\0\n",
             "byte 20: expected the integer 1 in binary, found bytes [2, 0, 0, 0]".to_owned(),
         ),
-        (
-            "$MeshFormat\n2.2 0 8 1\n",
-            "line 2: expected the end of the line, found '1'".to_owned(),
-        ),
+        ("$MeshFormat\n2.2 0 8 1\n", "line 2: expected the end of the line, found '1'".to_owned()),
     ] {
         assert_eq!(message(file), format!("m.msh: {expected}"));
     }
@@ -421,42 +371,18 @@ fn what_is_no_mesh_of_these_versions_is_refused() {
 fn counts_that_lie_are_found() {
     let file = v2_with(&["1 4 0 1 2 3 4"]);
     for (from, to, expected) in [
-        (
-            "\n4\n1 0",
-            "\n5\n1 0",
-            "line 10: expected a node number, found '$EndNodes'",
-        ),
-        (
-            "\n4\n1 0",
-            "\n3\n1 0",
-            "line 9: expected $EndNodes after 3 nodes, found '4'",
-        ),
-        (
-            "\n4\n1 0",
-            "\n-4\n1 0",
-            "line 5: expected the number of nodes, found '-4'",
-        ),
-        (
-            "\n4\n1 0",
-            "\nx\n1 0",
-            "line 5: expected the number of nodes, found 'x'",
-        ),
+        ("\n4\n1 0", "\n5\n1 0", "line 10: expected a node number, found '$EndNodes'"),
+        ("\n4\n1 0", "\n3\n1 0", "line 9: expected $EndNodes after 3 nodes, found '4'"),
+        ("\n4\n1 0", "\n-4\n1 0", "line 5: expected the number of nodes, found '-4'"),
+        ("\n4\n1 0", "\nx\n1 0", "line 5: expected the number of nodes, found 'x'"),
         (
             "\n4\n1 0",
             "\n99999999999999\n1 0",
             "line 5: the file states 99999999999999 nodes, more than its remaining 83 bytes can \
              hold",
         ),
-        (
-            "\n1\n1 4",
-            "\n2\n1 4",
-            "line 14: expected an element number, found '$EndElements'",
-        ),
-        (
-            "\n1\n1 4",
-            "\n0\n1 4",
-            "line 13: expected $EndElements after 0 elements, found '1'",
-        ),
+        ("\n1\n1 4", "\n2\n1 4", "line 14: expected an element number, found '$EndElements'"),
+        ("\n1\n1 4", "\n0\n1 4", "line 13: expected $EndElements after 0 elements, found '1'"),
         (
             "\n1\n1 4",
             "\n77\n1 4",
@@ -472,46 +398,14 @@ fn counts_that_lie_are_found() {
 fn block_counts_of_4_1_must_agree() {
     let file = v4_with(["1", "2"]);
     for (from, to, expected) in [
-        (
-            "\n1 5 1 5\n",
-            "\n1 6 1 5\n",
-            "line 21: the node blocks hold 5 nodes, and 6 are stated",
-        ),
-        (
-            "\n1 5 1 5\n",
-            "\n1 4 1 5\n",
-            "line 11: the node blocks hold more than the 4 nodes stated",
-        ),
-        (
-            "\n2 2 1 2\n",
-            "\n2 3 1 2\n",
-            "line 28: the blocks hold 2 elements, and 3 are stated",
-        ),
-        (
-            "\n2 2 1 2\n",
-            "\n2 1 1 2\n",
-            "line 27: the blocks hold more than the 1 elements stated",
-        ),
-        (
-            "\n2 2 1 2\n",
-            "\n1 1 1 2\n",
-            "line 27: expected $EndElements after 1 elements, found '3'",
-        ),
-        (
-            "\n3 2 4 1\n",
-            "\n2 2 4 1\n",
-            "line 27: tetrahedra in a block of dimension 2",
-        ),
-        (
-            "\n3 1 0 5\n",
-            "\n4 1 0 5\n",
-            "line 11: a node block has dimension 4, expected 0 to 3",
-        ),
-        (
-            "\n3 1 0 5\n",
-            "\n3 1 7 5\n",
-            "line 11: the parametric flag is 7, expected 0 or 1",
-        ),
+        ("\n1 5 1 5\n", "\n1 6 1 5\n", "line 21: the node blocks hold 5 nodes, and 6 are stated"),
+        ("\n1 5 1 5\n", "\n1 4 1 5\n", "line 11: the node blocks hold more than the 4 nodes stated"),
+        ("\n2 2 1 2\n", "\n2 3 1 2\n", "line 28: the blocks hold 2 elements, and 3 are stated"),
+        ("\n2 2 1 2\n", "\n2 1 1 2\n", "line 27: the blocks hold more than the 1 elements stated"),
+        ("\n2 2 1 2\n", "\n1 1 1 2\n", "line 27: expected $EndElements after 1 elements, found '3'"),
+        ("\n3 2 4 1\n", "\n2 2 4 1\n", "line 27: tetrahedra in a block of dimension 2"),
+        ("\n3 1 0 5\n", "\n4 1 0 5\n", "line 11: a node block has dimension 4, expected 0 to 3"),
+        ("\n3 1 0 5\n", "\n3 1 7 5\n", "line 11: the parametric flag is 7, expected 0 or 1"),
     ] {
         let changed = file.replace(from, to);
         assert_ne!(changed, file);
@@ -523,39 +417,18 @@ fn block_counts_of_4_1_must_agree() {
 fn rows_that_are_wrong_are_found() {
     let tet = "1 4 0 1 2 3 4";
     for (rows, expected) in [
-        (
-            [tet, "1 4 0 1 2 3"],
-            "line 14: expected a node number, found the end of the line",
-        ),
-        (
-            [tet, "1 4 0 1 2 3 4 4"],
-            "line 14: expected the end of the line, found '4'",
-        ),
-        (
-            [tet, "1 4 0 1 2 3 5"],
-            "line 14: an element has node 5, which is not in the file",
-        ),
-        (
-            [tet, "1 4 0 1 2 3 -1"],
-            "line 14: expected a node number, found -1",
-        ),
-        (
-            [tet, "1 4 0 1 2 3 1.5"],
-            "line 14: expected a node number, found '1.5'",
-        ),
+        ([tet, "1 4 0 1 2 3"], "line 14: expected a node number, found the end of the line"),
+        ([tet, "1 4 0 1 2 3 4 4"], "line 14: expected the end of the line, found '4'"),
+        ([tet, "1 4 0 1 2 3 5"], "line 14: an element has node 5, which is not in the file"),
+        ([tet, "1 4 0 1 2 3 -1"], "line 14: expected a node number, found -1"),
+        ([tet, "1 4 0 1 2 3 1.5"], "line 14: expected a node number, found '1.5'"),
         ([tet, "1 34 0 1 2 3 4"], "line 14: unknown element type 34"),
-        (
-            [tet, "1 4 -1 1 2 3 4"],
-            "line 14: expected the number of tags, found -1",
-        ),
+        ([tet, "1 4 -1 1 2 3 4"], "line 14: expected the number of tags, found -1"),
     ] {
         assert_eq!(message(v2_with(&rows)), format!("m.msh: {expected}"));
     }
     for (row, expected) in [
-        (
-            "2 1 0",
-            "line 7: expected a coordinate, found the end of the line",
-        ),
+        ("2 1 0", "line 7: expected a coordinate, found the end of the line"),
         ("2 1 0 x", "line 7: expected a coordinate, found 'x'"),
         ("1 1 0 0", "line 7: node 1 is in the file twice"),
     ] {
@@ -574,22 +447,10 @@ fn sections_that_are_missing_unended_or_repeated_are_found() {
         (nodes.to_owned(), "line 6: the file has no $Elements"),
         (elements.to_owned(), "line 4: $Elements comes before $Nodes"),
         (nodes.repeat(2), "line 7: $Nodes is in the file twice"),
-        (
-            "$X\n1\n$EndXY\n".to_owned(),
-            "line 5: this section has no $EndX",
-        ),
-        (
-            "$EndX\n".to_owned(),
-            "line 4: expected a section such as $Nodes, found '$EndX'",
-        ),
-        (
-            "Nodes\n".to_owned(),
-            "line 4: expected a section such as $Nodes, found 'Nodes'",
-        ),
-        (
-            "$Nodes\n0\n".to_owned(),
-            "line 5: expected $EndNodes after 0 nodes, found the end of the file",
-        ),
+        ("$X\n1\n$EndXY\n".to_owned(), "line 5: this section has no $EndX"),
+        ("$EndX\n".to_owned(), "line 4: expected a section such as $Nodes, found '$EndX'"),
+        ("Nodes\n".to_owned(), "line 4: expected a section such as $Nodes, found 'Nodes'"),
+        ("$Nodes\n0\n".to_owned(), "line 5: expected $EndNodes after 0 nodes, found the end of the file"),
         (
             "$ParametricNodes\n".to_owned(),
             "line 4: $ParametricNodes cannot be read: save without parametric nodes",
@@ -599,10 +460,7 @@ fn sections_that_are_missing_unended_or_repeated_are_found() {
             "line 6: expected a name in quotes, found 'grip'",
         ),
     ] {
-        assert_eq!(
-            message(format!("{format}{sections}")),
-            format!("m.msh: {expected}")
-        );
+        assert_eq!(message(format!("{format}{sections}")), format!("m.msh: {expected}"));
     }
 }
 
@@ -638,10 +496,7 @@ fn many_tags_on_many_nodes_are_refused() {
          $EndEntities\n$Nodes\n1 {count} 1 {count}\n0 1 0 {count}\n{rows}{positions}$EndNodes\n\
          $Elements\n1 {count} 1 {count}\n0 1 15 {count}\n{points}$EndElements\n"
     );
-    assert_eq!(
-        message(file),
-        "m.msh: line 6015: too many physical tags on the same entities"
-    );
+    assert_eq!(message(file), "m.msh: line 6015: too many physical tags on the same entities");
 }
 
 #[test]
