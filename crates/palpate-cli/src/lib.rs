@@ -12,11 +12,13 @@ mod source;
 mod verbs;
 mod verification;
 mod vtu;
+mod whole_file;
 
 pub use failure::Failure;
 
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Touch elastic objects that are free to move: record a mesh once, then get contact forces at 1 kHz.
@@ -38,6 +40,11 @@ enum Verb {
     Bench(verbs::bench::Arguments),
 }
 
+/// Say something on standard error; a reader that has gone away is no failure.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 /// Run a command line and print what went wrong.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
@@ -55,7 +62,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("error: {failure}");
+            tell(&format!("error: {failure}"));
             ExitCode::FAILURE
         }
     }

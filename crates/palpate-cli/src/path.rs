@@ -1,6 +1,7 @@
 //! The path of a device: positions over time, linear between rows, constant before and after.
 
 use crate::Failure;
+use crate::scene_file::LARGEST;
 use glam::DVec3;
 use std::path::Path;
 
@@ -40,13 +41,13 @@ impl DevicePath {
                     }
                     continue;
                 }
-                Err(_) => return Err(format!("{place}: {line:?} is not four numbers t,x,y,z")),
+                Err(_) => return Err(format!("{place}: {:?} is not four numbers t,x,y,z", short(line))),
             };
             let [t, x, y, z] = numbers[..] else {
                 return Err(format!("{place}: {} numbers, expected the four t,x,y,z", numbers.len()));
             };
-            if !numbers.iter().all(|number| number.is_finite()) {
-                return Err(format!("{place}: {line:?} is not finite"));
+            if !numbers.iter().all(|number| number.abs() < LARGEST) {
+                return Err(format!("{place}: {:?} must be finite and below {LARGEST:e}", short(line)));
             }
             if let Some((last, _)) = rows.last().filter(|(last, _)| *last >= t) {
                 return Err(format!("{place}: time {t} s does not come after {last} s"));
@@ -75,6 +76,11 @@ impl DevicePath {
     }
 }
 
+/// A line as it may stand in a message.
+fn short(line: &str) -> String {
+    if line.chars().count() > 60 { line.chars().take(60).chain(['…']).collect() } else { line.to_string() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,7 +99,7 @@ mod tests {
         let error = |text: &str| DevicePath::parse(text).err().unwrap_or_default();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z in s and m");
         assert_eq!(error("t,x,y\n"), "line 1: the columns are t,x,y, expected t,x,y,z");
-        assert_eq!(error("0,0,0,0\n1,2,NaN,0\n"), "line 2: \"1,2,NaN,0\" is not finite");
+        assert_eq!(error("0,0,0,0\n1,2,NaN,0\n"), "line 2: \"1,2,NaN,0\" must be finite and below 1e6");
         assert_eq!(error("0,0,0,0\n1,2,a,0\n"), "line 2: \"1,2,a,0\" is not four numbers t,x,y,z");
         assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,x,y,z");
         assert_eq!(error("1,0,0,0\n1,0,0,0\n"), "line 2: time 1 s does not come after 1 s");

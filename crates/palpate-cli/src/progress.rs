@@ -24,7 +24,7 @@ impl Bars {
             bar.finish_and_clear();
         }
         if let Some((stage, since)) = self.stage.take() {
-            eprintln!("  {stage:<24} {:>7.2} s", since.elapsed().as_secs_f64());
+            crate::tell(&format!("  {stage:<24} {:>7.2} s", since.elapsed().as_secs_f64()));
         }
     }
 }
@@ -53,8 +53,8 @@ impl Progress for Bars {
 
     fn remark(&mut self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("warning: {text}")),
-            None => eprintln!("warning: {text}"),
+            Some(bar) => bar.suspend(|| crate::tell(&format!("warning: {text}"))),
+            None => crate::tell(&format!("warning: {text}")),
         }
     }
 }

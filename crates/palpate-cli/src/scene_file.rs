@@ -6,7 +6,8 @@ use glam::{DQuat, DVec3};
 use palpate::{
     Grasp, Model, ModelParameters, MotionRule, ObjectStart, Pose, Recording, RigidCompliance, Twist,
 };
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,6 +23,8 @@ pub struct Scene {
     pub devices: Vec<SceneDevice>,
     /// Things the user should know.
     pub remarks: Vec<String>,
+    /// The files that the scene was read from.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// A device that holds a point and follows a path.
@@ -40,7 +43,7 @@ struct SceneFile {
     #[serde(default = "default_step")]
     step: Spanned<f64>,
     #[serde(default)]
-    gravity: [f64; 3],
+    gravity: Numbers<3>,
     motion: Option<Spanned<String>>,
     rigid_compliance: Option<bool>,
     #[serde(default)]
@@ -55,13 +58,13 @@ struct ObjectEntry {
     name: Spanned<String>,
     recording: Spanned<PathBuf>,
     #[serde(default)]
-    position: [f64; 3],
+    position: Numbers<3>,
     #[serde(default = "identity")]
-    orientation: [f64; 4],
+    orientation: Numbers<4>,
     #[serde(default)]
-    velocity: [f64; 3],
+    velocity: Numbers<3>,
     #[serde(default)]
-    angular_velocity: [f64; 3],
+    angular_velocity: Numbers<3>,
 }
 
 #[derive(Deserialize)]
@@ -77,7 +80,7 @@ struct DeviceEntry {
 #[serde(deny_unknown_fields)]
 struct AttachEntry {
     object: Spanned<String>,
-    point: Spanned<[f64; 3]>,
+    point: Spanned<Numbers<3>>,
 }
 
 #[derive(Deserialize)]
@@ -86,12 +89,38 @@ struct PathEntry {
     file: Spanned<PathBuf>,
 }
 
+/// So many finite numbers.
+#[derive(Clone, Copy)]
+struct Numbers<const N: usize>([f64; N]);
+
+impl<const N: usize> Default for Numbers<N> {
+    fn default() -> Self {
+        Self([0.0; N])
+    }
+}
+
+impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let numbers: Vec<f64> = Vec::deserialize(deserializer)?;
+        let array: [f64; N] = numbers.try_into().map_err(|numbers: Vec<f64>| {
+            D::Error::custom(format!("{} numbers, expected {N}", numbers.len()))
+        })?;
+        if !array.iter().all(|number| number.abs() < LARGEST) {
+            return Err(D::Error::custom(format!("{array:?}, expected finite numbers below {LARGEST:e}")));
+        }
+        Ok(Self(array))
+    }
+}
+
+/// Lengths [m], velocities and accelerations beyond this are no scene's.
+pub const LARGEST: f64 = 1e6;
+
 fn default_step() -> Spanned<f64> {
     Spanned::new(0..0, ModelParameters::default().step_s)
 }
 
-fn identity() -> [f64; 4] {
-    [1.0, 0.0, 0.0, 0.0]
+fn identity() -> Numbers<4> {
+    Numbers([1.0, 0.0, 0.0, 0.0])
 }
 
 /// How far from the surface a point to hold may be, as a share of the object's diagonal.
@@ -164,10 +193,14 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
     if !(step_s > 0.0 && step_s <= 1.0) {
         return source.fail(file.step.span(), format!("step is {step_s} s, expected above 0 and at most 1"));
     }
-    let gravity = DVec3::from_array(file.gravity);
+    let gravity = DVec3::from_array(file.gravity.0);
     let parameters = ModelParameters { step_s, gravity, motion, rigid_compliance, devices: devices.len() };
     let model = Model::new(parameters, objects).map_err(|e| Failure(format!("{}: {e}", path.display())))?;
-    Ok(Scene { model, object_names, devices, remarks })
+    let recordings = file.object.iter().map(|object| object.get_ref().recording.get_ref());
+    let paths = file.device.iter().map(|device| device.get_ref().path.file.get_ref());
+    let mut inputs = vec![path.to_path_buf()];
+    inputs.extend(recordings.chain(paths).map(|file| source.relative(file)));
+    Ok(Scene { model, object_names, devices, remarks, inputs })
 }
 
 /// Names stand in CSV headers: each once, and without separators.
@@ -197,15 +230,15 @@ fn read_object(
         Ok(recording) => recording,
         Err(failure) => return source.fail(place, failure),
     };
-    let [w, x, y, z] = object.orientation;
+    let [w, x, y, z] = object.orientation.0;
     let start = ObjectStart {
         pose: Pose {
-            position: DVec3::from_array(object.position),
+            position: DVec3::from_array(object.position.0),
             orientation: DQuat::from_xyzw(x, y, z, w),
         },
         twist: Twist {
-            linear: DVec3::from_array(object.velocity),
-            angular: DVec3::from_array(object.angular_velocity),
+            linear: DVec3::from_array(object.velocity.0),
+            angular: DVec3::from_array(object.angular_velocity.0),
         },
     };
     // Tried on its own, so that the line is that of this object.
@@ -239,8 +272,8 @@ fn read_device(
     };
     let (recording, start) = &objects[object];
     let point_span = device.attach.point.span();
-    let point = DVec3::from_array(*device.attach.point.get_ref());
-    let nearest = if point.is_finite() { recording.surface.nearest(point) } else { None };
+    let point = DVec3::from_array(device.attach.point.get_ref().0);
+    let nearest = recording.surface.nearest(point);
     let diagonal = recording.surface.diagonal();
     let allowed = OFF_SURFACE * diagonal;
     let grasp = match nearest {
@@ -254,7 +287,7 @@ fn read_device(
                 ),
             );
         }
-        None => return source.fail(point_span, format!("the point {point} is not finite")),
+        None => return source.fail(point_span, format!("the object {wanted:?} has no surface")),
     };
     let file = &device.path.file;
     let path = match DevicePath::read(&source.relative(file.get_ref())) {

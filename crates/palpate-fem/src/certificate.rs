@@ -31,6 +31,9 @@ const LEFT_OUT: usize = 2;
 /// The dynamic compliance may be off by this share of the static one within the bandwidth.
 const BANDWIDTH_TOLERANCE: f64 = 0.05;
 
+/// What stands for an error without bound: too few modes without residual can't be held in every direction at all.
+const UNBOUNDED: f64 = 1e6;
+
 /// Why no certificate could be made.
 #[derive(Debug, thiserror::Error)]
 pub enum CertificateError {
@@ -111,13 +114,16 @@ pub fn certificate(
         let change = relative(coarse.0, instantaneous).max(apart(&coarse.1, &exact));
 
         let force_error = apart(&response.presses(damping, false), &exact);
-        if force_error >= worst.force_error_max {
+        if force_error >= worst.force_error_max || force_error.is_nan() {
             worst.force_error_max = force_error;
             worst.worst_at_m = sample.centre.to_array();
             worst.worst_patch_radius_m = sample.radius;
         }
         force_errors.push(force_error);
-        let raise = |worst: &mut f64, error: f64| *worst = worst.max(error);
+        // An error that is no number is the worst of all.
+        let raise = |worst: &mut f64, error: f64| {
+            *worst = if error > *worst || error.is_nan() { error } else { *worst }
+        };
         raise(
             &mut worst.static_compliance_error_max,
             relative(response.modelled_static(), response.exact_static()),
@@ -132,6 +138,15 @@ pub fn certificate(
     }
     force_errors.sort_by(f64::total_cmp);
     worst.force_error_median = force_errors[force_errors.len() / 2];
+    for error in [
+        &mut worst.force_error_max,
+        &mut worst.force_error_median,
+        &mut worst.static_compliance_error_max,
+        &mut worst.instantaneous_compliance_error_max,
+        &mut worst.reference_error,
+    ] {
+        *error = if *error < UNBOUNDED { *error } else { UNBOUNDED };
+    }
     Ok(worst)
 }
 

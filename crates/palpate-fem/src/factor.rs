@@ -21,8 +21,22 @@ use std::sync::Arc;
 #[derive(Debug, thiserror::Error)]
 pub enum FactorError {
     /// The matrix is not positive definite: the body can still move without resistance.
-    #[error("the stiffness matrix is not positive definite (at row {0})")]
-    NotPositiveDefinite(usize),
+    #[error(
+        "the stiffness matrix is not positive definite to the digits of f64: a part of the body hangs on a hinge, the mesh \
+         has slivers, or its materials differ by too many orders"
+    )]
+    NotPositiveDefinite,
+    /// More memory is needed than there is.
+    #[error(
+        "the mesh needs about {needed_gb:.1} GB of memory for its factors and modes, and {available_gb:.1} GB are free: use \
+         fewer elements or modes, or --order 1"
+    )]
+    Memory {
+        /// Estimate.
+        needed_gb: f64,
+        /// What the system says is free.
+        available_gb: f64,
+    },
     /// The ordering or the symbolic analysis failed; most likely memory ran out.
     #[error("the sparse factor cannot be set up ({0})")]
     Setup(String),
@@ -74,9 +88,9 @@ impl Pattern {
         Ok(Self { symbolic: Arc::new(symbolic) })
     }
 
-    /// Numbers that a factor on this pattern stores.
-    pub fn stored_values(&self) -> usize {
-        self.symbolic.len_val()
+    /// Memory of one factor [bytes].
+    pub fn factor_bytes(&self) -> u64 {
+        8 * self.symbolic.len_val() as u64
     }
 
     /// Cholesky factor of K + `shift`·M; `constrained` has one entry per degree of freedom.
@@ -103,11 +117,7 @@ impl Pattern {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|error| match error {
-                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
-                    FactorError::NotPositiveDefinite(index)
-                }
-            })?;
+            .map_err(|_| FactorError::NotPositiveDefinite)?;
         let constrained = (0..constrained.len()).filter(|&row| constrained[row]).collect();
         Ok(Factor { symbolic: self.symbolic.clone(), constrained, values })
     }
@@ -211,6 +221,27 @@ fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> Spar
     }
     let symbolic = SymbolicSparseColMat::new_checked(3 * n, 3 * n, offsets, None, rows);
     SparseColMat::new(symbolic, values)
+}
+
+/// Memory that is free [bytes], where the system tells.
+fn available_memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(1024.0 * kilobytes)
+}
+
+/// Refuse work that would need more memory than is free.
+///
+/// # Errors
+/// [`FactorError::Memory`].
+pub fn check_memory(needed_bytes: f64) -> Result<(), FactorError> {
+    match available_memory() {
+        Some(available) if needed_bytes > available => {
+            Err(FactorError::Memory { needed_gb: needed_bytes / 1e9, available_gb: available / 1e9 })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Nested dissection of the node graph by METIS; gives old numbers in elimination order.

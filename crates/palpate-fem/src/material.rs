@@ -43,6 +43,12 @@ pub fn lame_constants(material: &Material) -> (f64, f64) {
     (lambda, young / (2.0 * (1.0 + poisson)))
 }
 
+/// Young's moduli that are computed [Pa]: wide around foam and diamond, for scaled units, within what f64 squares safely.
+const YOUNG_PA: [f64; 2] = [1e-6, 1e18];
+
+/// Densities that are computed [kg/m³].
+const DENSITY_KG_M3: [f64; 2] = [1e-9, 1e12];
+
 /// Refuse a material outside of what linear elasticity allows.
 ///
 /// # Errors
@@ -51,8 +57,10 @@ pub fn check(material: &Material) -> Result<(), MaterialError> {
     let Material { region, young_pa, poisson, density_kg_m3 } = material;
     let place = if region.is_empty() { String::new() } else { format!("region {region}: ") };
     let range = |what: String| Err(MaterialError::Range { what: format!("{place}{what}") });
-    if !(young_pa.is_finite() && *young_pa > 0.0) {
-        return range(format!("Young's modulus is {young_pa} Pa, expected a positive number"));
+    let within = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+    if !within(*young_pa, YOUNG_PA) {
+        let [low, high] = YOUNG_PA;
+        return range(format!("Young's modulus is {young_pa:e} Pa, expected {low:e} to {high:e} Pa"));
     }
     if *poisson >= 0.5 {
         return range(format!(
@@ -63,8 +71,9 @@ pub fn check(material: &Material) -> Result<(), MaterialError> {
     if !(*poisson > -1.0 && poisson.is_finite()) {
         return range(format!("Poisson's ratio is {poisson}, expected above -1 and below 0.5"));
     }
-    if !(density_kg_m3.is_finite() && *density_kg_m3 > 0.0) {
-        return range(format!("density is {density_kg_m3} kg/m³, expected a positive number"));
+    if !within(*density_kg_m3, DENSITY_KG_M3) {
+        let [low, high] = DENSITY_KG_M3;
+        return range(format!("density is {density_kg_m3:e} kg/m³, expected {low:e} to {high:e} kg/m³"));
     }
     Ok(())
 }
@@ -86,7 +95,7 @@ struct MaterialEntry {
 }
 
 #[derive(Deserialize, PartialEq)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a region is a name in quotes or a whole number")]
 enum RegionKey {
     Number(i64),
     Name(String),
@@ -136,6 +145,12 @@ pub fn materials_from_toml(text: &str, mesh: &Mesh) -> Result<Vec<Material>, Mat
         }
     }
     let for_region = |region: &Region| {
+        if file.material.iter().filter(|entry| entry.region.fits(region)).count() > 1 {
+            return Err(MaterialError::File(format!(
+                "region {} has more than one material",
+                region_text(region)
+            )));
+        }
         let Some(entry) = file.material.iter().find(|entry| entry.region.fits(region)) else {
             let known = join(file.material.iter().map(|entry| entry.region.text()).collect());
             return Err(MaterialError::Missing { region: region_text(region), known });

@@ -32,7 +32,7 @@ pub enum ModesError {
     TooMany {
         /// Asked for.
         wanted: usize,
-        /// Degrees of freedom less rigid motions.
+        /// What can be found.
         available: usize,
     },
     /// The body has motions without stiffness beside the rigid ones.
@@ -78,6 +78,11 @@ const BLOCK: usize = 16;
 /// Up to this many degrees of freedom all modes are computed densely, in about a second.
 const DENSE_UP_TO: usize = 900;
 
+/// Beyond this dense work is announced, and beyond the other (30 minutes, 5 GB) refused: up to a third of the modes of a
+/// mesh are found sparsely, whatever its size.
+const DENSE_SLOW: usize = 3_000;
+const DENSE_AT_MOST: usize = 14_000;
+
 /// Two neighbours in the spectrum are a gap when ω² differs by this share.
 const GAP: f64 = 1e-5;
 
@@ -98,13 +103,20 @@ pub fn lowest_modes(
         return Err(ModesError::TooMany { wanted, available });
     }
     // The Krylov basis needs room: several columns per mode.
-    let dense = system.discretisation.dofs() <= DENSE_UP_TO || 3 * wanted + 8 * BLOCK > available;
+    let dofs = system.discretisation.dofs();
+    let dense = dofs <= DENSE_UP_TO || 3 * wanted + 8 * BLOCK > available;
+    if dense && dofs > DENSE_AT_MOST {
+        return Err(ModesError::TooMany { wanted, available: (available - 8 * BLOCK) / 3 });
+    }
+    if dense && dofs > DENSE_SLOW {
+        progress.remark(&format!("so many of the {available} modes are found densely, which takes minutes"));
+    }
     let modes = if dense { all_modes(system, wanted, progress)? } else { krylov(system, wanted, progress)? };
     check_mechanism(system, &modes)?;
     Ok(modes)
 }
 
-/// A size of elastic ω² for the body: (c_s/diameter)², from the stiffest entries' ratio would depend on the mesh.
+/// A mechanism shows as a first mode that is slower than the last by many orders.
 fn check_mechanism(system: &System, modes: &Modes) -> Result<(), ModesError> {
     let (Some(&first), Some(&last)) = (modes.squares.first(), modes.squares.last()) else {
         return Ok(());

@@ -4,6 +4,7 @@ use crate::assembly::Assembly;
 use crate::certificate::{CertificateError, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::Order;
+use crate::factor::check_memory;
 use crate::material::{self, MaterialError};
 use crate::mesh::{Mesh, MeshError, check};
 use crate::modes::{Modes, ModesError, lowest_modes};
@@ -84,7 +85,9 @@ pub fn record(
     remark_on_locking(parameters, progress);
     progress.advance(1);
     let discretisation = Discretisation::new(&mesh, parameters.order);
-    let fixed_nodes = fixed_nodes(&mesh, &discretisation, &parameters.fixed_nodes);
+    check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))
+        .map_err(SystemError::from)?;
+    let fixed_nodes = fixed_nodes(&discretisation, &parameters.fixed_nodes)?;
     let assembly = Assembly::new(&discretisation, &parameters.materials);
     progress.advance(1);
     let system = System::new(discretisation, assembly, fixed_nodes)?;
@@ -115,8 +118,8 @@ pub fn record(
     let free = system.fixed_nodes.is_empty();
     let metadata = Metadata {
         format_version: FORMAT_VERSION,
-        hold: "held force, displacement at end of step".into(),
-        units: "SI".into(),
+        hold: Metadata::hold(),
+        units: Metadata::units(),
         support: if free { Support::Free } else { Support::Fixed },
         materials: parameters.materials.clone(),
         damping: parameters.damping,
@@ -173,6 +176,12 @@ fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), Re
     }
 }
 
+/// A rough estimate before anything large is made: the factor grows with dofs^(4/3) (measured: 0.6 GB at 81 000 with
+/// linear elements), the basis of the modes holds about four columns per mode, three times over.
+fn needed_bytes(dofs: f64, modes: f64) -> f64 {
+    0.6e9 * (dofs / 81e3).powf(4.0 / 3.0) + 3.0 * 8.0 * dofs * (4.0 * modes).min(dofs)
+}
+
 fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
     let stiffest = parameters.materials.iter().map(|m| m.poisson).fold(0.0, f64::max);
     if parameters.order == Order::Linear && stiffest > 0.45 {
@@ -190,7 +199,9 @@ fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress)
 
 fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
     let error = certificate.force_error_max;
-    if error > 0.05 {
+    if error > 10.0 {
+        progress.remark("the force of this recording is worth nothing (see the certificate): keep the residual compliance and more modes");
+    } else if error > 0.05 {
         progress.remark(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
              certificate): keep the residual compliance and more modes",
@@ -199,7 +210,8 @@ fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress)
     }
 }
 
-fn fixed_nodes(mesh: &Mesh, discretisation: &Discretisation, wanted: &[u32]) -> Vec<u32> {
+/// Nodes of the discretisation that are fixed, from nodes of the mesh.
+fn fixed_nodes(discretisation: &Discretisation, wanted: &[u32]) -> Result<Vec<u32>, RecordError> {
     let mut fixed = vec![false; discretisation.nodes.len()];
     for &node in wanted {
         if let Some(Some(node)) = discretisation.node_of_mesh.get(node as usize) {
@@ -217,8 +229,13 @@ fn fixed_nodes(mesh: &Mesh, discretisation: &Discretisation, wanted: &[u32]) -> 
             }
         }
     }
-    debug_assert!(mesh.nodes.len() == discretisation.node_of_mesh.len());
-    (0..fixed.len()).filter(|&node| fixed[node]).map(|node| node as u32).collect()
+    if !wanted.is_empty() && !fixed.contains(&true) {
+        return Err(RecordError::Option("the nodes to fix belong to no tetrahedron".into()));
+    }
+    if !fixed.contains(&false) {
+        return Err(RecordError::Option("all nodes are fixed: nothing can move".into()));
+    }
+    Ok((0..fixed.len()).filter(|&node| fixed[node]).map(|node| node as u32).collect())
 }
 
 fn surface(system: &System, surface_nodes: &[u32]) -> Surface {

@@ -124,7 +124,7 @@ fn whole(
         for (i, &value) in column.iter().enumerate().skip(j) {
             packed[i * (i + 1) / 2 + j] = value as f32;
         }
-        diagonal[j] = column[j] + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
+        diagonal[j] = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
     });
     for (i, value) in diagonal.into_iter().enumerate() {
         packed[i * (i + 1) / 2 + i] = value as f32;
@@ -164,7 +164,7 @@ fn near_field(
             }
         }
         if let Some(own) = row.into_iter().find(|&at| near.nodes[at] as usize == node) {
-            near.blocks[9 * own + 4 * axis] = (column[j] + F32_ROUNDING * sum) as f32;
+            near.blocks[9 * own + 4 * axis] = (column[j].max(0.0) + F32_ROUNDING * sum) as f32;
         }
     });
     for node in 0..positions.len() {

@@ -13,7 +13,7 @@
 
 use crate::assembly::{Assembly, Which};
 use crate::discretisation::Discretisation;
-use crate::factor::{Factor, FactorError, Pattern};
+use crate::factor::{Factor, FactorError, Pattern, check_memory};
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 use palpate::MassProperties;
@@ -68,6 +68,8 @@ impl System {
             fixed[3 * node as usize..][..3].fill(true);
         }
         let pattern = Pattern::new(&assembly)?;
+        // Its own factor and the two shifted ones of the certificate.
+        check_memory(3.0 * pattern.factor_bytes() as f64)?;
         let (mut held, mut rigid) = (fixed.clone(), None);
         if fixed_nodes.is_empty() {
             for (row, _) in independent_rows(&shapes, 0..shapes.nrows()) {
@@ -79,10 +81,9 @@ impl System {
             let rows = fixed_nodes.iter().flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
             let pivots = independent_rows(&shapes, rows);
             if pivots.len() < 6 || pivots[5].1 < 1e-9 * pivots[0].1 {
-                return Err(SystemError::Support(format!(
-                    "the {} fixed nodes leave the body free to turn: fix at least three nodes that are not on one line",
-                    fixed_nodes.len()
-                )));
+                return Err(SystemError::Support(
+                    "the fixed nodes leave the body free to turn: fix at least three nodes that are not on one line".into(),
+                ));
             }
         }
         let factor = pattern.factor(&assembly, &held, 0.0)?;

@@ -58,6 +58,9 @@ pub struct StepStatus {
     pub rejected_devices: u32,
     /// Held directions that repeat others and got no force.
     pub dependent_rows: u32,
+    /// Objects whose held points could not be met, or whose turn could not be found, because a hand or the body moves
+    /// too far in a step; they moved freely in this step.
+    pub unsolved_objects: u32,
 }
 
 /// Output of a step.

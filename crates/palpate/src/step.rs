@@ -30,6 +30,10 @@ const MAX_ITERATIONS: u32 = 40;
 /// a few roundings of the sum x + R·(r + u).
 const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
+/// A miss above this share of the reach, or this angle [rad], is no solution: the hand or the body moves too far in a
+/// step. The object then moves freely for the step, without force, and the status says so.
+const UNSOLVED: f64 = 1e-9;
+
 /// Advance a scene by one step.
 ///
 /// # Real time
@@ -47,6 +51,9 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
         } else {
             solve(model, object, own, held, workspace, &mut output.status)
         };
+        if end.miss > UNSOLVED {
+            output.status.unsolved_objects += 1;
+        }
         advance(model, object, own, held, workspace, &end);
     }
     state.steps += 1;
@@ -158,7 +165,7 @@ fn advance_rigid(
             let force = force + parameters.gravity * inertia.mass;
             inertia.advance(parameters.motion, start, parameters.step_s, force, torque)
         }
-        None => RigidStep { end: *start, turn: DVec3::ZERO },
+        None => RigidStep { end: *start, turn: DVec3::ZERO, miss: 0.0 },
     }
 }
 
@@ -205,8 +212,14 @@ fn solve(
         // Done at round-off, or near it when no more digits are gained.
         let stalled = miss > 0.5 * least_miss && miss < 1e3 * ROUND_OFF * reach;
         if miss <= ROUND_OFF * reach || stalled || iterations == MAX_ITERATIONS {
-            status.solver_residual_m = status.solver_residual_m.max(miss);
             status.iterations = status.iterations.max(iterations);
+            // Points that repeat others can't be met exactly, and need not be.
+            let solved = miss <= UNSOLVED * reach || dependent > 0 || !rigid_counts;
+            if !(solved && miss.is_finite()) {
+                status.unsolved_objects += 1;
+                return let_go(held, active, free);
+            }
+            status.solver_residual_m = status.solver_residual_m.max(miss);
             break;
         }
         least_miss = least_miss.min(miss);
@@ -224,6 +237,17 @@ fn solve(
         }
     }
     end
+}
+
+/// The step without force: sound whatever the hands ask for.
+fn let_go(held: &HeldPoints, active: &mut [ActivePoint], free: RigidStep) -> RigidStep {
+    for point in active {
+        point.force = DVec3::ZERO;
+        point.force_in_body = DVec3::ZERO;
+        point.displacement = point.free;
+        point.end_arm = free.end.pose.orientation * (held.points[point.device].rest + point.free);
+    }
+    free
 }
 
 /// Displacements, arms and misses of the points under their present forces, with the rotation of the

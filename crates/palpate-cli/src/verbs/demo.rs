@@ -157,7 +157,10 @@ pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<(Re
         && std::fs::create_dir_all(&folder).is_ok()
         && write_whole(&path, &bytes).is_err()
     {
-        eprintln!("warning: {} cannot be written, so the cube will be recorded again", path.display());
+        crate::tell(&format!(
+            "warning: {} cannot be written, so the cube will be recorded again",
+            path.display()
+        ));
     }
     Ok((recording, bytes))
 }

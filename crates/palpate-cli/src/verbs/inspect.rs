@@ -159,6 +159,7 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
 
 fn percent(share: f64) -> String {
     match 100.0 * share {
+        percent if percent > 1000.0 => "more than 1000 %".into(),
         percent if percent >= 10.0 => format!("{percent:.0} %"),
         percent if percent >= 0.005 => format!("{percent:.2} %"),
         _ => "below 0.01 %".into(),

@@ -1,7 +1,8 @@
 //! `palpate record`: mesh in, recording out.
 
 use crate::progress::Bars;
-use crate::verbs::{inspect, write_whole};
+use crate::verbs::inspect;
+use crate::whole_file::{check_writable, write_whole};
 use crate::{Failure, source};
 use clap::Args;
 use palpate::{Damping, Material};
@@ -36,13 +37,13 @@ pub struct Arguments {
     #[arg(short, long, value_name = "OUT.palp")]
     pub output: PathBuf,
     /// Young's modulus [Pa]
-    #[arg(long, value_name = "PA", required_unless_present = "materials")]
+    #[arg(long, value_name = "PA", allow_negative_numbers = true, required_unless_present = "materials")]
     pub young: Option<f64>,
     /// Poisson's ratio, below 0.5
     #[arg(long, allow_negative_numbers = true, required_unless_present = "materials")]
     pub poisson: Option<f64>,
     /// Density [kg/m³]
-    #[arg(long, value_name = "KG/M³", required_unless_present = "materials")]
+    #[arg(long, value_name = "KG/M³", allow_negative_numbers = true, required_unless_present = "materials")]
     pub density: Option<f64>,
     /// Materials by region of the mesh, a TOML file (see below)
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["young", "poisson", "density"])]
@@ -76,7 +77,7 @@ pub struct Arguments {
     #[arg(long)]
     pub merge_nodes: bool,
     /// Residual compliance: auto, whole, none, or a cut-off radius in metres
-    #[arg(long, default_value = "auto", value_parser = residual_choice)]
+    #[arg(long, default_value = "auto", allow_hyphen_values = true, value_parser = residual_choice)]
     pub residual: ResidualChoice,
     /// Print what `inspect --json` prints
     #[arg(long)]
@@ -97,7 +98,9 @@ fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
 
 /// Run the verb.
 pub fn record(arguments: &Arguments) -> Result<(), Failure> {
-    check_output(&arguments.output)?;
+    let inputs: Vec<&Path> =
+        [Some(Path::new(&arguments.source)), arguments.materials.as_deref()].into_iter().flatten().collect();
+    check_writable(&arguments.output, &inputs)?;
     let mut progress = Bars::new();
     let mut mesh = source::mesh(&arguments.source)?;
     mesh.scale(arguments.scale)?;
@@ -106,7 +109,8 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         progress.remark(&format!("{merged} nodes lay on others and were merged"));
     }
     let parameters = parameters(arguments, &mesh)?;
-    let recorded = record_mesh(mesh, &parameters, &mut progress)?;
+    let recorded = record_mesh(mesh, &parameters, &mut progress)
+        .map_err(|e| Failure(format!("{}: {e}", source::name(&arguments.source))))?;
     progress.begin("writing", 1);
     let bytes = recorded.recording.to_bytes()?;
     write_whole(&arguments.output, &bytes)?;
@@ -116,22 +120,6 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         inspect::print_for_person(&recorded.recording, &arguments.output, bytes.len())
     }
-}
-
-/// Fail before the work, not after it.
-fn check_output(output: &Path) -> Result<(), Failure> {
-    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Err(Failure(format!(
-            "cannot write {}: there is no folder {}",
-            output.display(),
-            folder.display()
-        )));
-    }
-    if output.is_dir() {
-        return Err(Failure(format!("cannot write {}: it is a folder", output.display())));
-    }
-    tempfile::tempfile_in(folder).map(drop).map_err(|e| Failure::file("write into", folder, &e))
 }
 
 fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Failure> {

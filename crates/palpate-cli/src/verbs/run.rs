@@ -4,12 +4,13 @@ use crate::Failure;
 use crate::scene_file::{self, Scene};
 use crate::verbs::{print, print_json};
 use crate::vtu::VtuSeries;
+use crate::whole_file::WholeFile;
 use clap::Args;
 use glam::DVec3;
+use indicatif::ProgressBar;
 use palpate::{DeviceInput, Input, Output, State, StepStatus, step};
 use serde_json::{Value, json};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,7 +42,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     pub vtu: Option<PathBuf>,
     /// Frames of --vtu per second of simulated time
-    #[arg(long, default_value_t = 50.0, value_name = "FPS")]
+    #[arg(long, default_value_t = 50.0, value_name = "FPS", allow_negative_numbers = true)]
     pub fps: f64,
     /// One JSON object on standard output
     #[arg(long)]
@@ -51,13 +52,16 @@ pub struct Arguments {
 /// Longest run [s] without a path to tell: long enough to see a fall.
 const DEFAULT_DURATION_S: f64 = 1.0;
 
+/// Runs of more steps than this (a second of work) show a bar on a terminal.
+const PROGRESS_FROM: usize = 200_000;
+
 /// More steps than this are a slip of the keyboard (a day at 1 kHz).
 const MOST_STEPS: f64 = 1e8;
 
 /// Run the verb.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = scene_file::read(&arguments.scene)?;
-    scene.remarks.iter().for_each(|remark| eprintln!("warning: {remark}"));
+    scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
     let summary = simulate(&scene, arguments)?;
     if arguments.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
 }
@@ -119,7 +123,15 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     if let Some(series) = &mut series {
         series.write_frame(&scene.model, &state)?;
     }
+    let bar = if std::io::stderr().is_terminal() && steps > PROGRESS_FROM {
+        ProgressBar::new(steps as u64)
+    } else {
+        ProgressBar::hidden()
+    };
     for number in 1..=steps {
+        if number % 1024 == 0 {
+            bar.set_position(number as u64);
+        }
         let time = number as f64 * step_s;
         for (device, entry) in scene.devices.iter().zip(&mut input.devices) {
             entry.position = device.path.at(time);
@@ -128,6 +140,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         let output = step(&scene.model, &mut state, &input);
         summary.times_ns.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
         summary.take(output);
+        check_status(scene, &input, output)?;
         if let Some(csv) = &mut csv {
             csv.write(&input, output)?;
         }
@@ -137,6 +150,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
             series.write_frame(&scene.model, &state)?;
         }
     }
+    bar.finish_and_clear();
     summary.times_ns.sort_unstable();
     summary.last = state.output().clone();
     if let Some(csv) = csv {
@@ -144,6 +158,27 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     }
     summary.index = series.map(VtuSeries::finish).transpose()?;
     Ok(summary)
+}
+
+/// A step that could not be solved ends the run: its numbers would be those of an object let go.
+fn check_status(scene: &Scene, input: &Input, output: &Output) -> Result<(), Failure> {
+    let finite = output.objects.iter().all(|o| o.energy.stored().is_finite() && o.pose.position.is_finite());
+    if output.status.unsolved_objects == 0 && output.status.rejected_devices == 0 && finite {
+        return Ok(());
+    }
+    let apart =
+        input.devices.iter().zip(&output.devices).map(|(hand, out)| (hand.position - out.point).length());
+    let farthest = apart.zip(&scene.devices).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint =
+        farthest.filter(|(distance, _)| *distance > 0.0).map_or(String::new(), |(distance, device)| {
+            format!("; the hand of {:?} is {distance:.3e} m from the point that it holds", device.name)
+        });
+    Err(Failure(format!(
+        "at {:.6} s the held points can't be met: a hand moves, or a body turns, too far in one step of {} s{hint}. Use a \
+         shorter step, and check that paths are in metres",
+        output.time_s,
+        scene.model.parameters().step_s
+    )))
 }
 
 impl Summary {
@@ -284,14 +319,13 @@ fn largest(forces: &[DVec3]) -> f64 {
 
 /// Every step as a line of numbers that read back to the same bits.
 struct CsvWriter {
-    file: BufWriter<File>,
-    path: PathBuf,
+    file: WholeFile,
 }
 
 impl CsvWriter {
     fn new(path: &Path, scene: &Scene) -> Result<Self, Failure> {
-        let file = File::create(path).map_err(|e| Failure::file("write", path, &e))?;
-        let mut writer = Self { file: BufWriter::new(file), path: path.to_path_buf() };
+        let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
+        let mut writer = Self { file: WholeFile::create(path, &inputs)? };
         let mut columns = vec!["t".to_string()];
         for device in &scene.devices {
             columns.extend(["x", "y", "z", "fx", "fy", "fz"].map(|c| format!("{}.{c}", device.name)));
@@ -307,7 +341,7 @@ impl CsvWriter {
     }
 
     fn line(&mut self, text: &str) -> Result<(), Failure> {
-        writeln!(self.file, "{text}").map_err(|e| Failure::file("write", &self.path, &e))
+        self.file.write(format!("{text}\n").as_bytes())
     }
 
     fn write(&mut self, input: &Input, output: &Output) -> Result<(), Failure> {
@@ -329,7 +363,7 @@ impl CsvWriter {
         self.line(&cells.join(","))
     }
 
-    fn finish(mut self) -> Result<(), Failure> {
-        self.file.flush().map_err(|e| Failure::file("write", &self.path, &e))
+    fn finish(self) -> Result<(), Failure> {
+        self.file.finish()
     }
 }

@@ -13,8 +13,8 @@ const POOR_BELOW: f64 = 0.03;
 /// Bodies outside of this range of extents [m] are most likely in another unit.
 const USUAL_EXTENT: [f64; 2] = [1e-3, 3.0];
 
-/// Nodes closer than this share of the mesh's diagonal are one point.
-const COINCIDENT: f64 = 1e-9;
+/// Nodes closer than this share of the mesh's diagonal are one point: some times the rounding of a file in f32.
+const COINCIDENT: f64 = 1e-6;
 
 /// Signed volume [m³].
 pub(crate) fn tet_volume(nodes: &[DVec3], tet: &[u32; 4]) -> f64 {
@@ -85,7 +85,7 @@ pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
                 }
                 Some(p) if !p.is_finite() => {
                     return unusable(format!(
-                        "node {node} is at {p}, which is not finite (in tetrahedron {number})"
+                        "node {node} is at {p}, which is not finite (in tetrahedron {number}; both counted from 0)"
                     ));
                 }
                 Some(_) => used[node as usize] = true,
@@ -104,7 +104,7 @@ pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
     check_connected(&mesh, &faces, coincident.first().copied())?;
     if let Some(&(a, b)) = coincident.first() {
         mesh.remarks.push(format!(
-            "{} pairs of nodes lie on the same point (nodes {a} and {b} at {}): the body is slit open there. If it \
+            "{} pairs of nodes lie on the same point (nodes {a} and {b}, counted from 0, at {}): the body is slit open there. If it \
              should not be, use --merge-nodes",
             coincident.len(),
             place(mesh.nodes[a as usize])
@@ -115,17 +115,21 @@ pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
-/// Make nodes that lie on the same point one node, and drop tetrahedra that this makes flat.
-/// Gives the number of nodes that went.
+/// Let tetrahedra and groups use one node where several lie on the same point. Gives the number of nodes that are no
+/// longer used.
 pub fn merge_nodes(mesh: &mut Mesh) -> usize {
-    let used = vec![true; mesh.nodes.len()];
+    let mut used = vec![false; mesh.nodes.len()];
+    let known = mesh.tets.iter().flatten().filter(|&&node| (node as usize) < mesh.nodes.len());
+    known.for_each(|&node| used[node as usize] = true);
     let (low, high) = extent(mesh, &used);
     let mut first: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
     let pairs = coincident_pairs(mesh, &used, COINCIDENT * (high - low).length());
     for (a, b) in pairs {
         first[b as usize] = first[a as usize];
     }
-    let renumber = |nodes: &mut [u32]| nodes.iter_mut().for_each(|node| *node = first[*node as usize]);
+    let renumber = |nodes: &mut [u32]| {
+        nodes.iter_mut().for_each(|node| *node = first.get(*node as usize).copied().unwrap_or(*node));
+    };
     mesh.tets.iter_mut().for_each(|tet| renumber(tet));
     for group in &mut mesh.groups {
         renumber(&mut group.nodes);
@@ -136,7 +140,7 @@ pub fn merge_nodes(mesh: &mut Mesh) -> usize {
 }
 
 fn place(p: DVec3) -> String {
-    format!("({:.6}, {:.6}, {:.6}) m", p.x, p.y, p.z)
+    format!("({:.4e}, {:.4e}, {:.4e}) m", p.x, p.y, p.z)
 }
 
 fn centre(mesh: &Mesh, tet: u32) -> DVec3 {
@@ -165,7 +169,7 @@ fn turn_upright(mesh: &mut Mesh) -> Result<(), MeshError> {
     }
     if let Some(&worst) = flat.first() {
         return Err(MeshError::Unusable(format!(
-            "{} tetrahedra are flat or repeat a node, first tetrahedron {worst} (nodes {:?}) near {}",
+            "{} tetrahedra are flat or repeat a node, first tetrahedron {worst} (nodes {:?}, all counted from 0) near {}",
             flat.len(),
             mesh.tets[worst as usize],
             place(centre(mesh, worst))
@@ -207,7 +211,7 @@ fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
     let report = |pairs: &[(u32, u32)], what: &str| {
         let (a, b) = pairs[0];
         Err(MeshError::Unusable(format!(
-            "{} {what}, first tetrahedra {a} and {b} near {}",
+            "{} {what}, first tetrahedra {a} and {b} (counted from 0) near {}",
             pairs.len(),
             place(centre(mesh, a))
         )))
@@ -267,26 +271,33 @@ fn check_connected(mesh: &Mesh, faces: &[Face], coincident: Option<(u32, u32)>) 
     )))
 }
 
-/// Pairs of used nodes within `tolerance` [m] of each other, by sorting into cells.
+/// Pairs (first, other) of used nodes within `tolerance` [m], each other node once: nodes are sorted into cells of that
+/// size and compared with those in the neighbouring cells.
 fn coincident_pairs(mesh: &Mesh, used: &[bool], tolerance: f64) -> Vec<(u32, u32)> {
-    if tolerance <= 0.0 {
+    if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Vec::new();
     }
-    // Sorted along x: only neighbours within the tolerance are compared.
-    let mut order: Vec<u32> = (0..mesh.nodes.len() as u32)
-        .filter(|&n| used[n as usize] && mesh.nodes[n as usize].is_finite())
-        .collect();
-    let key = |n: u32| mesh.nodes[n as usize].to_array();
-    let compare = |a: &[f64; 3], b: &[f64; 3]| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal);
-    // Round to the tolerance first, so that equal points sort next to each other in y and z too.
-    let rounded = |n: u32| key(n).map(|v| (v / (8.0 * tolerance)).round());
-    order.sort_by(|&a, &b| compare(&rounded(a), &rounded(b)).then(a.cmp(&b)));
+    let cell = |p: DVec3| (p / tolerance).floor();
+    let key = |cell: DVec3| cell.to_array().map(f64::to_bits);
+    let mut firsts: std::collections::HashMap<[u64; 3], Vec<u32>> = std::collections::HashMap::new();
     let mut pairs = Vec::new();
-    for same in order.chunk_by(|&a, &b| rounded(a) == rounded(b)) {
-        let first = same[0];
-        pairs.extend(same[1..].iter().map(|&other| (first, other)));
+    let nodes =
+        (0..mesh.nodes.len() as u32).filter(|&n| used[n as usize] && mesh.nodes[n as usize].is_finite());
+    for node in nodes {
+        let position = mesh.nodes[node as usize];
+        let home = cell(position);
+        let around =
+            (0..27).map(|at: i32| DVec3::new(f64::from(at % 3), f64::from(at / 3 % 3), f64::from(at / 9)));
+        let near = around
+            // Adding 0 turns −0 into 0, which has other bits.
+            .filter_map(|shift| firsts.get(&key(home + shift - DVec3::ONE + DVec3::ZERO)))
+            .flatten()
+            .find(|&&first| (mesh.nodes[first as usize] - position).length() <= tolerance);
+        match near {
+            Some(&first) => pairs.push((first, node)),
+            None => firsts.entry(key(home + DVec3::ZERO)).or_default().push(node),
+        }
     }
-    pairs.sort_unstable();
     pairs
 }
 

@@ -14,6 +14,7 @@ use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
+use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors, View};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
@@ -166,6 +167,7 @@ impl Recording {
         }
         let file = SafeTensors::deserialize(bytes).map_err(container)?;
         let views: Vec<_> = file.iter().collect();
+        check_shapes(&views)?;
         let hash =
             content_hash(header.metadata.get(), views.iter().map(|(name, v)| (*name, v.shape(), v.data())));
         if hash != header.content_hash {
@@ -216,6 +218,37 @@ impl Recording {
         };
         Ok(Self { metadata, surface, modes, residual, gravity })
     }
+}
+
+/// Tensors must have the extents that go together; their numbers are checked afterwards.
+fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), Error> {
+    let extents = |name: &str| views.iter().find(|(other, _)| *other == name).map(|(_, view)| view.shape());
+    let count = |name: &str| extents(name).and_then(|shape| shape.first()).copied().unwrap_or(0);
+    let (nodes, modes) = (count("surface.positions"), count("modes.angular_frequencies"));
+    for (name, view) in views {
+        let blocks = count("residual.nodes");
+        let expected: &[usize] = match *name {
+            "surface.positions" => &[nodes, 3],
+            "surface.triangles" => &[count("surface.triangles"), 3],
+            "surface.source_nodes" => &[nodes],
+            "modes.angular_frequencies" | "modes.damping_ratios" => &[modes],
+            "modes.mode_shapes" => &[nodes.saturating_mul(3), modes],
+            "residual.radius" => &[1],
+            "residual.offsets" => &[nodes.saturating_add(1)],
+            "residual.nodes" => &[blocks],
+            "residual.blocks" => &[blocks, 3, 3],
+            "gravity.modal_forces" => &[3, modes],
+            "gravity.residual_displacements" => &[nodes.saturating_mul(3), 3],
+            _ => continue,
+        };
+        if view.shape() != expected {
+            return Err(Error::Recording(format!(
+                "{name} has the shape {:?}, expected {expected:?}",
+                view.shape()
+            )));
+        }
+    }
+    Ok(())
 }
 
 #[derive(Deserialize)]

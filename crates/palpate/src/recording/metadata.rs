@@ -1,5 +1,7 @@
 //! What a recording says about itself; stored as JSON in the file.
 
+use crate::error::Error;
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
@@ -27,6 +29,56 @@ pub struct Metadata {
     pub certificate: Option<Certificate>,
     /// Where it came from.
     pub provenance: Provenance,
+}
+
+/// The only sampling that this version knows.
+const HOLD: &str = "held force, displacement at end of step";
+
+/// The only units that this version knows.
+const UNITS: &str = "SI";
+
+impl Metadata {
+    /// The value of [`Self::hold`].
+    pub fn hold() -> String {
+        HOLD.into()
+    }
+
+    /// The value of [`Self::units`].
+    pub fn units() -> String {
+        UNITS.into()
+    }
+
+    pub(super) fn validate(&self) -> Result<(), Error> {
+        if self.hold != HOLD || self.units != UNITS {
+            return Err(Error::Recording(format!(
+                "it is sampled as {:?} in units {:?}, expected {HOLD:?} in {UNITS:?}",
+                self.hold, self.units
+            )));
+        }
+        let certificate = self.certificate.as_ref();
+        if let Some(certificate) = certificate.filter(|certificate| !certificate.is_finite()) {
+            return Err(Error::Recording(format!(
+                "its certificate holds numbers that are not finite: {certificate:?}"
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl Certificate {
+    /// Whether every number is one.
+    fn is_finite(&self) -> bool {
+        [
+            self.force_error_max,
+            self.force_error_median,
+            self.static_compliance_error_max,
+            self.instantaneous_compliance_error_max,
+            self.bandwidth_hz,
+            self.reference_error,
+        ]
+        .iter()
+        .all(|number| number.is_finite())
+    }
 }
 
 /// Whether a body may move as a whole.

@@ -80,6 +80,23 @@ impl GravityResponse {
     }
 }
 
+/// Sizes [SI] beyond this, or below its inverse, are no body's: a step could overflow.
+const LARGEST: f64 = 1e18;
+
+/// Whether a tensor is the inertia of a body: ½·tr(I)·1 − I, its second moment of mass, must be positive definite.
+fn is_inertia(tensor: &DMat3) -> bool {
+    let trace = tensor.x_axis.x + tensor.y_axis.y + tensor.z_axis.z;
+    let asymmetry =
+        (*tensor - tensor.transpose()).to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let moment = DMat3::from_diagonal(DVec3::splat(0.5 * trace)) - *tensor;
+    let minor = moment.x_axis.x * moment.y_axis.y - moment.x_axis.y * moment.x_axis.y;
+    trace.is_finite()
+        && asymmetry <= 1e-12 * trace
+        && moment.x_axis.x > 0.0
+        && minor > 0.0
+        && moment.determinant() > 0.0
+}
+
 impl Recording {
     /// Mass [kg] of the body.
     pub fn mass(&self) -> f64 {
@@ -105,40 +122,39 @@ impl Recording {
         if let Some(t) = self.surface.triangles.iter().position(|t| t.iter().any(|&n| n as usize >= nodes)) {
             return fail(format!("triangle {t} names a node beyond the surface's {nodes} nodes"));
         }
-        if self.modes.damping_ratios.len() != modes || self.modes.mode_shapes.len() != 3 * nodes * modes {
+        if self.modes.damping_ratios.len() != modes {
+            return fail(format!("{} damping ratios for {modes} modes", self.modes.damping_ratios.len()));
+        }
+        if self.modes.mode_shapes.len() != 3 * nodes * modes {
             return fail(format!(
                 "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
                 self.modes.mode_shapes.len(),
                 3 * nodes * modes
             ));
         }
-        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-        if !self.surface.positions.iter().all(|p| p.is_finite()) {
+        let finite = |values: &[f64]| values.iter().all(|v| v.abs() < LARGEST);
+        if !self.surface.positions.iter().all(|p| p.abs().max_element() < LARGEST) {
             return fail("a surface position is not finite".into());
         }
         if !finite(&self.modes.mode_shapes) {
             return fail("a mode shape is not finite".into());
         }
         let frequencies = &self.modes.angular_frequencies;
-        if !frequencies.iter().all(|w| w.is_finite() && *w > 0.0) || !frequencies.is_sorted() {
+        if !frequencies.iter().all(|w| (1.0 / LARGEST..LARGEST).contains(w)) || !frequencies.is_sorted() {
             return fail("angular frequencies must be positive, finite and ascending".into());
         }
-        if !self.modes.damping_ratios.iter().all(|z| z.is_finite() && *z >= 0.0) {
+        if !self.modes.damping_ratios.iter().all(|z| (0.0..LARGEST).contains(z)) {
             return fail("damping ratios must be finite and not negative".into());
         }
         self.residual.validate(nodes)?;
         let mass = self.mass();
-        if !(mass.is_finite() && mass > 0.0) {
-            return fail(format!("mass is {mass} kg, expected a positive number"));
+        if !(1.0 / LARGEST..LARGEST).contains(&mass) {
+            return fail(format!("mass is {mass:e} kg, expected a positive number"));
         }
-        let inertia = self.inertia();
-        let symmetric = (inertia - inertia.transpose())
-            .to_cols_array()
-            .iter()
-            .all(|v| v.abs() <= 1e-12 * inertia.x_axis.x);
-        if !(inertia.is_finite() && symmetric && inertia.determinant() > 0.0 && inertia.x_axis.x > 0.0) {
-            return fail("the inertia tensor is not symmetric and positive definite".into());
+        if !is_inertia(&self.inertia()) {
+            return fail("the inertia tensor is not one of a body: symmetric, positive definite, and no principal value above the sum of the others".into());
         }
+        self.metadata.validate()?;
         match (&self.gravity, self.metadata.support) {
             (None, Support::Free) => Ok(()),
             (Some(gravity), Support::Fixed)

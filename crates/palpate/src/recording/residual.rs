@@ -88,6 +88,7 @@ impl ResidualCompliance {
                     || !near.offsets.is_sorted()
                     || near.blocks.len() != 9 * blocks
                     || near.nodes.iter().any(|&n| n as usize >= nodes)
+                    || !near.rows().all(|row| row.is_sorted_by(|a, b| a < b))
                     || !(near.radius.is_finite() && near.radius > 0.0)
                 {
                     return fail("the residual near field does not fit together".into());
@@ -95,14 +96,24 @@ impl ResidualCompliance {
                 &near.blocks
             }
         };
-        match values.iter().position(|v| !v.is_finite()) {
-            Some(at) => fail(format!("residual compliance number {at} is not finite")),
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return fail(format!("residual compliance number {at} is not finite"));
+        }
+        let diagonal = (0..nodes).map(|node| self.block(node, node));
+        let negative = |block: &DMat3| (0..3).any(|axis| block.col(axis)[axis] < 0.0);
+        match diagonal.into_iter().position(|block| negative(&block)) {
+            Some(node) => fail(format!("residual compliance of surface node {node} is negative")),
             None => Ok(()),
         }
     }
 }
 
 impl NearField {
+    /// The nodes of each row; only once the offsets are known to ascend within bounds.
+    fn rows(&self) -> impl Iterator<Item = &[u32]> {
+        self.offsets.windows(2).map(|pair| &self.nodes[pair[0] as usize..pair[1] as usize])
+    }
+
     fn block(&self, at: usize) -> DMat3 {
         let b = &self.blocks[9 * at..9 * at + 9];
         let row =

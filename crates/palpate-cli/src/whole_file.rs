@@ -1,0 +1,76 @@
+//! Output files that are either whole or not there.
+
+use crate::Failure;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file that takes its name when it is finished. Until then it stands beside it under another, and goes if it is not
+/// finished.
+pub struct WholeFile {
+    writer: Option<BufWriter<File>>,
+    temporary: PathBuf,
+    path: PathBuf,
+}
+
+impl WholeFile {
+    /// Begin a file. A link is followed; what stands there must be a file, or nothing, and none of `inputs`.
+    pub fn create(path: &Path, inputs: &[&Path]) -> Result<Self, Failure> {
+        let path = target(path, inputs)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+        let file = File::create(&temporary).map_err(|e| Failure::file("write", &path, &e))?;
+        Ok(Self { writer: Some(BufWriter::new(file)), temporary, path })
+    }
+
+    /// Write some bytes.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        writer.write_all(bytes).map_err(|e| Failure::file("write", &self.path, &e))
+    }
+
+    /// Let the file take its name.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        let failed = |e: std::io::Error| Failure::file("write", &self.path, &e);
+        if let Some(writer) = self.writer.take() {
+            writer.into_inner().map_err(|e| failed(e.into_error()))?.sync_all().map_err(failed)?;
+        }
+        std::fs::rename(&self.temporary, &self.path).map_err(failed)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        // After `finish` there is nothing left to remove.
+        let _ = std::fs::remove_file(&self.temporary);
+    }
+}
+
+/// Where an output really goes.
+fn target(path: &Path, inputs: &[&Path]) -> Result<PathBuf, Failure> {
+    let refuse = |why: String| Err(Failure(format!("cannot write {}: {why}", path.display())));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return refuse(format!("there is no folder {}", folder.display()));
+    }
+    let Ok(real) = path.canonicalize() else { return Ok(path.to_path_buf()) };
+    if !real.is_file() {
+        return refuse("it is not a file".into());
+    }
+    if inputs.iter().filter_map(|input| input.canonicalize().ok()).any(|input| input == real) {
+        return refuse("it is one of the inputs".into());
+    }
+    Ok(real)
+}
+
+/// Check before long work that an output can be written.
+pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    WholeFile::create(path, inputs).map(drop)
+}
+
+/// Write a whole file at once.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut file = WholeFile::create(path, &[])?;
+    file.write(bytes)?;
+    file.finish()
+}
