@@ -1,1 +1,82 @@
-fn main() {}
+//! The project's chores: `cargo xtask demo | test | verify | licences`.
+//!
+//! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
+
+mod licences;
+mod machine;
+
+use std::process::{Command, ExitCode};
+
+const USAGE: &str = "cargo xtask CHORE
+
+  demo       build palpate and run its demo: an elastic cube, held by two hands and shaken
+  test       install what the tests need, and run all of them
+  verify     the slow proofs: computed numbers against analytic ones, in release mode
+  licences   check that every dependency's licence fits MIT OR Apache-2.0";
+
+fn main() -> ExitCode {
+    let chore = std::env::args().nth(1);
+    let done = match chore.as_deref() {
+        Some("demo") => demo(),
+        Some("test") => test(),
+        Some("verify") => verify(),
+        Some("licences") => licences::check(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(what) => {
+            eprintln!("xtask: {what}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn demo() -> Result<(), String> {
+    machine::need_c_compiler()?;
+    eprintln!("building palpate (some minutes the first time)");
+    cargo(&["build", "--release", "--locked", "--package", "palpate-cli"])?;
+    cargo(&[
+        "run",
+        "--release",
+        "--locked",
+        "--quiet",
+        "--package",
+        "palpate-cli",
+        "--",
+        "demo",
+        "--output",
+        "target/demo",
+    ])
+}
+
+fn test() -> Result<(), String> {
+    machine::need_c_compiler()?;
+    if machine::runs("cargo", &["nextest", "--version"]) {
+        cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"])?;
+    } else {
+        eprintln!("cargo-nextest is not installed: using cargo test, which is slower to the same end");
+        cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests"])?;
+    }
+    cargo(&["test", "--workspace", "--locked", "--doc"])
+}
+
+fn verify() -> Result<(), String> {
+    machine::need_c_compiler()?;
+    cargo(&["run", "--release", "--locked", "--quiet", "--package", "palpate-cli", "--", "verify"])
+}
+
+/// Run cargo in the workspace's root; its output goes to ours.
+fn cargo(arguments: &[&str]) -> Result<(), String> {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo).args(arguments).current_dir(root).status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err(format!("cargo {} failed", arguments.join(" "))),
+        Err(error) => Err(format!("cargo can't be started: {error}")),
+    }
+}

@@ -1,0 +1,254 @@
+//! Held points: what a step must do, on the released sample recordings.
+
+use glam::DVec3;
+use palpate::{
+    DeviceInput, Grasp, Input, Model, ModelParameters, MotionRule, ObjectStart, Output, Pose, Recording,
+    RigidCompliance, State, SurfacePoint, Twist, step,
+};
+use std::sync::Arc;
+
+const H: f64 = 1e-3;
+
+fn free() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+fn fixed() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../data/recordings/v1/fixed.palp");
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+fn grasp(object: usize, triangle: u32) -> Grasp {
+    Grasp { object, point: SurfacePoint { triangle, weights: [0.25, 0.35, 0.4] } }
+}
+
+fn one(recording: Arc<Recording>, parameters: ModelParameters) -> (Model, State) {
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let model = Model::new(parameters, vec![(recording, start)]).expect("a good model");
+    let state = State::new(&model);
+    (model, state)
+}
+
+fn parameters(devices: usize) -> ModelParameters {
+    ModelParameters { devices, ..ModelParameters::default() }
+}
+
+/// Run with one hand on a path; `see` looks at every output.
+fn follow(
+    model: &Model,
+    state: &mut State,
+    grasp: Grasp,
+    steps: usize,
+    path: impl Fn(f64) -> DVec3,
+    mut see: impl FnMut(&Output),
+) {
+    for number in 1..=steps {
+        let position = path(number as f64 * H);
+        see(step(model, state, &Input { devices: vec![DeviceInput { position, grasp: Some(grasp) }] }));
+    }
+}
+
+#[test]
+fn a_held_point_is_at_the_hand_at_the_end_of_every_step() {
+    let (model, mut state) = one(free(), parameters(1));
+    let rest = free().surface.rest_position(&grasp(0, 3).point);
+    let path = |t: f64| rest + DVec3::new(0.02 * (9.0 * t).sin(), 0.01 * (25.0 * t).sin(), -0.1 * t * t);
+    let mut number = 0;
+    follow(&model, &mut state, grasp(0, 3), 1500, path, |output| {
+        number += 1;
+        let miss = (output.devices[0].point - path(f64::from(number) * H)).length();
+        // Eight roundings of coordinates below one metre.
+        assert!(miss < 2e-15, "step {number}: {miss}");
+        assert_eq!(output.status.unsolved_objects, 0);
+    });
+}
+
+#[test]
+fn what_the_hands_give_is_the_momentum_that_the_object_has() {
+    let recording = free();
+    let (model, mut state) = one(recording.clone(), parameters(1));
+    let rest = recording.surface.rest_position(&grasp(0, 7).point);
+    let path = |t: f64| rest + DVec3::new(0.03 * (8.0 * t).sin(), 0.2 * t * t, 0.01 * (30.0 * t).sin());
+    let (mut given, mut turning, mut before) = (DVec3::ZERO, DVec3::ZERO, rest);
+    let mut number = 0;
+    follow(&model, &mut state, grasp(0, 7), 400, path, |output| {
+        number += 1;
+        let force = -output.devices[0].force_on_hand;
+        let hand = path(f64::from(number) * H);
+        given += force * H;
+        // About the world's origin the force acts where the hand is in the middle of the step.
+        turning += (0.5 * (before + hand)).cross(force) * H;
+        before = hand;
+    });
+    let object = state.output().objects[0];
+    let momentum = object.twist.linear * recording.mass();
+    // Four hundred sums of terms below 0.1 N·s.
+    assert!((momentum - given).length() < 1e-13 * given.length().max(1.0), "{momentum} {given}");
+    let spin =
+        palpate::inertia_in_world(recording.inertia(), glam::DMat3::from_quat(object.pose.orientation));
+    let angular = spin * object.twist.angular + object.pose.position.cross(momentum);
+    assert!((angular - turning).length() < 1e-13 * turning.length().max(1.0), "{angular} {turning}");
+}
+
+#[test]
+fn the_energy_balance_closes_in_every_step_while_the_body_turns() {
+    let (model, mut state) = one(free(), ModelParameters { gravity: DVec3::Y * -9.81, ..parameters(1) });
+    let rest = free().surface.rest_position(&grasp(0, 2).point);
+    let path = |t: f64| rest + DVec3::new(0.05 * (11.0 * t).sin(), 0.04 * (17.0 * t).sin(), 0.0);
+    let mut lost = 0.0;
+    follow(&model, &mut state, grasp(0, 2), 2000, path, |output| {
+        let energy = output.energy;
+        let moved = energy.input.abs() + energy.dissipated + energy.stored().abs() + 1e-6;
+        // Two thousand sums with terms of the size of what moved.
+        assert!(energy.defect.abs() < 1e-12 * moved, "{energy:?}");
+        assert!(energy.dissipated >= lost - 1e-15, "dissipation gave back {}", lost - energy.dissipated);
+        lost = energy.dissipated;
+    });
+    assert!(lost > 0.0 && state.output().objects[0].pose.orientation.w.abs() < 0.99, "it did not turn");
+}
+
+#[test]
+fn a_fixed_body_sags_to_its_static_shape_and_its_point_then_needs_no_force() {
+    let recording = fixed();
+    let gravity = DVec3::new(0.0, -9.81, 2.0);
+    let (model, mut state) = one(recording.clone(), ModelParameters { gravity, ..parameters(1) });
+    let none = Input { devices: Vec::new() };
+    (0..60_000).for_each(|_| {
+        step(&model, &mut state, &none);
+    });
+    let mut sag = vec![DVec3::ZERO; recording.surface.positions.len()];
+    state.surface_displacement(&model, 0, &mut sag);
+    // The second route: Φ·Λ⁻¹·p + residual, without time.
+    let response = recording.gravity.as_ref().expect("a fixed body");
+    let m = recording.modes.len();
+    for (node, moved) in sag.iter().enumerate() {
+        let mut expected = response.residual_displacement(node, gravity);
+        for mode in 0..m {
+            let load: f64 = (0..3).map(|axis| gravity[axis] * response.modal_forces[axis * m + mode]).sum();
+            let q = load / recording.modes.angular_frequencies[mode].powi(2);
+            expected +=
+                DVec3::new(0.0, 1.0, 2.0).map(|axis| recording.modes.row(node, axis as usize)[mode]) * q;
+        }
+        // What is left of the swing after 60 s, and round-off.
+        assert!(
+            (*moved - expected).length() < 1e-9 * sag[0].length().max(1e-3),
+            "{node}: {moved} {expected}"
+        );
+    }
+    let output = state.output().clone();
+    assert!(output.energy.defect.abs() < 1e-12 * output.energy.dissipated, "{:?}", output.energy);
+    let held = grasp(0, 11);
+    let corners = recording.surface.corners(&held.point);
+    let at: DVec3 =
+        corners.iter().map(|&(node, w)| (recording.surface.positions[node] + sag[node]) * w).sum();
+    let input = Input { devices: vec![DeviceInput { position: at, grasp: Some(held) }] };
+    let force = step(&model, &mut state, &input).devices[0].force_on_hand.length();
+    assert!(force < 1e-9 * recording.mass() * 9.81, "{force}");
+}
+
+#[test]
+fn a_hand_that_is_no_number_lets_go_and_the_rest_goes_on() {
+    let (model, mut state) = one(free(), parameters(2));
+    let rest = |triangle| free().surface.rest_position(&grasp(0, triangle).point);
+    let hold = |triangle, position| DeviceInput { position, grasp: Some(grasp(0, triangle)) };
+    let bad = DVec3::new(f64::NAN, 0.0, 0.0);
+    let input = Input { devices: vec![hold(1, bad), hold(5, rest(5) + DVec3::X * 1e-3)] };
+    let output = step(&model, &mut state, &input);
+    assert_eq!(output.status.rejected_devices, 1);
+    assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO);
+    assert!(output.devices[1].force_on_hand.x < 0.0 && output.devices[1].force_on_hand.is_finite());
+}
+
+#[test]
+fn a_hand_that_jumps_too_far_gets_no_force_and_the_state_stays_sound() {
+    let (model, mut state) = one(free(), parameters(1));
+    let rest = free().surface.rest_position(&grasp(0, 3).point);
+    let hold = |position| Input { devices: vec![DeviceInput { position, grasp: Some(grasp(0, 3)) }] };
+    step(&model, &mut state, &hold(rest));
+    let output = step(&model, &mut state, &hold(rest + DVec3::new(300.0, 400.0, 50.0)));
+    assert_eq!(output.status.unsolved_objects, 1);
+    assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO);
+    let output = step(&model, &mut state, &hold(rest + DVec3::X * 1e-4));
+    assert_eq!(output.status.unsolved_objects, 0);
+    assert!(output.devices[0].force_on_hand.is_finite() && output.energy.defect.abs() < 1e-12);
+}
+
+#[test]
+fn two_hands_on_one_point_share_it_without_a_singular_force() {
+    let (model, mut state) = one(free(), parameters(2));
+    let hand = DeviceInput {
+        position: free().surface.rest_position(&grasp(0, 3).point) + DVec3::X * 1e-3,
+        grasp: Some(grasp(0, 3)),
+    };
+    let output = step(&model, &mut state, &Input { devices: vec![hand; 2] });
+    assert_eq!(output.status.dependent_rows, 3);
+    assert_eq!(output.devices[1].force_on_hand, DVec3::ZERO);
+    assert!((output.devices[0].point - hand.position).length() < 1e-12);
+}
+
+#[test]
+fn the_same_inputs_give_the_same_bits() {
+    let run = || {
+        let (model, mut state) = one(free(), parameters(1));
+        let rest = free().surface.rest_position(&grasp(0, 3).point);
+        let mut forces = Vec::new();
+        let path = |t: f64| rest + DVec3::Y * (0.01 * (40.0 * t).sin());
+        follow(&model, &mut state, grasp(0, 3), 300, path, |output| {
+            forces.push(output.devices[0].force_on_hand)
+        });
+        forces
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn without_rigid_compliance_the_point_is_missed_by_half_h_squared_times_the_mobility() {
+    let recording = free();
+    let dropped = ModelParameters { rigid_compliance: RigidCompliance::Dropped, ..parameters(1) };
+    let (model, mut state) = one(recording.clone(), dropped);
+    let rest = recording.surface.rest_position(&grasp(0, 3).point);
+    let hand = rest + DVec3::X * 1e-4;
+    let input = Input { devices: vec![DeviceInput { position: hand, grasp: Some(grasp(0, 3)) }] };
+    let output = step(&model, &mut state, &input);
+    let force = -output.devices[0].force_on_hand;
+    let miss = output.devices[0].point - hand;
+    let linear = force * (0.5 * H * H / recording.mass());
+    let spin = recording.inertia().inverse() * rest.cross(force) * (0.5 * H * H);
+    // First order in the small displacement.
+    assert!((miss - linear - spin.cross(rest)).length() < 1e-2 * miss.length(), "{miss} {linear}");
+    assert!(miss.length() > 1e-9, "{miss}");
+}
+
+#[test]
+fn the_papers_update_gives_momentum_but_not_the_exact_energy() {
+    let recording = free();
+    let paper = ModelParameters { motion: MotionRule::Paper, ..parameters(1) };
+    let (model, mut state) = one(recording.clone(), paper);
+    let rest = recording.surface.rest_position(&grasp(0, 3).point);
+    let mut given = DVec3::ZERO;
+    let path = |t: f64| rest + DVec3::Y * (0.02 * (20.0 * t).sin());
+    follow(&model, &mut state, grasp(0, 3), 300, path, |output| given -= output.devices[0].force_on_hand * H);
+    let output = state.output();
+    let momentum = output.objects[0].twist.linear * recording.mass();
+    assert!((momentum - given).length() < 1e-13, "{momentum} {given}");
+    // Semi-implicit Euler: the defect is there, first order in the step, and is shown.
+    let share = output.energy.defect.abs() / output.energy.input.abs();
+    assert!((1e-6..0.1).contains(&share), "{share}");
+}
+
+#[test]
+fn models_with_impossible_numbers_are_refused() {
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let refused = |parameters: ModelParameters, recording, start| {
+        Model::new(parameters, vec![(recording, start)]).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let step_s = |step_s| ModelParameters { step_s, ..ModelParameters::default() };
+    assert_eq!(refused(step_s(0.0), free(), start), "step is 0 s, expected above 0 and at most 1");
+    assert_eq!(refused(step_s(f64::NAN), free(), start), "step is NaN s, expected above 0 and at most 1");
+    let moving = ObjectStart { twist: Twist { linear: DVec3::X, angular: DVec3::ZERO }, ..start };
+    assert_eq!(
+        refused(step_s(H), fixed(), moving),
+        "object 0: has fixed nodes, so its velocities must be zero"
+    );
+}

@@ -1,0 +1,85 @@
+//! Recording files: every released one stays readable, every damaged one is refused.
+
+use palpate::Recording;
+
+const FREE: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
+const FIXED: &[u8] = include_bytes!("../../../data/recordings/v1/fixed.palp");
+
+#[test]
+fn files_of_version_1_are_read_and_written_back_to_the_same_bytes() {
+    for bytes in [FREE, FIXED] {
+        let recording = Recording::from_bytes(bytes).expect("a released recording");
+        assert_eq!(recording.to_bytes().expect("it can be written"), bytes);
+        let again = Recording::from_bytes(&recording.to_bytes().expect("it can be written"));
+        assert_eq!(again.as_ref(), Ok(&recording));
+    }
+}
+
+#[test]
+fn files_of_version_1_mean_what_they_meant() {
+    let free = Recording::from_bytes(FREE).expect("a released recording");
+    assert_eq!((free.surface.positions.len(), free.surface.triangles.len(), free.modes.len()), (12, 20, 12));
+    // 0.2 × 0.1 × 0.1 m at 110 kg/m³.
+    assert!((free.mass() - 0.22).abs() < 1e-15);
+    let fixed = Recording::from_bytes(FIXED).expect("a released recording");
+    assert!(fixed.gravity.is_some() && free.gravity.is_none());
+}
+
+#[test]
+fn a_file_cut_anywhere_is_refused() {
+    for length in 0..FREE.len() {
+        assert!(Recording::from_bytes(&FREE[..length]).is_err(), "cut to {length} bytes");
+    }
+}
+
+#[test]
+fn a_changed_byte_anywhere_is_refused() {
+    let mut bytes = FREE.to_vec();
+    for at in 0..bytes.len() {
+        bytes[at] ^= 0x11;
+        assert!(Recording::from_bytes(&bytes).is_err(), "byte {at}");
+        bytes[at] ^= 0x11;
+    }
+    assert!(Recording::from_bytes(&bytes).is_ok());
+}
+
+#[test]
+fn errors_say_what_is_wrong() {
+    let text = |bytes: &[u8]| Recording::from_bytes(bytes).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(
+        text(b"").starts_with("not a usable recording: the file is damaged, truncated or of another kind")
+    );
+    assert!(text(b"step = 0.001\n[[object]]\n").contains("damaged, truncated or of another kind"));
+    // A header length far beyond the file must not be believed.
+    let mut hostile = u64::MAX.to_le_bytes().to_vec();
+    hostile.extend_from_slice(&FREE[8..]);
+    assert!(text(&hostile).contains("damaged, truncated or of another kind"));
+    let other = b"\x02\0\0\0\0\0\0\0{}";
+    assert_eq!(
+        text(other),
+        "not a usable recording: a safetensors file, but without the metadata of palpate"
+    );
+    let pattern = b"\\\"format_version\\\":1,";
+    let at =
+        FREE.windows(pattern.len()).position(|w| w == pattern).expect("the version stands in the header");
+    let mut newer = FREE.to_vec();
+    newer[at + pattern.len() - 2] = b'9';
+    assert!(text(&newer).contains("format version 9, this palpate reads version 1"), "{}", text(&newer));
+}
+
+#[test]
+fn inconsistent_recordings_are_refused_when_written() {
+    let good = Recording::from_bytes(FREE).expect("a released recording");
+    let refused = |change: fn(&mut Recording)| {
+        let mut recording = good.clone();
+        change(&mut recording);
+        recording.to_bytes().err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    assert!(refused(|r| r.modes.mode_shapes[3] = f64::NAN).ends_with("a mode shape is not finite"));
+    assert!(refused(|r| r.modes.angular_frequencies.reverse()).contains("ascending"));
+    assert!(refused(|r| r.modes.damping_ratios[0] = -0.1).contains("damping ratios"));
+    assert!(refused(|r| r.surface.triangles[4][1] = 12).contains("triangle 4 names a node beyond"));
+    assert!(refused(|r| r.metadata.mass.mass_kg = 0.0).contains("mass is 0e0 kg"));
+    assert!(refused(|r| r.metadata.mass.inertia_kg_m2[1][1] *= -1.0).contains("inertia tensor"));
+    assert!(refused(|r| r.metadata.units = "mm".into()).contains("in units \"mm\""));
+}
