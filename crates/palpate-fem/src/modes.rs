@@ -3,7 +3,7 @@
 //! Block Krylov on the operator G·M (see `system`), whose eigenvalues on the elastic motions are 1/ω²:
 //! a random block, M-orthonormal, is multiplied again and again, every new block is made orthogonal to all
 //! before (twice), and the operator is projected on the basis (Rayleigh-Ritz). A mode counts as found when
-//! |G·M·φ − φ/ω²| in the norm of M is below [`TOLERANCE`]/ω². A block finds as many copies of
+//! |G·M·φ − φ/ω²| in the norm of M is below `TOLERANCE`/ω². A block finds as many copies of
 //! a repeated eigenvalue as it has columns; that none is missed is checked with the inertia of K − s·M for
 //! an s in a gap just above the last mode, and the basis is extended by a fresh random block if one is.
 //! References: Golub & Underwood 1977 (block Lanczos); Grimes, Lewis & Simon 1994, SIAM J. Matrix Anal. 15, 228.

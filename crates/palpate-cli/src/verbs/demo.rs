@@ -30,7 +30,7 @@ pub struct Arguments {
 }
 
 /// Half the way of the hands [m], how often [Hz], how long [s], and how much they squeeze [m].
-const AMPLITUDE_M: f64 = 0.03;
+const AMPLITUDE_M: f64 = 0.01;
 const FREQUENCY_HZ: f64 = 2.0;
 const DURATION_S: f64 = 2.0;
 const SQUEEZE_M: f64 = 0.003;
