@@ -51,6 +51,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
+    whole_file::remove_unfinished_on_interrupt();
     let done = match arguments.verb {
         Verb::Demo(arguments) => verbs::demo::demo(&arguments),
         Verb::Record(arguments) => verbs::record::record(&arguments),

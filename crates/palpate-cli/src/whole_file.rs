@@ -4,6 +4,27 @@ use crate::Failure;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Files that have not taken their names yet.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn note(temporary: &Path) {
+    if let Ok(mut unfinished) = UNFINISHED.lock() {
+        unfinished.push(temporary.to_path_buf());
+    }
+}
+
+/// Let an interrupt (Ctrl-C) remove the files that are not finished, and end the process with status 130.
+pub fn remove_unfinished_on_interrupt() {
+    // Without a handler an interrupt leaves a hidden file behind, nothing worse.
+    let _ = ctrlc::set_handler(|| {
+        if let Ok(unfinished) = UNFINISHED.lock() {
+            unfinished.iter().for_each(|path| drop(std::fs::remove_file(path)));
+        }
+        std::process::exit(130);
+    });
+}
 
 /// A file that takes its name when it is finished. Until then it stands beside it under another, and goes if it is not
 /// finished.
@@ -19,6 +40,7 @@ impl WholeFile {
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+        note(&temporary);
         let file = File::create(&temporary).map_err(|e| Failure::file("write", &path, &e))?;
         Ok(Self { writer: Some(BufWriter::new(file)), temporary, path })
     }
@@ -43,6 +65,9 @@ impl Drop for WholeFile {
     fn drop(&mut self) {
         // After `finish` there is nothing left to remove.
         let _ = std::fs::remove_file(&self.temporary);
+        if let Ok(mut unfinished) = UNFINISHED.lock() {
+            unfinished.retain(|path| *path != self.temporary);
+        }
     }
 }
 
