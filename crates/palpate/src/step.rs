@@ -205,7 +205,7 @@ fn solve(
     status.dependent_rows += dependent as u32;
 
     let reach = own.rigid.pose.position.length() + object.radius;
-    let (mut end, mut least_miss, mut iterations) = (free, f64::INFINITY, 0);
+    let (mut end, mut least_miss, mut first_miss, mut iterations) = (free, f64::INFINITY, f64::INFINITY, 0);
     loop {
         let miss = evaluate(model, object, own, held, active, &mut end);
         iterations += 1;
@@ -213,15 +213,16 @@ fn solve(
         let stalled = miss > 0.5 * least_miss && miss < 1e3 * ROUND_OFF * reach;
         if miss <= ROUND_OFF * reach || stalled || iterations == MAX_ITERATIONS {
             status.iterations = status.iterations.max(iterations);
-            // Points that repeat others can't be met exactly, and need not be.
-            let solved = miss <= UNSOLVED * reach || dependent > 0 || !rigid_counts;
-            if !(solved && miss.is_finite()) {
+            // Points that repeat others can't be met where their hands differ, and need not be.
+            let solved = miss <= UNSOLVED * reach || dependent > 0 && miss <= first_miss;
+            if !solved {
                 status.unsolved_objects += 1;
                 return let_go(held, active, free);
             }
             status.solver_residual_m = status.solver_residual_m.max(miss);
             break;
         }
+        first_miss = if iterations == 1 { miss } else { first_miss };
         least_miss = least_miss.min(miss);
         // f += W⁻¹·(hand − point).
         system.solve(|point| active[point].miss);
