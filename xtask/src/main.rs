@@ -55,13 +55,12 @@ fn demo() -> Result<(), String> {
 
 fn test() -> Result<(), String> {
     machine::need_c_compiler()?;
+    cargo(&["test", "--workspace", "--locked", "--doc"])?;
     if machine::runs("cargo", &["nextest", "--version"]) {
-        cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"])?;
-    } else {
-        eprintln!("cargo-nextest is not installed: using cargo test, which is slower to the same end");
-        cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests"])?;
+        return cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"]);
     }
-    cargo(&["test", "--workspace", "--locked", "--doc"])
+    eprintln!("cargo-nextest is not installed: using cargo test, which comes to the same end more slowly");
+    cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests"])
 }
 
 fn verify() -> Result<(), String> {

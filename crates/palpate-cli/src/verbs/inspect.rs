@@ -132,7 +132,7 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     let ms = |s: f64| 1000.0 * s;
     writeln!(
         out,
-        "    force error          {} at most, {} in the median: one place pressed smoothly in {} ms, held to {} ms",
+        "    force error          {} at most, {} in the median (one place pressed in {} ms, over {} ms)",
         percent(certificate.force_error_max),
         percent(certificate.force_error_median),
         ms(event.rise_s),

@@ -25,6 +25,16 @@ pub struct Oscillation {
 }
 
 /// Exact one-step map of one mode under a held force.
+///
+/// ```
+/// use palpate::{HeldOscillator, Oscillation};
+///
+/// // A mode of 10 Hz without damping, pushed from rest by 1 N/√kg for 1 ms.
+/// let omega = 10.0 * std::f64::consts::TAU;
+/// let mode = HeldOscillator::new(omega, 0.0, 1e-3);
+/// let pushed = mode.advance(Oscillation::default(), 1.0);
+/// assert!((pushed.q - (1.0 - (omega * 1e-3_f64).cos()) / omega.powi(2)).abs() < 1e-18);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOscillator {
     a11: f64,
@@ -91,8 +101,8 @@ impl HeldOscillator {
         Self { a11, a12, a21, a22, b: gain / stiffness, d11, d12, d22, stiffness }
     }
 
-    /// Displacement at the end of a step in which a unit force is held [m²·kg/(N·…)]: the mode's
-    /// part of R[0].
+    /// Displacement at the end of a step in which a unit force is held [s²]: its square-root-of-mass
+    /// gains at two points times this are the mode's part of R[0] [m/N].
     pub fn instantaneous_compliance(&self) -> f64 {
         self.b
     }
