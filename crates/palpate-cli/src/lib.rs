@@ -3,6 +3,7 @@
 //! Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
 //! input is bad or a check failed; 2: the command line is wrong.
 
+mod csv;
 mod failure;
 mod path;
 mod plot;

@@ -153,10 +153,19 @@ impl Source<'_> {
 
 /// Read a scene file, its recordings and its paths.
 pub fn read(path: &Path) -> Result<Scene, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    let bytes = std::fs::read(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        return Err(Failure(format!(
+            "{}: it is not a text file; a scene is TOML (docs/scene.md)",
+            path.display()
+        )));
+    };
     let source = Source { path, text: &text };
-    let file: SceneFile = toml::from_str(&text)
-        .map_err(|e| Failure(format!("{}: {}", path.display(), e.to_string().trim_end())))?;
+    let file: SceneFile = toml::from_str(&text).map_err(|e| {
+        // Types in the user's words.
+        let what = e.to_string().replace("expected f64", "expected a number");
+        Failure(format!("{}: {}", path.display(), what.trim_end()))
+    })?;
     if file.object.is_empty() {
         return source.fail(0..0, "the scene has no [[object]]");
     }
@@ -289,6 +298,12 @@ fn read_device(
         }
         None => return source.fail(point_span, format!("the object {wanted:?} has no surface")),
     };
+    if !recording.is_movable(&grasp.point) {
+        return source.fail(
+            point_span,
+            format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
+        );
+    }
     let file = &device.path.file;
     let path = match DevicePath::read(&source.relative(file.get_ref())) {
         Ok(path) => path,

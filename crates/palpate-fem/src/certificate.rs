@@ -76,7 +76,9 @@ pub fn certificate(
     damping: Damping,
     progress: &mut dyn Progress,
 ) -> Result<Certificate, CertificateError> {
-    let samples = samples(surface);
+    // A fixed place has no compliance to compare.
+    let movable = |node: usize| !system.is_fixed(3 * surface_nodes[node] as usize);
+    let samples = samples(surface, &movable);
     progress.begin("certificate", (BLOCKS + samples.len()) as u64);
     let loads = loads(system, surface_nodes, &samples);
     let reference = Reference::new(system, modes, loads, EVENT.step_s, BLOCKS, progress)?;
@@ -151,12 +153,14 @@ pub fn certificate(
 }
 
 /// Points spread over the surface, each as far from the others as it gets, and patches about the first of them.
-fn samples(surface: &Surface) -> Vec<Sample> {
+fn samples(surface: &Surface, movable: &dyn Fn(usize) -> bool) -> Vec<Sample> {
     let positions = &surface.positions;
+    let candidates: Vec<usize> = (0..positions.len()).filter(|&node| movable(node)).collect();
     let mut nearest: Vec<f64> = positions.iter().map(|p| p.length()).collect();
     let mut points = Vec::new();
-    for _ in 0..POINTS.min(positions.len()) {
-        let farthest = (0..positions.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b])).unwrap_or(0);
+    for _ in 0..POINTS.min(candidates.len()) {
+        let farthest = candidates.iter().copied().max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]));
+        let Some(farthest) = farthest else { break };
         points.push(farthest);
         for (node, distance) in nearest.iter_mut().enumerate() {
             let new = (positions[node] - positions[farthest]).length();
@@ -167,7 +171,7 @@ fn samples(surface: &Surface) -> Vec<Sample> {
     let radius = (PATCH_DIAGONAL * surface.diagonal()).max(PATCH_EDGES * surface.mean_edge());
     let patch = |&centre: &usize| {
         let within = |node: &usize| (positions[*node] - positions[centre]).length() <= radius;
-        let nodes: Vec<usize> = (0..positions.len()).filter(within).collect();
+        let nodes: Vec<usize> = candidates.iter().copied().filter(within).collect();
         let total: f64 = nodes.iter().map(|&node| areas[node]).sum();
         Sample {
             nodes: nodes.iter().map(|&node| (node, areas[node] / total)).collect(),

@@ -59,6 +59,9 @@ pub enum RecordError {
     Option(String),
 }
 
+/// Share of fixed nodes above which the user is asked whether that was meant.
+const MUCH_FIXED: f64 = 0.3;
+
 /// Everything about a recorded body, for checks that need more than the recording.
 pub struct Recorded {
     /// What is written.
@@ -88,6 +91,13 @@ pub fn record(
     check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))
         .map_err(SystemError::from)?;
     let fixed_nodes = fixed_nodes(&discretisation, &parameters.fixed_nodes)?;
+    let share = fixed_nodes.len() as f64 / discretisation.nodes.len() as f64;
+    if share > MUCH_FIXED {
+        progress.remark(&format!(
+            "{:.0} % of the nodes are fixed; conditions are in metres of the mesh",
+            100.0 * share
+        ));
+    }
     let assembly = Assembly::new(&discretisation, &parameters.materials);
     progress.advance(1);
     let system = System::new(discretisation, assembly, fixed_nodes)?;
@@ -199,8 +209,13 @@ fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress)
 
 fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
     let error = certificate.force_error_max;
+    let place = DVec3::from_array(certificate.worst_at_m);
     if error > 10.0 {
-        progress.remark("the force of this recording is worth nothing (see the certificate): keep the residual compliance and more modes");
+        progress.remark(&format!(
+            "the force of this recording is worth nothing near ({:.4}, {:.4}, {:.4}) m from its centre of mass (see the \
+             certificate): keep the residual compliance and more modes",
+            place.x, place.y, place.z
+        ));
     } else if error > 0.05 {
         progress.remark(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \

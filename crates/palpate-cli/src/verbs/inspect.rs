@@ -112,9 +112,15 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
     let last = frequencies.last().copied().unwrap_or_default();
     writeln!(out, "  modes        {} elastic, {} … {last:.4} Hz", frequencies.len(), shown.join(" "))?;
     match &recording.residual {
-        ResidualCompliance::None => writeln!(out, "  residual     none")?,
-        ResidualCompliance::Whole(_) => writeln!(out, "  residual     whole")?,
-        ResidualCompliance::NearField(near) => writeln!(out, "  residual     within {:.4} m", near.radius)?,
+        ResidualCompliance::None => {
+            writeln!(out, "  residual     none: forces are off by up to several times")?
+        }
+        ResidualCompliance::Whole(_) => {
+            writeln!(out, "  residual     compliance of what the modes miss: whole")?
+        }
+        ResidualCompliance::NearField(near) => {
+            writeln!(out, "  residual     compliance of what the modes miss: within {:.4} m", near.radius)?
+        }
     }
     match &metadata.certificate {
         None => writeln!(out, "  certificate  none")?,
@@ -127,7 +133,7 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     let Certificate { event, samples, modes_of: [kept, all], .. } = certificate;
     writeln!(
         out,
-        "  certificate  against all {all} modes of the mesh, {kept} kept; {samples} points and patches"
+        "  certificate  against the unreduced mesh with all its {all} modes; {kept} are kept; {samples} points and patches"
     )?;
     let ms = |s: f64| 1000.0 * s;
     writeln!(
@@ -145,9 +151,9 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     )?;
     writeln!(
         out,
-        "    R[0] at {} ms step   {} at most: only a jump of the hand within one step feels it",
-        ms(event.step_s),
-        percent(certificate.instantaneous_compliance_error_max)
+        "    sudden jump          {} of R[0] at most, within one step of {} ms; smooth motion does not feel it",
+        percent(certificate.instantaneous_compliance_error_max),
+        ms(event.step_s)
     )?;
     writeln!(
         out,

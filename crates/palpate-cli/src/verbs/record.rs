@@ -70,7 +70,7 @@ pub struct Arguments {
     /// Multiply the file's coordinates to come to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
-    /// Fix nodes: a named group of the mesh, or a condition in metres such as 'x<0.001' or 'y>0.1 & z<=0'; may be repeated. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
+    /// Fix nodes: a named group of the mesh, or a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale; may be repeated. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
     #[arg(long, value_name = "GROUP|CONDITION")]
     pub fix: Vec<String>,
     /// Make nodes that lie on the same point one node
@@ -140,7 +140,7 @@ fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Fa
     let damping = match (arguments.rayleigh.as_deref(), arguments.damping_ratio) {
         (Some(&[alpha, beta]), _) => Damping::Rayleigh { alpha, beta },
         (Some(other), _) => {
-            return Err(Failure(format!("--rayleigh has {} numbers, expected ALPHA,BETA", other.len())));
+            return Err(Failure(format!("--rayleigh is {other:?}, expected two numbers ALPHA,BETA")));
         }
         (None, ratio) => Damping::Ratio(ratio.unwrap_or(0.0)),
     };

@@ -1,17 +1,17 @@
 //! `palpate run`: a scene, headless, as fast as it goes.
 
 use crate::Failure;
+use crate::csv::CsvWriter;
 use crate::scene_file::{self, Scene};
 use crate::verbs::{print, print_json};
 use crate::vtu::VtuSeries;
-use crate::whole_file::WholeFile;
 use clap::Args;
 use glam::DVec3;
 use indicatif::ProgressBar;
 use palpate::{DeviceInput, Input, Output, State, StepStatus, step};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Run a scene and write forces, motion and energies
@@ -52,6 +52,12 @@ pub struct Arguments {
 /// Longest run [s] without a path to tell: long enough to see a fall.
 const DEFAULT_DURATION_S: f64 = 1.0;
 
+/// How often the deformation is looked at: seldom enough to cost nothing beside the steps.
+const LOOKS: usize = 100;
+
+/// Elastic displacement, as a share of the object's diagonal, beyond which linear elasticity is doubtful.
+const LARGE_DEFORMATION: f64 = 0.1;
+
 /// Runs of more steps than this (a second of work) show a bar on a terminal.
 const PROGRESS_FROM: usize = 200_000;
 
@@ -78,6 +84,8 @@ pub struct Summary {
     /// Compute time of each step [ns], sorted.
     times_ns: Vec<u32>,
     index: Option<PathBuf>,
+    /// Largest elastic displacement of the surface [m] per object, looked at now and then.
+    deformation: Vec<f64>,
 }
 
 /// Run a scene to its end.
@@ -119,7 +127,9 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         start_energy: state.output().energy.stored(),
         times_ns: Vec::with_capacity(steps),
         index: None,
+        deformation: vec![0.0; scene.object_names.len()],
     };
+    let look_every = (steps / LOOKS).max(1);
     if let Some(series) = &mut series {
         series.write_frame(&scene.model, &state)?;
     }
@@ -143,6 +153,9 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         check_status(scene, &input, output)?;
         if let Some(csv) = &mut csv {
             csv.write(&input, output)?;
+        }
+        if number % look_every == 0 {
+            summary.look(scene, &state);
         }
         if let Some(series) =
             series.as_mut().filter(|series| time * arguments.fps >= series.frames() as f64 - 1e-9)
@@ -193,6 +206,15 @@ impl Summary {
         all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
     }
 
+    fn look(&mut self, scene: &Scene, state: &State) {
+        for (object, (recording, largest)) in scene.model.recordings().zip(&mut self.deformation).enumerate()
+        {
+            let mut displacement = vec![DVec3::ZERO; recording.surface.positions.len()];
+            state.surface_displacement(&scene.model, object, &mut displacement);
+            *largest = displacement.iter().map(|u| u.length()).fold(*largest, f64::max);
+        }
+    }
+
     /// Compute time of a step [µs] at a share of all steps: 0.5 is the median.
     pub fn time_us(&self, share: f64) -> f64 {
         percentile_us(&self.times_ns, share)
@@ -218,7 +240,8 @@ impl Summary {
             .object_names
             .iter()
             .zip(&self.last.objects)
-            .map(|(name, object)| {
+            .zip(&self.deformation)
+            .map(|((name, object), deformation)| {
                 let q = object.pose.orientation;
                 json!({
                     "name": name,
@@ -226,6 +249,7 @@ impl Summary {
                     "orientation": [q.w, q.x, q.y, q.z],
                     "velocity_m_s": object.twist.linear.to_array(),
                     "angular_velocity_rad_s": object.twist.angular.to_array(),
+                    "displacement_max_m": deformation,
                 })
             })
             .collect();
@@ -272,28 +296,47 @@ impl Summary {
                 largest(forces)
             );
         }
-        for (name, object) in scene.object_names.iter().zip(&self.last.objects) {
-            let (p, v) = (object.pose.position, object.twist.linear);
+        for ((name, object), deformation) in
+            scene.object_names.iter().zip(&self.last.objects).zip(&self.deformation)
+        {
+            // Adding 0 turns −0 into 0.
+            let (p, v) = (object.pose.position + DVec3::ZERO, object.twist.linear + DVec3::ZERO);
             out += &format!(
-                "  {name:<12} centre ({:.5}, {:.5}, {:.5}) m, velocity ({:.4}, {:.4}, {:.4}) m/s\n",
-                p.x, p.y, p.z, v.x, v.y, v.z
+                "  {name:<12} centre ({:.5}, {:.5}, {:.5}) m, velocity ({:.4}, {:.4}, {:.4}) m/s, deformed by up to {:.2} mm\n",
+                p.x,
+                p.y,
+                p.z,
+                v.x,
+                v.y,
+                v.z,
+                1000.0 * deformation
             );
         }
         let energy = &self.last.energy;
         out += &format!(
-            "  energy       {:+.3e} J stored = {:+.3e} J from the hands - {:.3e} J lost (sum closes to {:.0e} J)\n",
+            "  energy       {:+.3e} J stored since the start = {:+.3e} J from the hands - {:.3e} J dissipated, to {:.0e} J\n",
             energy.stored() - self.start_energy,
             energy.input,
             energy.dissipated,
             energy.defect.abs()
         );
         out += &format!(
-            "  step time    {:.1} µs median, {:.1} p99, {:.1} p99.9, {:.1} at most\n",
+            "  step time    {:.1} µs median; 99 % below {:.1}, 99.9 % below {:.1}, all below {:.1}\n",
             self.time_us(0.5),
             self.time_us(0.99),
             self.time_us(0.999),
             self.time_us(1.0)
         );
+        let recordings = scene.model.recordings().zip(&scene.object_names).zip(&self.deformation);
+        for ((recording, name), deformation) in recordings {
+            let share = deformation / recording.surface.diagonal();
+            if share > LARGE_DEFORMATION {
+                out += &format!(
+                    "  warning      {name} deforms by {:.0} % of its size; linear elasticity is meant for small strain\n",
+                    100.0 * share
+                );
+            }
+        }
         if self.status.dependent_rows > 0 {
             out += &format!(
                 "  warning      {} held directions repeat others and were given no force\n",
@@ -315,55 +358,4 @@ pub fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
 
 fn largest(forces: &[DVec3]) -> f64 {
     forces.iter().map(|force| force.length()).fold(0.0, f64::max)
-}
-
-/// Every step as a line of numbers that read back to the same bits.
-struct CsvWriter {
-    file: WholeFile,
-}
-
-impl CsvWriter {
-    fn new(path: &Path, scene: &Scene) -> Result<Self, Failure> {
-        let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
-        let mut writer = Self { file: WholeFile::create(path, &inputs)? };
-        let mut columns = vec!["t".to_string()];
-        for device in &scene.devices {
-            columns.extend(["x", "y", "z", "fx", "fy", "fz"].map(|c| format!("{}.{c}", device.name)));
-        }
-        for name in &scene.object_names {
-            let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
-            columns.extend(parts.map(|c| format!("{name}.{c}")));
-        }
-        let energies = ["kinetic", "elastic", "residual", "potential", "input", "dissipated", "defect"];
-        columns.extend(energies.map(|c| format!("energy.{c}")));
-        writer.line(&columns.join(","))?;
-        Ok(writer)
-    }
-
-    fn line(&mut self, text: &str) -> Result<(), Failure> {
-        self.file.write(format!("{text}\n").as_bytes())
-    }
-
-    fn write(&mut self, input: &Input, output: &Output) -> Result<(), Failure> {
-        let mut numbers = vec![output.time_s];
-        for (device, out) in input.devices.iter().zip(&output.devices) {
-            numbers.extend(device.position.to_array());
-            numbers.extend(out.force_on_hand.to_array());
-        }
-        for object in &output.objects {
-            let q = object.pose.orientation;
-            numbers.extend(object.pose.position.to_array());
-            numbers.extend([q.w, q.x, q.y, q.z]);
-            numbers.extend(object.twist.linear.to_array());
-            numbers.extend(object.twist.angular.to_array());
-        }
-        let e = &output.energy;
-        numbers.extend([e.kinetic, e.elastic, e.residual, e.potential, e.input, e.dissipated, e.defect]);
-        let cells: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
-        self.line(&cells.join(","))
-    }
-
-    fn finish(self) -> Result<(), Failure> {
-        self.file.finish()
-    }
 }

@@ -98,6 +98,17 @@ fn is_inertia(tensor: &DMat3) -> bool {
 }
 
 impl Recording {
+    /// Whether a surface point can be moved: not when all its corners are fixed nodes.
+    pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
+        self.surface.corners(point).iter().any(|&(node, weight)| {
+            let moves = |axis: usize| {
+                self.modes.row(node, axis).iter().any(|phi| *phi != 0.0)
+                    || self.residual.block(node, node).col(axis)[axis] != 0.0
+            };
+            weight != 0.0 && (0..3).any(moves)
+        })
+    }
+
     /// Mass [kg] of the body.
     pub fn mass(&self) -> f64 {
         self.metadata.mass.mass_kg
