@@ -140,10 +140,8 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn fail<T>(&self, span: Range<usize>, what: impl std::fmt::Display) -> Result<T, Failure> {
-        let line = self.text[..span.start.min(self.text.len())].lines().count().max(1);
-        // A span that starts a line counts that line itself.
-        let starts_line = span.start > 0 && self.text[..span.start].ends_with('\n');
-        Err(Failure(format!("{}: line {}: {what}", self.path.display(), line + usize::from(starts_line))))
+        let line = 1 + self.text[..span.start.min(self.text.len())].matches('\n').count();
+        Err(Failure(format!("{}: line {line}: {what}", self.path.display())))
     }
 
     fn relative(&self, file: &Path) -> PathBuf {

@@ -597,7 +597,7 @@ fn a_failed_recording_says_why_and_leaves_what_was_there() {
          one line"
     );
     assert_eq!(with(&["--scale", "0"]), "scale is 0, expected a positive number");
-    assert_eq!(with(&["--rayleigh", "2"]), "--rayleigh has 1 numbers, expected ALPHA,BETA");
+    assert_eq!(with(&["--rayleigh", "2"]), "--rayleigh is [2.0], expected two numbers ALPHA,BETA");
     assert_eq!(
         with(&["--damping-ratio", "-0.1"]),
         "box:0.1x0.1x0.1/2x2x2: damping ratio is -0.1, expected a number that is not negative"

@@ -11,7 +11,6 @@
 use crate::progress::Progress;
 use crate::system::System;
 use faer::{Mat, MatRef, Side};
-use glam::DVec3;
 
 /// Elastic modes of a body.
 #[derive(Debug, Clone)]
@@ -35,9 +34,6 @@ pub enum ModesError {
         /// What can be found.
         available: usize,
     },
-    /// The body has motions without stiffness beside the rigid ones.
-    #[error("{0}")]
-    Mechanism(String),
     /// The iteration did not reach its tolerance.
     #[error(
         "the modes did not converge: {found} of {wanted} after a basis of {basis}, largest residual {residual:e}; \
@@ -86,9 +82,6 @@ const DENSE_AT_MOST: usize = 14_000;
 /// Two neighbours in the spectrum are a gap when ω² differs by this share.
 const GAP: f64 = 1e-5;
 
-/// ω² below this share of the typical elastic one is a mechanism: a hinge that no shape resists.
-const MECHANISM_BELOW: f64 = 1e-10;
-
 /// The `wanted` lowest elastic modes.
 ///
 /// # Errors
@@ -111,30 +104,7 @@ pub fn lowest_modes(
     if dense && dofs > DENSE_SLOW {
         progress.remark(&format!("so many of the {available} modes are found densely, which takes minutes"));
     }
-    let modes = if dense { all_modes(system, wanted, progress)? } else { krylov(system, wanted, progress)? };
-    check_mechanism(system, &modes)?;
-    Ok(modes)
-}
-
-/// A mechanism shows as a first mode that is slower than the last by many orders.
-fn check_mechanism(system: &System, modes: &Modes) -> Result<(), ModesError> {
-    let (Some(&first), Some(&last)) = (modes.squares.first(), modes.squares.last()) else {
-        return Ok(());
-    };
-    if first > MECHANISM_BELOW * last {
-        return Ok(());
-    }
-    // Where the loose part moves most.
-    let shape = modes.shapes.col(0);
-    let size = |n: usize| DVec3::new(shape[3 * n], shape[3 * n + 1], shape[3 * n + 2]).length();
-    let nodes = &system.discretisation.nodes;
-    let worst = (0..nodes.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(0);
-    let p = nodes[worst];
-    Err(ModesError::Mechanism(format!(
-        "the body has a motion without stiffness beside the rigid ones: a part near ({:.6}, {:.6}, {:.6}) m hangs \
-         on a hinge (an edge or a node alone)",
-        p.x, p.y, p.z
-    )))
+    if dense { all_modes(system, wanted, progress) } else { krylov(system, wanted, progress) }
 }
 
 fn krylov(system: &System, wanted: usize, progress: &mut dyn Progress) -> Result<Modes, ModesError> {

@@ -214,9 +214,11 @@ fn nothing_is_left_when_all_modes_are_kept() {
 
 #[test]
 fn the_near_field_is_the_whole_residual_tapered() {
+    // Many entries of this body's blocks are zero by symmetry: round-off that only a copy makes equal.
     let with = |residual| {
-        let parameters = RecordParameters { residual, ..parameters(Order::Quadratic, 12) };
-        recorded(small_cube(), &parameters).recording
+        let (mesh, parameters) = two_material_bar(12);
+        let parameters = RecordParameters { residual, order: Order::Linear, ..parameters };
+        recorded(mesh, &parameters).recording
     };
     let whole = with(ResidualChoice::Whole);
     let positions = &whole.surface.positions;

@@ -115,7 +115,9 @@ fn the_runtime_has_no_standard_library_thread_clock_or_unsafe_code() {
     assert!(files.len() > 10, "the sources are not where this test looks");
     for path in files {
         let text = std::fs::read_to_string(&path).expect("a source file");
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let before_tests = text.split("#[cfg(test)]").next().unwrap_or_default();
+        let is_comment = |line: &&str| line.trim_start().starts_with("//");
+        let code: String = before_tests.lines().filter(|line| !is_comment(line)).collect();
         for banned in ["std::", "unsafe ", "println!", ".unwrap()", "panic!("] {
             assert!(!code.contains(banned), "{} contains {banned:?}", path.display());
         }

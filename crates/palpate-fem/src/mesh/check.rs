@@ -160,7 +160,8 @@ fn turn_upright(mesh: &mut Mesh) -> Result<(), MeshError> {
         let edges = super::super::element::EDGES.map(|[a, b]| (corners[a] - corners[b]).length());
         let longest = edges.into_iter().fold(0.0, f64::max);
         let volume = tet_volume(&mesh.nodes, tet);
-        if volume.abs() <= FLAT_BELOW * longest.powi(3) {
+        // Beyond 1e100 m a volume overflows: that is no size either.
+        if volume.abs() <= FLAT_BELOW * longest.powi(3) || !volume.is_finite() {
             flat.push(number as u32);
         } else if volume < 0.0 {
             tet.swap(2, 3);
