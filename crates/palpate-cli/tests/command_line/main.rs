@@ -1,0 +1,5 @@
+//! The command `palpate` from outside: what it prints and writes, what it refuses and how it says so.
+
+mod bad_input;
+mod results;
+mod workplace;

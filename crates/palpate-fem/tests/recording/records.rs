@@ -1,0 +1,252 @@
+//! What `record` keeps, computes in closed form, and refuses.
+
+use faer::Mat;
+use glam::DVec3;
+use palpate::Damping;
+use palpate_fem::element::Order;
+use palpate_fem::modes::Modes;
+use palpate_fem::record::{RecordParameters, Recorded, record};
+use palpate_fem::residual::ResidualChoice;
+
+use crate::bodies::*;
+
+#[test]
+fn the_same_input_gives_the_same_bytes() {
+    for (mesh, parameters) in [two_material_bar(30), fixed_bar(Order::Quadratic, 30)] {
+        let bytes = || recorded(mesh.clone(), &parameters).recording.to_bytes().expect("a good recording");
+        assert!(bytes() == bytes());
+    }
+}
+
+#[test]
+fn mass_centre_and_inertia_of_a_box_are_the_closed_forms() {
+    const SCALE: f64 = 0.5;
+    for order in [Order::Linear, Order::Quadratic] {
+        let mut mesh = block([0.2, 0.4, 0.6], [2, 3, 2]);
+        let offset = DVec3::new(10.0, -20.0, 3.0);
+        mesh.nodes.iter_mut().for_each(|node| *node += offset);
+        mesh.scale(SCALE).expect("a positive number");
+        let recording = recorded(mesh, &parameters(order, 6)).recording;
+        let mass = 1000.0 * 0.1 * 0.2 * 0.3;
+        assert!((recording.mass() / mass - 1.0).abs() < SUMMED);
+        let centre = DVec3::from_array(recording.metadata.mass.center_of_mass_m);
+        assert!((centre - offset * SCALE).length() < SUMMED * offset.length(), "{centre}");
+        let moment = |a: f64, b: f64| mass / 12.0 * (a * a + b * b);
+        let exact = [moment(0.2, 0.3), moment(0.1, 0.3), moment(0.1, 0.2)];
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let expected = if i == j { exact[i] } else { 0.0 };
+            let got = recording.metadata.mass.inertia_kg_m2[i][j];
+            // Coordinates of 10 m have lost two digits beside edges of 0.1 m.
+            assert!((got - expected).abs() < 100.0 * SUMMED * exact[0], "{i}, {j}: {got} {expected}");
+        }
+        // The body frame has its origin at the centre of mass.
+        let low = recording.surface.positions.iter().copied().reduce(DVec3::min).expect("nodes");
+        assert!((low + DVec3::new(0.05, 0.1, 0.15)).length() < SUMMED * offset.length(), "{low}");
+    }
+}
+
+#[test]
+fn gravity_bends_a_fixed_bar_as_its_static_compliance_says() {
+    for order in [Order::Linear, Order::Quadratic] {
+        let (mesh, parameters) = fixed_bar(order, 15);
+        let Recorded { recording, system, .. } = recorded(mesh, &parameters);
+        let gravity = recording.gravity.expect("a fixed body has a gravity response");
+        let surface_nodes = system.discretisation.surface_nodes();
+        let uniform =
+            Mat::from_fn(system.discretisation.dofs(), 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
+        let exact = system.elastic_compliance(system.mass_times(uniform.as_ref()));
+        let m = recording.modes.len();
+        for (axis, g) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            for (node, &number) in surface_nodes.iter().enumerate() {
+                let modal = |part: usize| -> f64 {
+                    let phi = recording.modes.row(node, part);
+                    let omegas = &recording.modes.angular_frequencies;
+                    (0..m).map(|i| phi[i] * gravity.modal_forces[axis * m + i] / omegas[i].powi(2)).sum()
+                };
+                let sag = DVec3::new(modal(0), modal(1), modal(2)) + gravity.residual_displacement(node, g);
+                let expected =
+                    DVec3::from_array([0, 1, 2].map(|part| exact[(3 * number as usize + part, axis)]));
+                assert!((sag - expected).length() < SOLVED * exact.norm_max(), "{node}: {sag} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hanging_bar_without_poisson_effect_sags_by_its_weight_over_twice_its_stiffness() {
+    // u = ρg/E·(L·s − s²/2) at s from the support: in the space of quadratic elements, so exact at every node.
+    let (mesh, parameters) = fixed_bar(Order::Quadratic, 15);
+    let parameters = RecordParameters { materials: vec![material(2e4, 0.0, 1000.0)], ..parameters };
+    let Recorded { recording, .. } = recorded(mesh, &parameters);
+    let gravity = recording.gravity.expect("a fixed body has a gravity response");
+    let (m, end) = (recording.modes.len(), 1000.0 / 2e4 * 0.2 * 0.2 / 2.0);
+    for (node, position) in recording.surface.positions.iter().enumerate() {
+        let s = position.x + 0.1;
+        let exact = DVec3::X * (1000.0 / 2e4 * (0.2 * s - s * s / 2.0));
+        let modal = |part: usize| -> f64 {
+            let phi = recording.modes.row(node, part);
+            let omegas = &recording.modes.angular_frequencies;
+            (0..m).map(|i| phi[i] * gravity.modal_forces[i] / omegas[i].powi(2)).sum()
+        };
+        let sag = DVec3::new(modal(0), modal(1), modal(2)) + gravity.residual_displacement(node, DVec3::X);
+        assert!((sag - exact).length() < SOLVED * end, "at {s} m: {sag}, expected {exact}");
+    }
+}
+
+#[test]
+fn quadratic_elements_have_four_triangles_a_face_and_a_closed_surface() {
+    let mesh = block([0.1; 3], [2; 3]);
+    let (corners, count) = (mesh.nodes.len() as u32, mesh.nodes.len());
+    let surface = recorded(mesh, &parameters(Order::Quadratic, 6)).recording.surface;
+    // 6 sides of 4 cells of 2 faces; V − E + F = 2 for a closed surface.
+    assert_eq!(surface.triangles.len(), 4 * 6 * 4 * 2);
+    let mut edges: Vec<[u32; 2]> =
+        surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    edges.sort_unstable();
+    assert!(edges.windows(2).all(|pair| pair[0] != pair[1]), "an edge is passed twice the same way");
+    assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "an edge has one triangle");
+    assert_eq!(surface.positions.len() + surface.triangles.len(), edges.len() / 2 + 2);
+    // All triangles look outward: those of a convex body away from its centre.
+    for triangle in &surface.triangles {
+        let [a, b, c] = triangle.map(|node| surface.positions[node as usize]);
+        assert!((b - a).cross(c - a).dot(a) > 0.0);
+    }
+    let mut sources = surface.source_nodes.clone();
+    sources.sort_unstable();
+    sources.dedup();
+    assert_eq!(sources.len(), surface.positions.len());
+    // All corner nodes but the middle one are on the surface.
+    assert_eq!(sources.iter().filter(|&&node| node < corners).count(), count - 1);
+}
+
+#[test]
+fn supports_that_do_not_hold_the_body_are_refused() {
+    let text =
+        "the fixed nodes leave the body free to turn: fix at least three nodes that are not on one line";
+    let at_edge = |p: DVec3| p.x < -0.0499 && p.y < -0.0499;
+    let with = |order, holds: &dyn Fn(DVec3) -> bool| {
+        let mesh = small_cube();
+        let fixed_nodes = nodes_where(&mesh, holds);
+        assert!(!fixed_nodes.is_empty());
+        refusal(mesh, &RecordParameters { fixed_nodes, ..parameters(order, 6) })
+    };
+    for order in [Order::Linear, Order::Quadratic] {
+        assert_eq!(with(order, &at_edge), text);
+        assert_eq!(with(order, &|p| at_edge(p) && p.z < 0.01), text);
+        assert_eq!(with(order, &|p| p == DVec3::ZERO), text);
+        assert_eq!(with(order, &|_| true), "all nodes are fixed: nothing can move");
+    }
+    let mut mesh = small_cube();
+    mesh.nodes.push(DVec3::ZERO);
+    let parameters = RecordParameters { fixed_nodes: vec![27], ..parameters(Order::Linear, 6) };
+    assert_eq!(refusal(mesh, &parameters), "the nodes to fix belong to no tetrahedron");
+}
+
+#[test]
+fn a_cube_held_at_three_corners_can_be_recorded() {
+    let mesh = small_cube();
+    let fixed_nodes = nodes_where(&mesh, |p| {
+        p.x + p.y + p.z > 0.0499 && p.abs().min_element() > 0.0499 && p != DVec3::splat(0.05)
+    });
+    assert_eq!(fixed_nodes.len(), 3);
+    let parameters = RecordParameters { fixed_nodes, ..parameters(Order::Linear, 6) };
+    let recorded = recorded(mesh, &parameters);
+    assert_eq!(recorded.recording.metadata.mesh.fixed_nodes, 3);
+    // 24 nodes are free.
+    assert_eq!(recorded.system.elastic_modes(), 72);
+    assert!(recorded.recording.modes.angular_frequencies[0] > 1.0);
+}
+
+#[test]
+fn materials_and_options_out_of_range_are_refused_with_value_and_range() {
+    let with_material = |young, poisson, density| {
+        let materials = vec![material(young, poisson, density)];
+        refusal(small_cube(), &RecordParameters { materials, ..parameters(Order::Linear, 6) })
+    };
+    assert_eq!(
+        with_material(1e4, 0.5, 1000.0),
+        "Poisson's ratio is 0.5, expected below 0.5: at 0.5 the material is incompressible and has no \
+         displacement-only stiffness; use 0.49 for rubber or soft tissue"
+    );
+    assert_eq!(with_material(1e4, -1.0, 1000.0), "Poisson's ratio is -1, expected above -1 and below 0.5");
+    assert_eq!(
+        with_material(1e4, f64::NAN, 1000.0),
+        "Poisson's ratio is NaN, expected above -1 and below 0.5"
+    );
+    assert_eq!(with_material(0.0, 0.3, 1000.0), "Young's modulus is 0e0 Pa, expected 1e-6 to 1e18 Pa");
+    assert_eq!(with_material(1e4, 0.3, f64::INFINITY), "density is inf kg/m³, expected 1e-9 to 1e12 kg/m³");
+
+    let with = |change: &dyn Fn(&mut RecordParameters)| {
+        let mut parameters = parameters(Order::Linear, 6);
+        change(&mut parameters);
+        refusal(small_cube(), &parameters)
+    };
+    assert_eq!(with(&|p| p.modes = 0), "0 modes are wanted, expected 1 or more");
+    assert_eq!(with(&|p| p.materials.clear()), "0 materials for 1 regions");
+    assert_eq!(
+        with(&|p| p.residual = ResidualChoice::NearField(0.0)),
+        "residual radius is 0 m, expected a positive number"
+    );
+    assert_eq!(
+        with(&|p| p.damping = Damping::Ratio(-0.1)),
+        "damping ratio is -0.1, expected a number that is not negative"
+    );
+    assert_eq!(
+        with(&|p| p.damping = Damping::Rayleigh { alpha: 1.0, beta: f64::NAN }),
+        "Rayleigh damping is 1 1/s, NaN s, expected two numbers that are not negative"
+    );
+    let mut mesh = small_cube();
+    mesh.tets.pop();
+    mesh.tets.push([0, 1, 2, 99]);
+    assert_eq!(refusal(mesh, &parameters(Order::Linear, 6)), "tetrahedron 39 names node 99 of 27");
+}
+
+#[test]
+fn locking_and_the_meshs_own_remarks_are_told() {
+    let mut listener = Listener::default();
+    let mut mesh = small_cube();
+    mesh.nodes.push(DVec3::ZERO);
+    let parameters =
+        RecordParameters { materials: vec![material(2e4, 0.49995, 1000.0)], ..parameters(Order::Linear, 40) };
+    record(mesh, &parameters, &mut listener).expect("a good recording");
+    assert_eq!(
+        listener.0[..3],
+        [
+            "1 nodes belong to no tetrahedron and are left out",
+            "linear elements lock at Poisson's ratio 0.49995: frequencies come out some per cent too high; --order 2 \
+             avoids it",
+            "Poisson's ratio 0.49995 is so near to 0.5 that even quadratic elements lock; 0.49 is usual for rubber"
+        ]
+    );
+}
+
+#[test]
+fn a_recording_reads_back_as_it_was_written() {
+    for residual in [ResidualChoice::Automatic, ResidualChoice::NearField(0.05), ResidualChoice::None] {
+        let (mesh, parameters) = fixed_bar(Order::Linear, 8);
+        let recording = recorded(mesh, &RecordParameters { residual, ..parameters }).recording;
+        let bytes = recording.to_bytes().expect("a good recording");
+        assert!(palpate::Recording::from_bytes(&bytes).expect("a good recording") == recording);
+    }
+}
+
+#[test]
+fn kept_modes_of_a_recording_are_those_of_all_nodes_at_the_surface() {
+    let (mesh, parameters) = two_material_bar(10);
+    let Recorded { recording, system, modes } = recorded(mesh, &parameters);
+    let Modes { squares, shapes } = modes;
+    for (node, &number) in system.discretisation.surface_nodes().iter().enumerate() {
+        let expected = DVec3::from_array(system.mass.center_of_mass_m) + recording.surface.positions[node];
+        assert!((system.discretisation.nodes[number as usize] - expected).length() < SUMMED);
+        for (axis, mode) in (0..3).flat_map(|axis| (0..10).map(move |mode| (axis, mode))) {
+            assert_eq!(recording.modes.row(node, axis)[mode], shapes[(3 * number as usize + axis, mode)]);
+        }
+    }
+    for (mode, square) in squares.into_iter().enumerate() {
+        let omega = recording.modes.angular_frequencies[mode];
+        assert_eq!(omega, square.sqrt());
+        // ζ = α/(2ω) + βω/2.
+        let zeta = 2.0 / (2.0 * omega) + 2e-4 * omega / 2.0;
+        assert!((recording.modes.damping_ratios[mode] / zeta - 1.0).abs() < SUMMED);
+    }
+}
