@@ -144,14 +144,10 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
         ms(event.rise_s),
         ms(event.duration_s)
     )?;
+    writeln!(out, "    static compliance    {} at most", percent(certificate.static_compliance_error_max))?;
     writeln!(
         out,
-        "    static compliance    {} at most, at rest",
-        percent(certificate.static_compliance_error_max)
-    )?;
-    writeln!(
-        out,
-        "    sudden jump          {} of R[0] at most, within one step of {} ms; smooth motion does not feel it",
+        "    sudden jump          R[0] off by {} at most, within one step of {} ms; smooth motion does not feel it",
         percent(certificate.instantaneous_compliance_error_max),
         ms(event.step_s)
     )?;
@@ -160,7 +156,7 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
         "    bandwidth            {:.1} Hz (dynamic compliance within 5 % of the static)",
         certificate.bandwidth_hz
     )?;
-    writeln!(out, "    reference            known to {}", percent(certificate.reference_error))
+    writeln!(out, "    reference            its own error is {}", percent(certificate.reference_error))
 }
 
 fn percent(share: f64) -> String {
