@@ -69,7 +69,7 @@ impl VtuSeries {
     }
 
     /// Write the index; gives its path.
-    pub fn finish(self) -> Result<PathBuf, Failure> {
+    pub fn finish(mut self) -> Result<PathBuf, Failure> {
         let mut text = String::from(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n",
         );
@@ -79,7 +79,17 @@ impl VtuSeries {
         text.push_str("</Collection>\n</VTKFile>\n");
         let path = self.folder.join("scene.pvd");
         std::fs::write(&path, text).map_err(|e| Failure::file("write", &path, &e))?;
+        self.written.clear();
         Ok(path)
+    }
+}
+
+impl Drop for VtuSeries {
+    /// Frames of a run that failed go with it; after [`Self::finish`] there are none to remove.
+    fn drop(&mut self) {
+        for (_, _, name) in &self.written {
+            let _ = std::fs::remove_file(self.folder.join(name));
+        }
     }
 }
 
