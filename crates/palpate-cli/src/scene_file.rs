@@ -6,6 +6,7 @@ use glam::{DQuat, DVec3};
 use palpate::{
     Grasp, Model, ModelParameters, MotionRule, ObjectStart, Pose, Recording, RigidCompliance, Twist,
 };
+use palpate_fem::certificate::DOUBTFUL;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 use std::ops::Range;
@@ -126,9 +127,6 @@ fn identity() -> Numbers<4> {
 /// How far from the surface a point to hold may be, as a share of the object's diagonal.
 const OFF_SURFACE: f64 = 0.05;
 
-/// Force error above which a recording gets a remark.
-const DOUBTFUL: f64 = 0.05;
-
 /// A hand that starts farther than this share of the diagonal from its point gets a remark.
 const FAR_START: f64 = 0.01;
 
@@ -197,12 +195,10 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
         RigidCompliance::Dropped
     };
     let step_s = *file.step.get_ref();
-    if !(step_s > 0.0 && step_s <= 1.0) {
-        return source.fail(file.step.span(), format!("step is {step_s} s, expected above 0 and at most 1"));
-    }
     let gravity = DVec3::from_array(file.gravity.0);
     let parameters = ModelParameters { step_s, gravity, motion, rigid_compliance, devices: devices.len() };
-    let model = Model::new(parameters, objects).map_err(|e| Failure(format!("{}: {e}", path.display())))?;
+    // Objects and gravity have been checked where they stand: what is left to be wrong is the step.
+    let model = Model::new(parameters, objects).or_else(|e| source.fail(file.step.span(), e))?;
     let recordings = file.object.iter().map(|object| object.get_ref().recording.get_ref());
     let paths = file.device.iter().map(|device| device.get_ref().path.file.get_ref());
     let mut inputs = vec![path.to_path_buf()];

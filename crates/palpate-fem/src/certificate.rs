@@ -31,6 +31,11 @@ const LEFT_OUT: usize = 2;
 /// The dynamic compliance may be off by this share of the static one within the bandwidth.
 const BANDWIDTH_TOLERANCE: f64 = 0.05;
 
+/// Force error above which a recording gets a remark, and above which the remark says that it is worth nothing.
+pub const DOUBTFUL: f64 = 0.05;
+/// See [`DOUBTFUL`].
+pub const WORTHLESS: f64 = 10.0;
+
 /// What stands for an error without bound: too few modes without residual can't be held in every direction at all.
 const UNBOUNDED: f64 = 1e6;
 
@@ -229,9 +234,13 @@ fn outer(a: DVec3) -> DMat3 {
     DMat3::from_cols(a * a.x, a * a.y, a * a.z)
 }
 
-/// |a − b| / |b| in the Frobenius norm.
+/// Frobenius norm.
+fn norm(m: DMat3) -> f64 {
+    m.to_cols_array().iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// |a − b| / |b|.
 fn relative(a: DMat3, b: DMat3) -> f64 {
-    let norm = |m: DMat3| m.to_cols_array().iter().map(|v| v * v).sum::<f64>().sqrt();
     norm(a - b) / norm(b)
 }
 
@@ -272,7 +281,6 @@ impl Response {
 
     /// Up to where the left-out modes answer as if they were a spring. The kept ones are the same in both.
     fn bandwidth_hz(&self, damping: Damping) -> f64 {
-        let norm = |m: DMat3| m.to_cols_array().iter().map(|v| v * v).sum::<f64>().sqrt();
         let allowed = BANDWIDTH_TOLERANCE * norm(self.exact_static());
         let first = self.kept.first().map_or(1.0, |m| m.square.sqrt());
         let last = std::f64::consts::PI / EVENT.step_s;

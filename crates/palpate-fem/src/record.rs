@@ -1,7 +1,7 @@
 //! The whole way from a mesh to a recording.
 
 use crate::assembly::Assembly;
-use crate::certificate::{CertificateError, certificate};
+use crate::certificate::{CertificateError, DOUBTFUL, WORTHLESS, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::Order;
 use crate::factor::check_memory;
@@ -210,13 +210,13 @@ fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress)
 fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
     let error = certificate.force_error_max;
     let place = DVec3::from_array(certificate.worst_at_m);
-    if error > 10.0 {
+    if error > WORTHLESS {
         progress.remark(&format!(
             "the force of this recording is worth nothing near ({:.4}, {:.4}, {:.4}) m from its centre of mass (see the \
              certificate): keep the residual compliance and more modes",
             place.x, place.y, place.z
         ));
-    } else if error > 0.05 {
+    } else if error > DOUBTFUL {
         progress.remark(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
              certificate): keep the residual compliance and more modes",

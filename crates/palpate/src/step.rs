@@ -146,8 +146,7 @@ fn predict(
     object.modes.predict(&own.modes, forces, free_modes);
     for active in &mut workspace.active {
         let point = &held.points[active.device];
-        let sag = point.grasp.map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
-        active.free = project_rows(held.rows(active.device, m), free_modes.iter().copied()) + sag;
+        active.free = project_rows(held.rows(active.device, m), free_modes.iter().copied()) + point.sag;
     }
 }
 
@@ -329,11 +328,11 @@ fn advance(
         let pushed: DVec3 =
             active.iter().map(|other| held.residual(device, other.device) * other.force_in_body).sum();
         let held_point = &mut held.points[device];
-        let sag = held_point.grasp.map_or(DVec3::ZERO, |grasp| sag(model, object, own, &grasp));
-        residual_work += force.dot(pushed + sag - held_point.residual);
+        let residual = pushed + held_point.sag;
+        residual_work += force.dot(residual - held_point.residual);
         residual_energy += 0.5 * force.dot(pushed);
         input += active[at].force.dot(travel + (active[at].end_arm - active[at].start_arm));
-        held_point.residual = pushed + sag;
+        held_point.residual = residual;
         held_point.displacement = active[at].displacement;
         held_point.force = force;
         held_point.force_in_world = active[at].force;

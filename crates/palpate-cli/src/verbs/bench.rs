@@ -47,7 +47,7 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure("--steps is 0, expected 1 or more".into()));
     }
     let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
-        Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?.0))
+        Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?))
     };
     let mut cases = Vec::new();
     for &cells in &arguments.cells {

@@ -58,7 +58,8 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let output = &arguments.output;
     std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
     let recording_path = output.join("cube.palp");
-    let (recording, bytes) = cached_cube(12, 200, arguments.cache.as_deref())?;
+    let recording = cached_cube(12, 200, arguments.cache.as_deref())?;
+    let bytes = recording.to_bytes()?;
     write_whole(&recording_path, &bytes)?;
     print("An elastic cube, 10 cm and 110 g, as soft as jelly:\n\n")?;
     inspect::print_for_person(&recording, &recording_path, bytes.len())?;
@@ -135,34 +136,32 @@ fn shake_path(side: f64) -> String {
     text
 }
 
-/// The paper's cube from the cache, or recorded into it. Gives the file's bytes too.
-pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<(Recording, Vec<u8>), Failure> {
+/// The paper's cube from the cache, or recorded into it.
+pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Recording, Failure> {
     let folder = cache.map(Path::to_path_buf).or_else(cache_folder);
     let name = format!("cube-{cells}-{modes}-{}.palp", env!("CARGO_PKG_VERSION"));
     let path = folder.as_ref().map(|folder| folder.join(name));
     if let Some(recording) = path.as_deref().and_then(|path| read_recording(path).ok()) {
-        let bytes = recording.to_bytes()?;
-        return Ok((recording, bytes));
+        return Ok(recording);
     }
-    eprintln!(
+    crate::tell(&format!(
         "recording the paper's cube, {cells}³ cells, {modes} modes (once; it is kept for the next time)"
-    );
+    ));
     let mut progress = Quiet(Bars::new());
     let mesh = box_mesh([0.1; 3], [cells; 3])?;
     let recording = record(mesh, &paper_cube(cells, modes), &mut progress)?.recording;
     progress.0.finish();
-    let bytes = recording.to_bytes()?;
     // A cache that can't be written costs time the next time, nothing else.
     if let (Some(folder), Some(path)) = (folder, path)
         && std::fs::create_dir_all(&folder).is_ok()
-        && write_whole(&path, &bytes).is_err()
+        && write_whole(&path, &recording.to_bytes()?).is_err()
     {
         crate::tell(&format!(
             "warning: {} cannot be written, so the cube will be recorded again",
             path.display()
         ));
     }
-    Ok((recording, bytes))
+    Ok(recording)
 }
 
 /// Bars without remarks: the paper's linear elements are what is wanted here.

@@ -202,7 +202,6 @@ impl Summary {
         let (all, now) = (&mut self.status, &output.status);
         all.solver_residual_m = all.solver_residual_m.max(now.solver_residual_m);
         all.iterations = all.iterations.max(now.iterations);
-        all.rejected_devices = all.rejected_devices.max(now.rejected_devices);
         all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
     }
 

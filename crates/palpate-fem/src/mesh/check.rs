@@ -157,7 +157,7 @@ fn turn_upright(mesh: &mut Mesh) -> Result<(), MeshError> {
     let (mut turned, mut flat) = (0, Vec::new());
     for (number, tet) in mesh.tets.iter_mut().enumerate() {
         let corners = tet.map(|n| mesh.nodes[n as usize]);
-        let edges = super::super::element::EDGES.map(|[a, b]| (corners[a] - corners[b]).length());
+        let edges = crate::element::EDGES.map(|[a, b]| (corners[a] - corners[b]).length());
         let longest = edges.into_iter().fold(0.0, f64::max);
         let volume = tet_volume(&mesh.nodes, tet);
         // Beyond 1e100 m a volume overflows: that is no size either.
@@ -187,7 +187,6 @@ fn turn_upright(mesh: &mut Mesh) -> Result<(), MeshError> {
 
 /// Each face must join at most two tetrahedra, on opposite sides.
 fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
-    let (mut doubled, mut crowded, mut folded) = (Vec::new(), Vec::new(), Vec::new());
     let mut sorted: Vec<_> = mesh
         .tets
         .iter()
@@ -199,8 +198,9 @@ fn check_faces(mesh: &Mesh, faces: &[Face]) -> Result<(), MeshError> {
         })
         .collect();
     sorted.sort_unstable();
-    doubled
-        .extend(sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| (pair[0].1, pair[1].1)));
+    let same_nodes = sorted.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+    let doubled: Vec<_> = same_nodes.map(|pair| (pair[0].1, pair[1].1)).collect();
+    let (mut crowded, mut folded) = (Vec::new(), Vec::new());
     for same in faces.chunk_by(|a, b| a.0 == b.0) {
         match same {
             [_] => {}
@@ -317,10 +317,8 @@ fn remark_on_size(mesh: &mut Mesh, extent: DVec3) {
 fn remark_on_quality(mesh: &mut Mesh) {
     let quality = |tet: &[u32; 4]| {
         let corners = tet.map(|n| mesh.nodes[n as usize]);
-        let squares: f64 = super::super::element::EDGES
-            .iter()
-            .map(|&[a, b]| (corners[a] - corners[b]).length_squared())
-            .sum();
+        let squares: f64 =
+            crate::element::EDGES.iter().map(|&[a, b]| (corners[a] - corners[b]).length_squared()).sum();
         12.0 * (3.0 * tet_volume(&mesh.nodes, tet)).powf(2.0 / 3.0) / squares
     };
     let worst = mesh.tets.iter().enumerate().map(|(number, tet)| (number, quality(tet)));

@@ -20,6 +20,9 @@ pub(crate) struct HeldPoint {
     pub(crate) displacement: DVec3,
     /// The residual compliance's part of it [m].
     pub(crate) residual: DVec3,
+    /// Residual displacement under the body's weight [m]; it lasts as long as the grasp, since only bodies that stay
+    /// where they are have one.
+    pub(crate) sag: DVec3,
     /// Force on the object, held over the last step [N].
     pub(crate) force: DVec3,
     /// The same in world axes.
@@ -122,6 +125,7 @@ impl HeldPoints {
             rest: recording.surface.rest_position(&grasp.point),
             displacement: project_rows(self.rows(device, m), q) + residual,
             residual,
+            sag,
             ..HeldPoint::default()
         };
 
