@@ -4,11 +4,14 @@
 //! input is bad or a check failed; 2: the command line is wrong.
 
 mod csv;
+mod dense;
 mod failure;
 mod path;
 mod plot;
 mod progress;
+mod report;
 mod scene_file;
+mod selection;
 mod source;
 mod verbs;
 mod verification;

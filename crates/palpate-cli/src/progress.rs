@@ -18,6 +18,16 @@ impl Bars {
         Self { bar: None, stage: None, interactive: std::io::stderr().is_terminal() }
     }
 
+    /// Counts units of the present stage from any thread.
+    pub fn counter(&self) -> impl Fn(usize) + Sync + use<> {
+        let bar = self.bar.clone();
+        move |units| {
+            if let Some(bar) = &bar {
+                bar.inc(units as u64);
+            }
+        }
+    }
+
     /// The last stage is done.
     pub fn finish(&mut self) {
         if let Some(bar) = self.bar.take() {

@@ -4,9 +4,11 @@ use crate::Failure;
 use crate::path::DevicePath;
 use glam::{DQuat, DVec3};
 use palpate::{
-    Grasp, Model, ModelParameters, MotionRule, ObjectStart, Pose, Recording, RigidCompliance, Twist,
+    Grasp, Model, ModelObject, ModelParameters, MotionRule, ObjectStart, Pose, Recording, ResponseForm,
+    RigidCompliance, Twist,
 };
 use palpate_fem::certificate::DOUBTFUL;
+use palpate_store::{Location, TableStore};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 use std::ops::Range;
@@ -58,6 +60,8 @@ struct SceneFile {
 struct ObjectEntry {
     name: Spanned<String>,
     recording: Spanned<PathBuf>,
+    response: Option<Spanned<String>>,
+    table: Option<Spanned<PathBuf>>,
     #[serde(default)]
     position: Numbers<3>,
     #[serde(default = "identity")]
@@ -169,9 +173,11 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
         file.object.iter().map(|o| &o.get_ref().name).chain(file.device.iter().map(|d| &d.get_ref().name));
     check_names(&source, names)?;
 
+    let step_s = *file.step.get_ref();
+    let gravity = DVec3::from_array(file.gravity.0);
     let mut objects = Vec::new();
     for entry in &file.object {
-        objects.push(read_object(&source, entry)?);
+        objects.push(read_object(&source, entry, step_s, gravity)?);
     }
     let object_names: Vec<String> = file.object.iter().map(|o| o.get_ref().name.get_ref().clone()).collect();
     let mut remarks = Vec::new();
@@ -194,8 +200,6 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
     } else {
         RigidCompliance::Dropped
     };
-    let step_s = *file.step.get_ref();
-    let gravity = DVec3::from_array(file.gravity.0);
     let parameters = ModelParameters { step_s, gravity, motion, rigid_compliance, devices: devices.len() };
     // Objects and gravity have been checked where they stand: what is left to be wrong is the step.
     let model = Model::new(parameters, objects).or_else(|e| source.fail(file.step.span(), e))?;
@@ -225,14 +229,11 @@ fn check_names<'a>(source: &Source, names: impl Iterator<Item = &'a Spanned<Stri
 fn read_object(
     source: &Source,
     entry: &Spanned<ObjectEntry>,
-) -> Result<(Arc<Recording>, ObjectStart), Failure> {
+    step_s: f64,
+    gravity: DVec3,
+) -> Result<ModelObject, Failure> {
     let object = entry.get_ref();
-    let place = object.recording.span();
-    let path = source.relative(object.recording.get_ref());
-    let recording = match crate::verbs::read_recording(&path) {
-        Ok(recording) => recording,
-        Err(failure) => return source.fail(place, failure),
-    };
+    let (recording, response) = read_responses(source, object)?;
     let [w, x, y, z] = object.orientation.0;
     let start = ObjectStart {
         pose: Pose {
@@ -244,19 +245,83 @@ fn read_object(
             angular: DVec3::from_array(object.angular_velocity.0),
         },
     };
-    // Tried on its own, so that the line is that of this object.
-    let recording = Arc::new(recording);
-    if let Err(error) = Model::new(ModelParameters::default(), vec![(recording.clone(), start)]) {
+    // Tried on its own, so that the line is that of this object; a bad step is told of elsewhere.
+    let model_object = ModelObject { recording, response, start };
+    let usual = ModelParameters::default();
+    let step_s = if step_s > 0.0 && step_s <= 1.0 { step_s } else { usual.step_s };
+    let parameters = ModelParameters { step_s, gravity, ..usual };
+    if let Err(error) = Model::new(parameters, vec![model_object.clone()]) {
         let what = error.to_string().replacen("object 0: ", "", 1);
         return source.fail(object.name.span(), format!("object {:?}: {what}", object.name.get_ref()));
     }
-    Ok((recording, start))
+    Ok(model_object)
+}
+
+/// The body and the form of its response: a recording file, a store of impulse responses, or both.
+fn read_responses(source: &Source, object: &ObjectEntry) -> Result<(Arc<Recording>, ResponseForm), Failure> {
+    let path = source.relative(object.recording.get_ref());
+    let place = object.recording.span();
+    let form = object.response.as_ref().map(|form| (form.get_ref().as_str(), form.span()));
+    let fir = match form {
+        None => path.is_dir(),
+        Some(("modal", _)) if path.is_dir() => {
+            return source.fail(
+                place,
+                "response = \"modal\" needs a recording file (.palp); this is a store of impulse responses",
+            );
+        }
+        Some(("modal", _)) => false,
+        Some(("fir", _)) => true,
+        Some((other, span)) => {
+            return source.fail(span, format!("response is {other:?}, expected \"modal\" or \"fir\""));
+        }
+    };
+    if let (Some(table), false) = (&object.table, fir) {
+        return source.fail(table.span(), "a table is used with response = \"fir\" only");
+    }
+    if !fir {
+        let recording = crate::verbs::read_recording(&path).or_else(|e| source.fail(place, e))?;
+        return Ok((Arc::new(recording), ResponseForm::Modal));
+    }
+    let (table, table_place) = match &object.table {
+        Some(table) => (source.relative(table.get_ref()), table.span()),
+        None if path.is_dir() => (path.clone(), place.clone()),
+        None => (path.with_extension("zarr"), place.clone()),
+    };
+    if !table.exists() {
+        return source.fail(
+            table_place,
+            format!(
+                "response = \"fir\" needs a store of impulse responses, and there is no {}: make one with `palpate record … \
+                 --dense`, and name it with table = \"…\"",
+                table.display()
+            ),
+        );
+    }
+    let loaded = TableStore::open(&Location::Folder(table)).and_then(TableStore::load);
+    let (body, table) = loaded.or_else(|e| source.fail(table_place.clone(), e))?;
+    let recording = if path.is_dir() {
+        body
+    } else {
+        let recording = crate::verbs::read_recording(&path).or_else(|e| source.fail(place, e))?;
+        if recording.metadata.provenance.mesh_hash != body.metadata.provenance.mesh_hash {
+            return source.fail(
+                table_place,
+                format!(
+                    "the store is of another mesh ({}) than the recording ({})",
+                    body.metadata.provenance.source, recording.metadata.provenance.source
+                ),
+            );
+        }
+        recording
+    };
+    Ok((Arc::new(recording), ResponseForm::Fir(Arc::new(table))))
 }
 
 fn read_device(
     source: &Source,
     device: &DeviceEntry,
-    objects: &[(Arc<Recording>, ObjectStart)],
+    objects: &[ModelObject],
     object_names: &[String],
     remarks: &mut Vec<String>,
 ) -> Result<SceneDevice, Failure> {
@@ -273,7 +338,7 @@ fn read_device(
             format!("there is no object {wanted:?}; the scene has {known}"),
         );
     };
-    let (recording, start) = &objects[object];
+    let ModelObject { recording, response, start } = &objects[object];
     let point_span = device.attach.point.span();
     let point = DVec3::from_array(device.attach.point.get_ref().0);
     let nearest = recording.surface.nearest(point);
@@ -292,11 +357,19 @@ fn read_device(
         }
         None => return source.fail(point_span, format!("the object {wanted:?} has no surface")),
     };
-    if !recording.is_movable(&grasp.point) {
-        return source.fail(
-            point_span,
-            format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
-        );
+    match response {
+        ResponseForm::Modal if !recording.is_movable(&grasp.point) => {
+            return source.fail(
+                point_span,
+                format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
+            );
+        }
+        ResponseForm::Modal => {}
+        ResponseForm::Fir(table) => {
+            if let Err(error) = table.prepare(&recording.surface, &grasp.point) {
+                return source.fail(point_span, format!("device {name:?} on {wanted:?}: {error}"));
+            }
+        }
     }
     let file = &device.path.file;
     let path = match DevicePath::read(&source.relative(file.get_ref())) {
@@ -331,11 +404,11 @@ fn check_grasps(source: &Source, file: &SceneFile, devices: &[SceneDevice]) -> R
 
 /// Recordings whose own certificate says that their forces can't be trusted.
 fn doubtful_recordings<'a>(
-    objects: &'a [(Arc<Recording>, ObjectStart)],
+    objects: &'a [ModelObject],
     names: &'a [String],
 ) -> impl Iterator<Item = String> + 'a {
-    objects.iter().zip(names).filter_map(move |((recording, _), name)| {
-        let certificate = recording.metadata.certificate.as_ref()?;
+    objects.iter().zip(names).filter_map(move |(object, name)| {
+        let certificate = object.recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
         (error > DOUBTFUL).then(|| {
             format!(

@@ -1,7 +1,7 @@
 //! Where a mesh comes from: a primitive's text or a file.
 
 use crate::Failure;
-use palpate_fem::mesh::{Mesh, NodeGroup, ball_mesh, box_mesh, gmsh, vtk};
+use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh, gmsh, vtk};
 use std::path::Path;
 
 /// Read or make a mesh.
@@ -51,71 +51,6 @@ fn triple<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
     parts.ok()?.try_into().ok()
 }
 
-/// Nodes of the mesh that `--fix` means: a named group, or a condition like `x<0.001 & z>=0`.
-pub fn selected_nodes(mesh: &Mesh, selection: &str) -> Result<Vec<u32>, Failure> {
-    if let Some(NodeGroup { nodes, .. }) = mesh.groups.iter().find(|group| group.name == selection) {
-        return Ok(nodes.clone());
-    }
-    let conditions: Option<Vec<Condition>> = selection.split('&').map(Condition::parse).collect();
-    let Some(conditions) = conditions else {
-        let groups: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
-        let known = if groups.is_empty() {
-            "the mesh names no groups".into()
-        } else {
-            format!("the mesh has the groups {}", groups.join(", "))
-        };
-        return Err(Failure(format!(
-            "--fix {selection:?} is neither a group of the mesh nor a condition such as 'x<0.001' or 'y>=0.1 & z<0'; {known}"
-        )));
-    };
-    let holds = |node: &u32| {
-        let position = mesh.nodes[*node as usize].to_array();
-        conditions.iter().all(|condition| condition.holds(position))
-    };
-    let nodes: Vec<u32> = (0..mesh.nodes.len() as u32).filter(holds).collect();
-    if nodes.is_empty() {
-        let axis = |i: usize| {
-            let values = mesh.nodes.iter().map(|p| p.to_array()[i]);
-            format!(
-                "{:.6} … {:.6}",
-                values.clone().fold(f64::INFINITY, f64::min),
-                values.fold(f64::NEG_INFINITY, f64::max)
-            )
-        };
-        return Err(Failure(format!(
-            "--fix {selection:?} selects no node; the mesh spans x {}, y {}, z {} m",
-            axis(0),
-            axis(1),
-            axis(2)
-        )));
-    }
-    Ok(nodes)
-}
-
-struct Condition {
-    axis: usize,
-    below: bool,
-    or_equal: bool,
-    bound: f64,
-}
-
-impl Condition {
-    fn parse(text: &str) -> Option<Self> {
-        let at = text.find(['<', '>'])?;
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == text[..at].trim())?;
-        let rest = &text[at + 1..];
-        let or_equal = rest.starts_with('=');
-        let bound: f64 = rest.trim_start_matches('=').trim().parse().ok()?;
-        Some(Self { axis, below: text[at..].starts_with('<'), or_equal, bound })
-    }
-
-    fn holds(&self, position: [f64; 3]) -> bool {
-        let value = position[self.axis];
-        (self.or_equal && value == self.bound)
-            || if self.below { value < self.bound } else { value > self.bound }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,22 +70,5 @@ mod tests {
         assert!(text(mesh("sphere:x/2")).contains("write sphere:RADIUS/N"));
         assert!(text(mesh("cow.stl")).contains("no mesh that palpate reads"));
         assert!(text(mesh("no-such-file.msh")).starts_with("cannot read mesh no-such-file.msh"));
-    }
-
-    #[test]
-    fn conditions_and_groups_select_nodes() {
-        let mut mesh = mesh("box:1x1x1/2x2x2").expect("a good box");
-        mesh.groups.push(NodeGroup { name: "foot".into(), nodes: vec![3, 4] });
-        assert_eq!(selected_nodes(&mesh, "foot").ok(), Some(vec![3, 4]));
-        assert_eq!(selected_nodes(&mesh, "x<-0.4").map(|n| n.len()).ok(), Some(9));
-        assert_eq!(selected_nodes(&mesh, "x<=-0.5 & y > 0.4").map(|n| n.len()).ok(), Some(3));
-        assert_eq!(
-            text(selected_nodes(&mesh, "x<-4")),
-            "--fix \"x<-4\" selects no node; the mesh spans x -0.500000 … 0.500000, y -0.500000 … 0.500000, z -0.500000 … 0.500000 m"
-        );
-        assert_eq!(
-            text(selected_nodes(&mesh, "hand")),
-            "--fix \"hand\" is neither a group of the mesh nor a condition such as 'x<0.001' or 'y>=0.1 & z<0'; the mesh has the groups foot"
-        );
     }
 }

@@ -83,6 +83,27 @@ impl Discretisation {
         self.elements.chunks_exact(self.order.nodes())
     }
 
+    /// Whether each node is among some nodes of the mesh; a mid-edge node is when both ends of its edge are.
+    pub fn among(&self, mesh_nodes: &[u32]) -> Vec<bool> {
+        let mut chosen = vec![false; self.nodes.len()];
+        for &node in mesh_nodes {
+            if let Some(Some(node)) = self.node_of_mesh.get(node as usize) {
+                chosen[*node as usize] = true;
+            }
+        }
+        if self.order == Order::Quadratic {
+            let ends = chosen.clone();
+            for nodes in self.element_nodes() {
+                for (middle, [a, b]) in nodes[4..].iter().zip(EDGES) {
+                    if ends[nodes[a] as usize] && ends[nodes[b] as usize] {
+                        chosen[*middle as usize] = true;
+                    }
+                }
+            }
+        }
+        chosen
+    }
+
     /// Nodes on the boundary, ascending.
     pub fn surface_nodes(&self) -> Vec<u32> {
         let mut nodes: Vec<u32> = self.triangles.iter().flatten().copied().collect();

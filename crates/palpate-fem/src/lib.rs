@@ -17,3 +17,5 @@ pub mod record;
 pub mod reference;
 pub mod residual;
 pub mod system;
+pub mod table;
+pub mod transient;

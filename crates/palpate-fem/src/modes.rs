@@ -21,6 +21,13 @@ pub struct Modes {
     pub shapes: Mat<f64>,
 }
 
+impl Modes {
+    /// No modes.
+    pub(crate) fn none(system: &System) -> Self {
+        Self { squares: Vec::new(), shapes: Mat::zeros(system.discretisation.dofs(), 0) }
+    }
+}
+
 /// Why modes could not be found.
 #[derive(Debug, thiserror::Error)]
 pub enum ModesError {

@@ -34,6 +34,20 @@ pub struct RecordParameters {
     pub fixed_nodes: Vec<u32>,
     /// Where the mesh came from, for the file.
     pub source: String,
+    /// How much is computed.
+    pub extent: Extent,
+}
+
+/// How much of a recording is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Extent {
+    /// Modes, residual compliance and certificate.
+    #[default]
+    Whole,
+    /// Without the certificate: for tables in closed form.
+    Uncertified,
+    /// The body alone, without modes: for tables by time integration.
+    Body,
 }
 
 /// Why no recording could be made.
@@ -103,14 +117,15 @@ pub fn record(
     let system = System::new(discretisation, assembly, fixed_nodes)?;
     progress.advance(2);
 
-    let wanted = parameters.modes.min(system.elastic_modes());
-    if wanted < parameters.modes {
+    let body_only = parameters.extent == Extent::Body;
+    let wanted = if body_only { 0 } else { parameters.modes.min(system.elastic_modes()) };
+    if wanted < parameters.modes && !body_only {
         progress.remark(&format!(
             "{} modes are wanted, the model has {wanted} elastic modes: all of them are kept",
             parameters.modes
         ));
     }
-    let modes = lowest_modes(&system, wanted, progress)?;
+    let modes = if body_only { Modes::none(&system) } else { lowest_modes(&system, wanted, progress)? };
     let surface_nodes = system.discretisation.surface_nodes();
     let surface = surface(&system, &surface_nodes);
     let residual = residual_compliance(
@@ -118,12 +133,16 @@ pub fn record(
         &modes,
         &surface_nodes,
         surface.mean_edge(),
-        parameters.residual,
+        if body_only { ResidualChoice::None } else { parameters.residual },
         progress,
     );
-    let certificate =
-        certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)?;
-    remark_on_certificate(&certificate, progress);
+    let mut stated = None;
+    if parameters.extent == Extent::Whole {
+        let certificate =
+            certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)?;
+        remark_on_certificate(&certificate, progress);
+        stated = Some(certificate);
+    }
 
     let free = system.fixed_nodes.is_empty();
     let metadata = Metadata {
@@ -140,7 +159,7 @@ pub fn record(
             fixed_nodes: system.fixed_nodes.len() as u64,
         },
         mass: system.mass.clone(),
-        certificate: Some(certificate),
+        certificate: stated,
         provenance: Provenance {
             source: parameters.source.clone(),
             mesh_hash: mesh_hash(&mesh),
@@ -227,23 +246,7 @@ fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress)
 
 /// Nodes of the discretisation that are fixed, from nodes of the mesh.
 fn fixed_nodes(discretisation: &Discretisation, wanted: &[u32]) -> Result<Vec<u32>, RecordError> {
-    let mut fixed = vec![false; discretisation.nodes.len()];
-    for &node in wanted {
-        if let Some(Some(node)) = discretisation.node_of_mesh.get(node as usize) {
-            fixed[*node as usize] = true;
-        }
-    }
-    // A mid-edge node is fixed when both ends of its edge are.
-    if discretisation.order == Order::Quadratic {
-        let ends: Vec<bool> = fixed.clone();
-        for nodes in discretisation.element_nodes() {
-            for (middle, [a, b]) in nodes[4..].iter().zip(crate::element::EDGES) {
-                if ends[nodes[a] as usize] && ends[nodes[b] as usize] {
-                    fixed[*middle as usize] = true;
-                }
-            }
-        }
-    }
+    let fixed = discretisation.among(wanted);
     if !wanted.is_empty() && !fixed.contains(&true) {
         return Err(RecordError::Option("the nodes to fix belong to no tetrahedron".into()));
     }

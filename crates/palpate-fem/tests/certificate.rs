@@ -4,7 +4,7 @@ use palpate::{Certificate, Damping, Material};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::Silent;
-use palpate_fem::record::{RecordParameters, record};
+use palpate_fem::record::{Extent, RecordParameters, record};
 use palpate_fem::residual::ResidualChoice;
 
 fn clamped_bar(residual: ResidualChoice, modes: usize) -> Certificate {
@@ -23,6 +23,7 @@ fn clamped_bar(residual: ResidualChoice, modes: usize) -> Certificate {
         residual,
         fixed_nodes: left.collect(),
         source: "bar".into(),
+        extent: Extent::Whole,
     };
     let recorded = record(mesh.clone(), &parameters, &mut Silent).expect("a good bar");
     recorded.recording.metadata.certificate.expect("a certificate")

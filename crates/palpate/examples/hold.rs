@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
+    Twist, step,
 };
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let parameters = ModelParameters { devices: 1, ..ModelParameters::default() };
-    let model = Model::new(parameters, vec![(Arc::new(block), start)])?;
+    let model = Model::new(parameters, vec![ModelObject::new(Arc::new(block), start)])?;
     let mut state = State::new(&model);
     let output = step(&model, &mut state, &input);
     println!("{:.5} N", output.devices[0].force_on_hand.x);

@@ -42,11 +42,12 @@ pub use energy::EnergyLedger;
 pub use error::Error;
 pub use motion::MotionRule;
 pub use recording::{
-    Certificate, CertificateEvent, Damping, FORMAT_VERSION, GravityResponse, MassProperties, Material,
-    MeshCounts, Metadata, ModalBasis, NearField, Provenance, Recording, ResidualCompliance, Support,
+    Certificate, CertificateEvent, Column, ColumnsInMemory, Damping, FORMAT_VERSION, GravityResponse,
+    ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField,
+    Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
-pub use response::{HeldOscillator, Oscillation};
-pub use scene::{Model, ModelParameters, ObjectStart, RigidCompliance};
+pub use response::{HeldOscillator, Oscillation, ResponseForm};
+pub use scene::{Model, ModelObject, ModelParameters, ObjectStart, RigidCompliance};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
 pub use state::{DeviceInput, DeviceOutput, Input, ObjectOutput, Output, State, StepStatus};
 pub use step::step;

@@ -4,7 +4,7 @@ use crate::contact::Grasp;
 use crate::error::Error;
 use crate::motion::{Inertia, MotionRule};
 use crate::recording::{Recording, Support};
-use crate::response::SampledModes;
+use crate::response::{Response, ResponseForm};
 use crate::spatial::{Pose, Twist};
 use alloc::format;
 use alloc::sync::Arc;
@@ -58,11 +58,29 @@ pub struct ObjectStart {
     pub twist: Twist,
 }
 
+/// An object to be put into a scene.
+#[derive(Debug, Clone)]
+pub struct ModelObject {
+    /// The body.
+    pub recording: Arc<Recording>,
+    /// Which form of its response is used.
+    pub response: ResponseForm,
+    /// Where it is at the start.
+    pub start: ObjectStart,
+}
+
+impl ModelObject {
+    /// An object with the modal form of its response.
+    pub fn new(recording: Arc<Recording>, start: ObjectStart) -> Self {
+        Self { recording, response: ResponseForm::Modal, start }
+    }
+}
+
 /// One object of a scene.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneObject {
     pub(crate) recording: Arc<Recording>,
-    pub(crate) modes: SampledModes,
+    pub(crate) response: Response,
     /// None for a body with fixed nodes.
     pub(crate) inertia: Option<Inertia>,
     pub(crate) start: ObjectStart,
@@ -82,10 +100,7 @@ impl Model {
     ///
     /// # Errors
     /// When a number is out of its range; the text names it.
-    pub fn new(
-        parameters: ModelParameters,
-        objects: Vec<(Arc<Recording>, ObjectStart)>,
-    ) -> Result<Self, Error> {
+    pub fn new(parameters: ModelParameters, objects: Vec<ModelObject>) -> Result<Self, Error> {
         let h = parameters.step_s;
         if !(h > 0.0 && h <= 1.0) {
             return Err(Error::Model(format!("step is {h} s, expected above 0 and at most 1")));
@@ -95,7 +110,7 @@ impl Model {
         }
         let objects = objects.into_iter().enumerate();
         let objects: Result<_, _> =
-            objects.map(|(at, (recording, start))| SceneObject::new(at, recording, start, h)).collect();
+            objects.map(|(at, object)| SceneObject::new(at, object, &parameters)).collect();
         Ok(Self { parameters, objects: objects? })
     }
 
@@ -116,14 +131,17 @@ impl Model {
             (grasp.point.triangle as usize) < object.recording.surface.triangles.len()
                 && libm::fabs(a + b + c - 1.0) < 1e-9
                 && [a, b, c].iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))
+                && object.response.accepts(&grasp.point)
         })
     }
 }
 
 impl SceneObject {
-    fn new(at: usize, recording: Arc<Recording>, start: ObjectStart, h: f64) -> Result<Self, Error> {
+    fn new(at: usize, object: ModelObject, parameters: &ModelParameters) -> Result<Self, Error> {
+        let ModelObject { recording, response, start } = object;
         let ObjectStart { mut pose, twist } = start;
-        let fail = |what| Err(Error::Model(format!("object {at}: {what}")));
+        let refusal = |what| Error::Model(format!("object {at}: {what}"));
+        let fail = |what| Err(refusal(what));
         let norm = pose.orientation.length();
         if !(0.99..=1.01).contains(&norm) {
             return fail(format!("orientation has length {norm}, expected a unit quaternion w, x, y, z"));
@@ -139,9 +157,15 @@ impl SceneObject {
             }
             Support::Fixed => None,
         };
-        let modes = SampledModes::new(&recording.modes, h);
+        let response = Response::new(&recording, response, parameters.step_s)
+            .map_err(|error| refusal(format!("{error}")))?;
+        if inertia.is_none() && parameters.gravity != DVec3::ZERO && !response.knows_gravity() {
+            return fail(
+                "has fixed nodes, and its impulse response does not tell how it sags under gravity".into(),
+            );
+        }
         let radius = recording.surface.radius();
-        Ok(Self { recording, modes, inertia, start: ObjectStart { pose, twist }, radius })
+        Ok(Self { recording, response, inertia, start: ObjectStart { pose, twist }, radius })
     }
 
     /// Gravity [m/s²] in body axes.

@@ -3,7 +3,7 @@
 use crate::contact::{Grasp, HeldPoints, HeldSystem};
 use crate::energy::EnergyLedger;
 use crate::motion::RigidState;
-use crate::response::Oscillation;
+use crate::response::{ModalPoints, Oscillation, ResponseState};
 use crate::scene::{Model, SceneObject};
 use crate::spatial::{Pose, Twist};
 use alloc::vec;
@@ -82,7 +82,7 @@ pub struct Output {
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectState {
     pub(crate) rigid: RigidState,
-    pub(crate) modes: Vec<Oscillation>,
+    pub(crate) response: ResponseState,
     pub(crate) ledger: EnergyLedger,
     pub(crate) stored_at_start: f64,
 }
@@ -91,8 +91,6 @@ pub(crate) struct ObjectState {
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
     pub(crate) system: HeldSystem,
-    pub(crate) free_modes: Vec<f64>,
-    pub(crate) modal_forces: Vec<f64>,
     pub(crate) active: Vec<ActivePoint>,
 }
 
@@ -124,6 +122,7 @@ pub struct State {
     pub(crate) steps: u64,
     pub(crate) objects: Vec<ObjectState>,
     pub(crate) held: HeldPoints,
+    pub(crate) modal_points: ModalPoints,
     pub(crate) workspace: Workspace,
     pub(crate) output: Output,
 }
@@ -132,9 +131,9 @@ impl State {
     /// The scene at its start: undeformed, with all buffers that steps will need.
     pub fn new(model: &Model) -> Self {
         let devices = model.parameters.devices;
-        let most_modes = model.objects.iter().map(|o| o.modes.oscillators.len()).max().unwrap_or(0);
+        let most_modes = model.objects.iter().map(|o| o.response.modes()).max().unwrap_or(0);
         let objects: Vec<_> =
-            model.objects.iter().map(|o| ObjectState::new(o, model.parameters.gravity)).collect();
+            model.objects.iter().map(|o| ObjectState::new(o, devices, model.parameters.gravity)).collect();
         let object_outputs = model.objects.iter().zip(&objects).map(|(object, state)| ObjectOutput {
             pose: state.rigid.pose,
             twist: object.start.twist,
@@ -150,13 +149,9 @@ impl State {
         Self {
             steps: 0,
             objects,
-            held: HeldPoints::new(devices, most_modes),
-            workspace: Workspace {
-                system: HeldSystem::new(devices),
-                free_modes: vec![0.0; most_modes],
-                modal_forces: vec![0.0; most_modes],
-                active: Vec::with_capacity(devices),
-            },
+            held: HeldPoints::new(devices),
+            modal_points: ModalPoints::new(devices, most_modes),
+            workspace: Workspace { system: HeldSystem::new(devices), active: Vec::with_capacity(devices) },
             output,
         }
     }
@@ -166,43 +161,27 @@ impl State {
         &self.output
     }
 
-    /// Modal coordinates q [m·√kg] of an object and their rates.
+    /// Modal coordinates q [m·√kg] of an object and their rates; none for one that uses a table.
     pub fn modal_state(&self, object: usize) -> &[Oscillation] {
-        &self.objects[object].modes
+        self.objects[object].response.modes()
     }
 
-    /// Elastic displacement [m, body] of every surface node of an object at the end of the last
-    /// step, u = Φ·q + S·f. Costs nodes × modes: for pictures, beside the force.
+    /// Elastic displacement [m, body] of every surface node of an object at the end of the last step. Costs nodes ×
+    /// modes, with a table nodes × forces of the last T steps: for pictures, beside the force.
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, object: usize, out: &mut [DVec3]) {
-        let scene_object = &model.objects[object];
-        let recording = &*scene_object.recording;
+        let SceneObject { recording, response, .. } = &model.objects[object];
         assert_eq!(out.len(), recording.surface.positions.len(), "one entry per surface node");
         let state = &self.objects[object];
-        let gravity = scene_object.gravity_in_body(model.parameters.gravity, &state.rigid.pose);
-        for (node, u) in out.iter_mut().enumerate() {
-            let part = |axis: usize| -> f64 {
-                recording.modes.row(node, axis).iter().zip(&state.modes).map(|(phi, mode)| phi * mode.q).sum()
-            };
-            *u = DVec3::new(part(0), part(1), part(2));
-            if let Some(response) = &recording.gravity {
-                *u += response.residual_displacement(node, gravity);
-            }
-            for point in &self.held.points {
-                if let Some(grasp) = point.grasp.filter(|grasp| grasp.object == object) {
-                    for (corner, weight) in recording.surface.corners(&grasp.point) {
-                        *u += recording.residual.block(node, corner) * point.force * weight;
-                    }
-                }
-            }
-        }
+        let gravity = model.objects[object].gravity_in_body(model.parameters.gravity, &state.rigid.pose);
+        state.response.surface_displacement(response, recording, gravity, out);
     }
 }
 
 impl ObjectState {
-    fn new(object: &SceneObject, gravity: DVec3) -> Self {
+    fn new(object: &SceneObject, devices: usize, gravity: DVec3) -> Self {
         let twist = object.start.twist;
         let pose = object.start.pose;
         let angular_momentum = object
@@ -210,7 +189,7 @@ impl ObjectState {
             .map_or(DVec3::ZERO, |inertia| inertia.angular_momentum(pose.orientation, twist.angular));
         let mut state = Self {
             rigid: RigidState { pose, velocity: twist.linear, angular_momentum },
-            modes: vec![Oscillation::default(); object.modes.oscillators.len()],
+            response: object.response.at_rest(devices),
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };
@@ -223,20 +202,21 @@ impl ObjectState {
     ///
     /// # Real time
     pub(crate) fn weigh(&mut self, object: &SceneObject, gravity: DVec3) {
-        let (kinetic, elastic) = object.modes.energy(&self.modes);
+        let elastic = self.response.energy(&object.response);
         let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
         let mut potential = -object.recording.mass() * gravity.dot(self.rigid.pose.position);
         if let Some(response) = &object.recording.gravity {
             let acceleration = object.gravity_in_body(gravity, &self.rigid.pose);
-            let m = self.modes.len();
+            let modes = self.response.modes();
             for (axis, a) in acceleration.to_array().into_iter().enumerate() {
-                let loads = &response.modal_forces[axis * m..][..m];
-                let work: f64 = loads.iter().zip(&self.modes).map(|(p, mode)| p * mode.q).sum();
+                let loads = &response.modal_forces[axis * modes.len()..][..modes.len()];
+                let work: f64 = loads.iter().zip(modes).map(|(p, mode)| p * mode.q).sum();
                 potential -= a * work;
             }
         }
-        self.ledger.kinetic = kinetic + rigid;
-        self.ledger.elastic = elastic;
+        self.ledger.kinetic = elastic.kinetic + rigid;
+        self.ledger.elastic = elastic.elastic;
+        self.ledger.residual = elastic.residual;
         self.ledger.potential = potential;
     }
 }

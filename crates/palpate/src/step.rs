@@ -1,7 +1,7 @@
 //! One step of a scene, a function per stage.
 //!
 //! For each object: predict without new force; find the forces f that bring the held points to the
-//! hands at the end of the step; advance modes and rigid motion with f held; account for the energy.
+//! hands at the end of the step; advance deformation and rigid motion with f held; account for the energy.
 //!
 //! With R, R⁺ the orientation before and after, v = h·ω̄ the step's turn (see `motion`), a the
 //! deformed arm in body axes, and A = R·a, A⁺ = R⁺·a⁺ in world axes, the Cayley map gives
@@ -14,10 +14,10 @@
 //! f·(Δx + ΔA) at the hand is, exactly, the work on the rigid motion, f·Δx + τ·v, plus that on
 //! the deformation, g·Δa: the energy balance holds in every step, also while the body turns.
 
-use crate::contact::{Grasp, HeldPoints};
+use crate::contact::{Grasp, HeldPoint, HeldPoints};
 use crate::energy::EnergyLedger;
 use crate::motion::{RigidState, RigidStep};
-use crate::response::project_rows;
+use crate::response::{Acting, ModalPoints, Responding};
 use crate::scene::{Model, RigidCompliance, SceneObject};
 use crate::state::{ActivePoint, DeviceInput, Input, ObjectState, Output, State, StepStatus, Workspace};
 use glam::{DMat3, DVec3};
@@ -42,10 +42,10 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     state.output.status = StepStatus::default();
     take_grasps(model, state, input);
     for (at, object) in model.objects.iter().enumerate() {
-        let State { objects, held, workspace, output, .. } = &mut *state;
+        let State { objects, held, modal_points, workspace, output, .. } = &mut *state;
         let own = &mut objects[at];
         gather(at, own, held, input, workspace);
-        predict(model, object, own, held, workspace);
+        predict(model, object, own, modal_points, &mut workspace.active);
         let end = if workspace.active.is_empty() {
             advance_rigid(model, object, &own.rigid, DVec3::ZERO, DVec3::ZERO)
         } else {
@@ -54,7 +54,7 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
         if end.miss > UNSOLVED {
             output.status.unsolved_objects += 1;
         }
-        advance(model, object, own, held, workspace, &end);
+        advance(model, object, own, held, modal_points, &workspace.active, &end);
     }
     state.steps += 1;
     write_output(model, state, input);
@@ -68,41 +68,52 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<(&'i Dev
     (device_input.position.is_finite() && model.accepts(&grasp)).then_some((device_input, grasp))
 }
 
-/// Which point each device holds in this step; rows of those that are new.
+/// Which point each device holds in this step; those that are new are prepared.
 fn take_grasps(model: &Model, state: &mut State, input: &Input) {
-    state.held.begin();
+    let State { objects, held, modal_points, output, .. } = state;
     // Released points first, so that new ones don't couple to them.
-    for device in 0..state.held.points.len() {
+    for device in 0..held.points.len() {
         let wanted = usable(model, input, device).map(|(_, grasp)| grasp);
         let asked = input.devices.get(device).is_some_and(|d| d.grasp.is_some());
         if asked && wanted.is_none() {
-            state.output.status.rejected_devices += 1;
+            output.status.rejected_devices += 1;
         }
-        if state.held.points[device].grasp != wanted {
-            state.held.release(device);
+        if held.points[device].grasp != wanted {
+            if let Some(grasp) = held.points[device].grasp {
+                objects[grasp.object].response.release(device);
+            }
+            held.points[device] = HeldPoint::default();
         }
     }
-    for device in 0..state.held.points.len() {
+    for device in 0..held.points.len() {
         let Some((_, grasp)) = usable(model, input, device) else {
             continue;
         };
-        if state.held.points[device].grasp.is_none() {
+        if held.points[device].grasp.is_none() {
             let object = &model.objects[grasp.object];
-            let own = &state.objects[grasp.object];
-            let sag = sag(model, object, own, &grasp);
-            state.held.hold(device, grasp, object, own.modes.iter().map(|mode| mode.q), sag);
+            let own = &mut objects[grasp.object];
+            held.points[device] = HeldPoint {
+                grasp: Some(grasp),
+                rest: object.recording.surface.rest_position(&grasp.point),
+                displacement: responding(model, object, own).hold(modal_points, device, &grasp.point),
+                force_in_world: DVec3::ZERO,
+            };
+            held.couple(device, &grasp, |(a, at), (b, other)| {
+                let points = ((a, &at.point), (b, &other.point));
+                object.response.compliance(&object.recording, modal_points, points.0, points.1)
+            });
         }
     }
 }
 
-/// Static displacement of a point under its body's weight, the part that modes miss [m, body].
-fn sag(model: &Model, object: &SceneObject, own: &ObjectState, grasp: &Grasp) -> DVec3 {
-    let Some(response) = &object.recording.gravity else {
-        return DVec3::ZERO;
-    };
-    let gravity = object.gravity_in_body(model.parameters.gravity, &own.rigid.pose);
-    let corners = object.recording.surface.corners(&grasp.point);
-    corners.iter().map(|&(node, weight)| response.residual_displacement(node, gravity) * weight).sum()
+/// The response of an object with its state.
+fn responding<'a>(model: &Model, object: &'a SceneObject, own: &'a mut ObjectState) -> Responding<'a> {
+    Responding {
+        response: &object.response,
+        recording: &object.recording,
+        gravity: object.gravity_in_body(model.parameters.gravity, &own.rigid.pose),
+        state: &mut own.response,
+    }
 }
 
 /// The held points of one object, with where their hands will be.
@@ -120,33 +131,18 @@ fn gather(at: usize, own: &ObjectState, held: &HeldPoints, input: &Input, worksp
     }
 }
 
-/// Stage 1: modal coordinates and held points at the end of the step without new force.
+/// Stage 1: the held points at the end of the step without new force.
 fn predict(
     model: &Model,
     object: &SceneObject,
-    own: &ObjectState,
-    held: &HeldPoints,
-    workspace: &mut Workspace,
+    own: &mut ObjectState,
+    modal_points: &mut ModalPoints,
+    active: &mut [ActivePoint],
 ) {
-    let m = own.modes.len();
-    let forces = &mut workspace.modal_forces[..m];
-    forces.fill(0.0);
-    if let Some(response) = &object.recording.gravity {
-        let gravity = object.gravity_in_body(model.parameters.gravity, &own.rigid.pose);
-        for (axis, a) in gravity.to_array().into_iter().enumerate() {
-            for (force, load) in forces.iter_mut().zip(&response.modal_forces[axis * m..]) {
-                *force += a * load;
-            }
-        }
-    }
-    if workspace.active.is_empty() {
-        return;
-    }
-    let free_modes = &mut workspace.free_modes[..m];
-    object.modes.predict(&own.modes, forces, free_modes);
-    for active in &mut workspace.active {
-        let point = &held.points[active.device];
-        active.free = project_rows(held.rows(active.device, m), free_modes.iter().copied()) + point.sag;
+    let mut responding = responding(model, object, own);
+    responding.predict(modal_points, !active.is_empty());
+    for active in active {
+        active.free = responding.free(modal_points, active.device);
     }
 }
 
@@ -302,45 +298,30 @@ fn advance(
     object: &SceneObject,
     own: &mut ObjectState,
     held: &mut HeldPoints,
-    workspace: &mut Workspace,
+    modal_points: &mut ModalPoints,
+    active: &[ActivePoint],
     end: &RigidStep,
 ) {
-    let m = own.modes.len();
-    let Workspace { modal_forces, active, .. } = workspace;
-    let modal_forces = &mut modal_forces[..m];
+    let acting = active.iter().filter_map(|active| {
+        let point = &held.points[active.device];
+        Some(Acting {
+            device: active.device,
+            point: &point.grasp.as_ref()?.point,
+            force: active.force_in_body,
+            travel: active.displacement - point.displacement,
+        })
+    });
+    let dissipated = responding(model, object, own).advance(modal_points, acting);
 
-    // p = Φᵀ·Jᵀ·g.
-    for point in active.iter() {
-        let rows = held.rows(point.device, m);
-        for (axis, g) in point.force_in_body.to_array().into_iter().enumerate() {
-            for (force, row) in modal_forces.iter_mut().zip(&rows[axis * m..(axis + 1) * m]) {
-                *force += g * row;
-            }
-        }
-    }
-    let mut dissipated = object.modes.advance(&mut own.modes, modal_forces);
-
-    // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
-    let (mut residual_work, mut residual_energy, mut input) = (0.0, 0.0, 0.0);
     let travel = end.end.pose.position - own.rigid.pose.position;
-    for at in 0..active.len() {
-        let (device, force) = (active[at].device, active[at].force_in_body);
-        let pushed: DVec3 =
-            active.iter().map(|other| held.residual(device, other.device) * other.force_in_body).sum();
-        let held_point = &mut held.points[device];
-        let residual = pushed + held_point.sag;
-        residual_work += force.dot(residual - held_point.residual);
-        residual_energy += 0.5 * force.dot(pushed);
-        input += active[at].force.dot(travel + (active[at].end_arm - active[at].start_arm));
-        held_point.residual = residual;
-        held_point.displacement = active[at].displacement;
-        held_point.force = force;
-        held_point.force_in_world = active[at].force;
+    let mut input = 0.0;
+    for active in active {
+        input += active.force.dot(travel + (active.end_arm - active.start_arm));
+        let point = &mut held.points[active.device];
+        point.displacement = active.displacement;
+        point.force_in_world = active.force;
     }
-    dissipated += residual_work - (residual_energy - own.ledger.residual);
-
     own.rigid = end.end;
-    own.ledger.residual = residual_energy;
     own.ledger.input += input;
     own.ledger.dissipated += dissipated;
     own.weigh(object, model.parameters.gravity);
@@ -349,7 +330,7 @@ fn advance(
 }
 
 fn write_output(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, held, workspace: _, output } = state;
+    let State { steps, objects, held, output, .. } = state;
     output.time_s = *steps as f64 * model.parameters.step_s;
     for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
         out.pose = own.rigid.pose;

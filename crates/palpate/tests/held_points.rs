@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, MotionRule, ObjectStart, Output, Pose, Recording,
-    RigidCompliance, State, SurfacePoint, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, MotionRule, ObjectStart, Output, Pose,
+    Recording, RigidCompliance, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ fn grasp(object: usize, triangle: u32) -> Grasp {
 
 fn one(recording: Arc<Recording>, parameters: ModelParameters) -> (Model, State) {
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let model = Model::new(parameters, vec![(recording, start)]).expect("a good model");
+    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a good model");
     let state = State::new(&model);
     (model, state)
 }
@@ -241,7 +241,10 @@ fn the_papers_update_gives_momentum_but_not_the_exact_energy() {
 fn models_with_impossible_numbers_are_refused() {
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let refused = |parameters: ModelParameters, recording, start| {
-        Model::new(parameters, vec![(recording, start)]).err().map(|e| e.to_string()).unwrap_or_default()
+        Model::new(parameters, vec![ModelObject::new(recording, start)])
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default()
     };
     let step_s = |step_s| ModelParameters { step_s, ..ModelParameters::default() };
     assert_eq!(refused(step_s(0.0), free(), start), "step is 0 s, expected above 0 and at most 1");

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, SurfacePoint,
-    Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
+    SurfacePoint, Twist, step,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -50,8 +50,11 @@ fn a_step_makes_no_allocation() {
     let start =
         |x: f64| ObjectStart { pose: Pose { position: DVec3::X * x, ..Pose::IDENTITY }, twist: Twist::ZERO };
     let parameters = ModelParameters { devices: 4, gravity: DVec3::Y * -9.81, ..ModelParameters::default() };
-    let model =
-        Model::new(parameters, vec![(free.clone(), start(0.0)), (fixed, start(1.0))]).expect("a good model");
+    let model = Model::new(
+        parameters,
+        vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed, start(1.0))],
+    )
+    .expect("a good model");
     let mut state = State::new(&model);
     let grasp =
         |object, triangle| Some(Grasp { object, point: SurfacePoint { triangle, weights: [0.2, 0.3, 0.5] } });

@@ -7,7 +7,8 @@ use crate::verbs::{print, print_json};
 use clap::Args;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
+    Twist, step,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -103,7 +104,7 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
         .collect();
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let parameters = ModelParameters { devices: held.len(), ..ModelParameters::default() };
-    let model = Model::new(parameters, vec![(case.recording.clone(), start); case.objects])?;
+    let model = Model::new(parameters, vec![ModelObject::new(case.recording.clone(), start); case.objects])?;
     let mut state = State::new(&model);
     let rest: Vec<DVec3> = held.iter().map(|grasp| surface.rest_position(&grasp.point)).collect();
     let mut input = Input { devices: Vec::new() };

@@ -10,7 +10,7 @@ use palpate::{Damping, Material, Recording};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::Progress;
-use palpate_fem::record::{RecordParameters, record};
+use palpate_fem::record::{Extent, RecordParameters, record};
 use palpate_fem::residual::ResidualChoice;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -50,6 +50,7 @@ pub fn paper_cube(cells: u32, modes: usize) -> RecordParameters {
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"),
+        extent: Extent::Whole,
     }
 }
 

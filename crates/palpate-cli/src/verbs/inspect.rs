@@ -1,18 +1,26 @@
 //! `palpate inspect`: what is in a recording.
 
 use crate::Failure;
+use crate::progress::Bars;
 use crate::verbs::{print, print_json, read_recording};
 use clap::Args;
-use palpate::{Certificate, Damping, Recording, ResidualCompliance, Support};
+use palpate::{Certificate, Damping, Material, Recording, ResidualCompliance, Support};
+use palpate_fem::progress::Progress;
+use palpate_store::{Location, TableStore};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Show what is in a recording, with its force-error certificate
+/// Show what is in a recording, with its force-error certificate, or in a store of impulse responses
+///
+/// Of a store it tells which shards are there and which are missing, and checks those that are there.
 #[derive(Args)]
 pub struct Arguments {
-    /// The recording
+    /// The recording, or the store: a folder or s3://BUCKET/PREFIX
     file: PathBuf,
+    /// Don't read a store's shards to check them
+    #[arg(long)]
+    quick: bool,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -20,12 +28,138 @@ pub struct Arguments {
 
 /// Run the verb.
 pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
+    let text = arguments.file.to_string_lossy();
+    if arguments.file.is_dir() || text.contains("://") {
+        return inspect_store(arguments, &Location::parse(&text));
+    }
     let recording = read_recording(&arguments.file)?;
     if arguments.json {
         return print_as_json(&recording);
     }
     let bytes = std::fs::metadata(&arguments.file).map_or(0, |m| m.len() as usize);
     print_for_person(&recording, &arguments.file, bytes)
+}
+
+fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failure> {
+    let store = TableStore::open(location)?;
+    let mut damaged = Vec::new();
+    if !arguments.quick {
+        let present = store.present()?;
+        let mut progress = Bars::new();
+        progress.begin("checking shards", present.len() as u64);
+        for shard in (0..present.len()).filter(|&shard| present[shard].is_some()) {
+            if let Err(error) = store.check_shard(shard) {
+                damaged.push((shard, error.to_string()));
+            }
+            progress.advance(1);
+        }
+    }
+    let printed = if arguments.json {
+        print_store_as_json(&store, &damaged)
+    } else {
+        print_store_for_person(&store, &damaged)
+    };
+    match damaged.into_iter().next() {
+        Some((_, what)) => Err(Failure(what)),
+        None => printed,
+    }
+}
+
+/// A store as one JSON object; `damaged` are the shards that don't decode, with why.
+pub fn print_store_as_json(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
+    let (content, present) = (store.content(), store.present()?);
+    let attributes = &content.attributes;
+    let missing: Vec<usize> = (0..present.len()).filter(|&shard| present[shard].is_none()).collect();
+    print_json(&json!({
+        "shards_total": store.shards(),
+        "shards_done": present.len() - missing.len() - damaged.len(),
+        "shards_missing": missing,
+        "shards_damaged": damaged.iter().map(|(shard, _)| shard).collect::<Vec<_>>(),
+        "columns_per_shard": attributes.columns_per_shard,
+        "touchable_dofs": content.touchable_dofs.len(),
+        "samples": content.samples,
+        "observed_dofs": content.observed_dofs.len(),
+        "step_s": attributes.step_s,
+        "sampling": attributes.sampling,
+        "method": attributes.method,
+        "dtype": content.number.name(),
+        "compression": attributes.compression,
+        "bytes": present.iter().flatten().sum::<u64>(),
+        "bytes_uncompressed": content.raw_bytes(),
+        "recording": attributes.recording,
+    }))
+}
+
+/// A store for a person.
+pub fn print_store_for_person(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
+    let present = store.present()?;
+    print(&describe_store(store, &present, damaged).map_err(|e| Failure(e.to_string()))?)
+}
+
+fn describe_store(
+    store: &TableStore,
+    present: &[Option<u64>],
+    damaged: &[(usize, String)],
+) -> Result<String, std::fmt::Error> {
+    let content = store.content();
+    let attributes = &content.attributes;
+    let bytes = present.iter().flatten().sum::<u64>();
+    let mut out = String::new();
+    let source = &attributes.recording.provenance.source;
+    writeln!(out, "{} ({}), from {source}", store.location(), size(bytes as usize))?;
+    writeln!(
+        out,
+        "  table        {} touchable × {} samples × {} observed degrees of freedom, {}, {} before packing",
+        content.touchable_dofs.len(),
+        content.samples,
+        content.observed_dofs.len(),
+        content.number.name(),
+        size(content.raw_bytes() as usize)
+    )?;
+    let end =
+        if attributes.sampling == "end" { "at the end of each" } else { "mean of middle and end of each" };
+    writeln!(out, "  samples      {} steps of {} ms, {end}", content.samples, 1000.0 * attributes.step_s)?;
+    writeln!(out, "  method       {}", attributes.method)?;
+    for material in &attributes.recording.materials {
+        writeln!(out, "  material     {}", material_text(material))?;
+    }
+    let missing: Vec<usize> = (0..present.len()).filter(|&shard| present[shard].is_none()).collect();
+    let done = present.len() - missing.len() - damaged.len();
+    writeln!(
+        out,
+        "  shards       {done} of {} done, {} columns each",
+        present.len(),
+        attributes.columns_per_shard
+    )?;
+    if !missing.is_empty() {
+        writeln!(out, "  missing      {}: record again with the same command to go on", ranges(&missing))?;
+    }
+    if !damaged.is_empty() {
+        let shards: Vec<usize> = damaged.iter().map(|(shard, _)| *shard).collect();
+        writeln!(out, "  damaged      {}", ranges(&shards))?;
+    }
+    Ok(out)
+}
+
+/// Ascending numbers as `0-3, 7`.
+fn ranges(numbers: &[usize]) -> String {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for &number in numbers {
+        match runs.last_mut() {
+            Some((_, last)) if *last + 1 == number => *last = number,
+            _ => runs.push((number, number)),
+        }
+    }
+    let text = |&(first, last): &(usize, usize)| {
+        if first == last { first.to_string() } else { format!("{first}-{last}") }
+    };
+    runs.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+fn material_text(material: &Material) -> String {
+    let region = if material.region.is_empty() { String::new() } else { format!("{}: ", material.region) };
+    let Material { young_pa, poisson, density_kg_m3, .. } = material;
+    format!("{region}E = {young_pa} Pa, ν = {poisson}, ρ = {density_kg_m3} kg/m³")
 }
 
 fn frequencies_hz(recording: &Recording) -> Vec<f64> {
@@ -87,13 +221,7 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
         Support::Fixed => writeln!(out, "  support      {} nodes fixed", mesh.fixed_nodes)?,
     }
     for material in &metadata.materials {
-        let region =
-            if material.region.is_empty() { String::new() } else { format!("{}: ", material.region) };
-        writeln!(
-            out,
-            "  material     {region}E = {} Pa, ν = {}, ρ = {} kg/m³",
-            material.young_pa, material.poisson, material.density_kg_m3
-        )?;
+        writeln!(out, "  material     {}", material_text(material))?;
     }
     match metadata.damping {
         Damping::Rayleigh { alpha, beta } => writeln!(out, "  damping      α = {alpha} 1/s, β = {beta} s")?,
@@ -169,5 +297,8 @@ fn percent(share: f64) -> String {
 }
 
 fn size(bytes: usize) -> String {
-    format!("{:.1} MB", bytes as f64 / 1e6)
+    match bytes as f64 {
+        bytes if bytes >= 1e10 => format!("{:.1} GB", bytes / 1e9),
+        bytes => format!("{:.1} MB", bytes / 1e6),
+    }
 }

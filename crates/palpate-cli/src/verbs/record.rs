@@ -1,6 +1,8 @@
 //! `palpate record`: mesh in, recording out.
 
+use crate::dense::{Dense, DenseArguments};
 use crate::progress::Bars;
+use crate::selection::select;
 use crate::verbs::inspect;
 use crate::whole_file::{check_writable, write_whole};
 use crate::{Failure, source};
@@ -10,7 +12,7 @@ use palpate_fem::element::Order;
 use palpate_fem::material::materials_from_toml;
 use palpate_fem::mesh::{Mesh, merge_nodes};
 use palpate_fem::progress::Progress;
-use palpate_fem::record::{RecordParameters, record as record_mesh};
+use palpate_fem::record::{Extent, RecordParameters, record as record_mesh};
 use palpate_fem::residual::ResidualChoice;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +25,8 @@ use std::path::{Path, PathBuf};
   palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 -o cube.palp
   palpate record liver.msh --scale 0.001 --young 5e3 --poisson 0.45 --density 1060 --fix ligament -o liver.palp
   palpate record hand.msh --materials hand.toml -o hand.palp
+  palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 \
+      --dense cube.zarr --method transient --step 0.002 --duration 1
 
 A material file has a table per region of the mesh:
   [[material]]
@@ -33,9 +37,9 @@ A material file has a table per region of the mesh:
 pub struct Arguments {
     /// A Gmsh (.msh) or VTK legacy (.vtk) file, box:LXxLYxLZ/NXxNYxNZ (metres / cells), or sphere:RADIUS/N
     pub source: String,
-    /// The recording to write
-    #[arg(short, long, value_name = "OUT.palp")]
-    pub output: PathBuf,
+    /// The recording to write; may be left out with --dense
+    #[arg(short, long, value_name = "OUT.palp", required_unless_present = "dense")]
+    pub output: Option<PathBuf>,
     /// Young's modulus [Pa]
     #[arg(long, value_name = "PA", allow_negative_numbers = true, required_unless_present = "materials")]
     pub young: Option<f64>,
@@ -70,7 +74,7 @@ pub struct Arguments {
     /// Multiply the file's coordinates to come to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
-    /// Fix nodes: a named group of the mesh, or a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale; may be repeated. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
+    /// Fix nodes: a named group of the mesh, a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale, or the words of --touchable; may be repeated. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
     #[arg(long, value_name = "GROUP|CONDITION")]
     pub fix: Vec<String>,
     /// Make nodes that lie on the same point one node
@@ -79,9 +83,12 @@ pub struct Arguments {
     /// Residual compliance: auto, whole, none, or a cut-off radius in metres
     #[arg(long, default_value = "auto", allow_hyphen_values = true, value_parser = residual_choice)]
     pub residual: ResidualChoice,
-    /// Print what `inspect --json` prints
+    /// Print what `inspect --json` prints; of the store, if there is no -o
     #[arg(long)]
     pub json: bool,
+    /// The paper's table
+    #[command(flatten)]
+    pub dense: DenseArguments,
 }
 
 fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
@@ -100,7 +107,9 @@ fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
 pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     let inputs: Vec<&Path> =
         [Some(Path::new(&arguments.source)), arguments.materials.as_deref()].into_iter().flatten().collect();
-    check_writable(&arguments.output, &inputs)?;
+    if let Some(output) = &arguments.output {
+        check_writable(output, &inputs)?;
+    }
     let mut progress = Bars::new();
     let mut mesh = source::mesh(&arguments.source)?;
     mesh.scale(arguments.scale)?;
@@ -108,21 +117,33 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         let merged = merge_nodes(&mut mesh);
         progress.remark(&format!("{merged} nodes lay on others and were merged"));
     }
-    let parameters = parameters(arguments, &mesh)?;
+    let dense = Dense::new(&arguments.dense, &mesh)?;
+    let extent = dense.as_ref().map_or(Extent::Whole, |dense| dense.extent(arguments.output.is_some()));
+    let parameters = parameters(arguments, extent, &mesh)?;
     let recorded = record_mesh(mesh, &parameters, &mut progress)
         .map_err(|e| Failure(format!("{}: {e}", source::name(&arguments.source))))?;
-    progress.begin("writing", 1);
-    let bytes = recorded.recording.to_bytes()?;
-    write_whole(&arguments.output, &bytes)?;
+    let mut written = None;
+    if let Some(output) = &arguments.output {
+        progress.begin("writing", 1);
+        let bytes = recorded.recording.to_bytes()?;
+        write_whole(output, &bytes)?;
+        written = Some((output, bytes.len()));
+    }
     progress.finish();
-    if arguments.json {
-        inspect::print_as_json(&recorded.recording)
-    } else {
-        inspect::print_for_person(&recorded.recording, &arguments.output, bytes.len())
+    let store = dense.map(|dense| dense.record(&recorded, &mut progress)).transpose()?;
+    match (written, store) {
+        (Some(_), _) if arguments.json => inspect::print_as_json(&recorded.recording),
+        (None, Some(store)) if arguments.json => inspect::print_store_as_json(&store, &[]),
+        (written, store) => {
+            if let Some((output, bytes)) = written {
+                inspect::print_for_person(&recorded.recording, output, bytes)?;
+            }
+            store.map_or(Ok(()), |store| inspect::print_store_for_person(&store, &[]))
+        }
     }
 }
 
-fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Failure> {
+fn parameters(arguments: &Arguments, extent: Extent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
     let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
         (Some(path), ..) => {
             let text =
@@ -146,7 +167,7 @@ fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Fa
     };
     let mut fixed_nodes = Vec::new();
     for selection in &arguments.fix {
-        fixed_nodes.extend(source::selected_nodes(mesh, selection)?);
+        fixed_nodes.extend(select(mesh, "--fix", selection)?.mesh_nodes);
     }
     Ok(RecordParameters {
         materials,
@@ -156,5 +177,6 @@ fn parameters(arguments: &Arguments, mesh: &Mesh) -> Result<RecordParameters, Fa
         residual: arguments.residual,
         fixed_nodes,
         source: source::name(&arguments.source),
+        extent,
     })
 }

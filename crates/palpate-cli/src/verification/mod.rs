@@ -18,7 +18,7 @@ use palpate_fem::element::Order;
 use palpate_fem::mesh::{Mesh, check};
 use palpate_fem::modes::{Modes, lowest_modes};
 use palpate_fem::progress::{Progress, Silent};
-use palpate_fem::record::{RecordParameters, Recorded, record};
+use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
 use palpate_fem::residual::ResidualChoice;
 use palpate_fem::system::System;
 
@@ -138,6 +138,7 @@ fn undamped(young_pa: f64, poisson: f64, density_kg_m3: f64, order: Order, modes
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: "verification".into(),
+        extent: Extent::Whole,
     }
 }
 

@@ -4,8 +4,8 @@ use super::{Check, recorded, undamped};
 use crate::Failure;
 use glam::{DMat3, DQuat, DVec3};
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist,
-    inertia_in_world, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
+    Twist, inertia_in_world, step,
 };
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
@@ -26,7 +26,7 @@ fn model(
 ) -> Result<Model, Failure> {
     let start = ObjectStart { pose: Pose::IDENTITY, twist };
     let parameters = ModelParameters { step_s, devices, gravity, ..ModelParameters::default() };
-    Ok(Model::new(parameters, vec![(recording.clone(), start)])?)
+    Ok(Model::new(parameters, vec![ModelObject::new(recording.clone(), start)])?)
 }
 
 fn angular_momentum(recording: &Recording, pose: &Pose, twist: &Twist) -> DVec3 {

@@ -5,7 +5,8 @@ use crate::Failure;
 use crate::verbs::demo::paper_cube;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, Recording, State, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
+    Twist, step,
 };
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::record::RecordParameters;
@@ -28,7 +29,7 @@ fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, Failure> {
         [-REACH, REACH].map(|x| surface.nearest(DVec3::X * x).map(|(point, _)| Grasp { object: 0, point }));
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let parameters = ModelParameters { devices: 2, ..ModelParameters::default() };
-    let model = Model::new(parameters, vec![(Arc::new(recording), start)])?;
+    let model = Model::new(parameters, vec![ModelObject::new(Arc::new(recording), start)])?;
     let mut state = State::new(&model);
     let forces = (1..=steps).map(|number| {
         let s = (number as f64 / 50.0).min(1.0);

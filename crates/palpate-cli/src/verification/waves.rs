@@ -4,7 +4,8 @@ use super::{Check, recorded, undamped};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelParameters, ObjectStart, Pose, State, SurfacePoint, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, State, SurfacePoint,
+    Twist, step,
 };
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
@@ -48,7 +49,7 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, Failure> {
     let step_s = TAU / omega / 200.0;
     let parameters = ModelParameters { step_s, devices: grasps.len(), ..ModelParameters::default() };
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let model = Model::new(parameters, vec![(Arc::new(body.recording), start)])?;
+    let model = Model::new(parameters, vec![ModelObject::new(Arc::new(body.recording), start)])?;
     let mut state = State::new(&model);
     let (mut in_phase, mut quadrature, mut count) = (0.0, 0.0, 0.0);
     for number in 1..=(PERIODS * 200.0) as usize {

@@ -6,7 +6,7 @@ use palpate::{Damping, Material, ResidualCompliance};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::{Mesh, Region, box_mesh};
 use palpate_fem::progress::{Progress, Silent};
-use palpate_fem::record::{RecordParameters, Recorded, record};
+use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
 use palpate_fem::residual::ResidualChoice;
 use palpate_fem::system::System;
 
@@ -32,6 +32,7 @@ pub fn parameters(order: Order, modes: usize) -> RecordParameters {
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: "test".into(),
+        extent: Extent::Whole,
     }
 }
 

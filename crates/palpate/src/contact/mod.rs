@@ -4,7 +4,7 @@ mod held;
 mod rows;
 
 pub(crate) use held::HeldSystem;
-pub(crate) use rows::HeldPoints;
+pub(crate) use rows::{HeldPoint, HeldPoints};
 
 use crate::surface::SurfacePoint;
 

@@ -1,10 +1,12 @@
 //! What offline work hands to the runtime: one body's responses, surface, mass and certificate.
 
 mod file;
+mod impulse_response;
 mod metadata;
 mod residual;
 
 pub use file::FORMAT_VERSION;
+pub use impulse_response::{Column, ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
 pub use metadata::{
     Certificate, CertificateEvent, Damping, MassProperties, Material, MeshCounts, Metadata, Provenance,
     Support,
@@ -120,8 +122,11 @@ impl Recording {
     }
 
     /// Refuse what a step could trip over: lengths that don't fit, numbers that are not finite,
-    /// indices out of range, impossible physics.
-    pub(crate) fn validate(&self) -> Result<(), Error> {
+    /// indices out of range, impossible physics. A recording from a file has been checked.
+    ///
+    /// # Errors
+    /// Says what does not fit.
+    pub fn validate(&self) -> Result<(), Error> {
         let fail = |what| Err(Error::Recording(what));
         let (nodes, modes) = (self.surface.positions.len(), self.modes.len());
         if nodes == 0 || self.surface.triangles.is_empty() {
