@@ -1,5 +1,6 @@
 //! What the machine must have, and how it gets it.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Whether a command can be run and succeeds.
@@ -23,6 +24,39 @@ pub fn need_c_compiler() -> Result<(), String> {
         return Ok(());
     }
     Err("a C compiler is missing and could not be installed: install gcc or clang, so that `cc --version` works".into())
+}
+
+/// A Python with what the tests in python/tests need, in an environment of its own under target/.
+pub fn need_python() -> Result<PathBuf, String> {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let environment = root.join("target/python-tests");
+    let requirements = root.join("python/tests/requirements.txt");
+    let python = environment.join("bin/python");
+    // Renewed when the list of packages changes.
+    let wanted =
+        std::fs::read_to_string(&requirements).map_err(|e| format!("{}: {e}", requirements.display()))?;
+    let stamp = environment.join("installed.txt");
+    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
+        return Ok(python);
+    }
+    if !runs("python3", &["-c", "import venv, ensurepip"]) {
+        install(&["python3", "python3-venv"]);
+    }
+    eprintln!("installing Python packages for the tests into target/python-tests");
+    let made = Command::new("python3").args(["-m", "venv"]).arg(&environment).status();
+    if !made.is_ok_and(|status| status.success()) {
+        return Err(
+            "Python 3 with venv is missing and could not be installed: install python3 and python3-venv"
+                .into(),
+        );
+    }
+    let installed =
+        Command::new(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements).status();
+    if !installed.is_ok_and(|status| status.success()) {
+        return Err(format!("pip could not install the packages of {}", requirements.display()));
+    }
+    std::fs::write(&stamp, wanted).map_err(|e| format!("{}: {e}", stamp.display()))?;
+    Ok(python)
 }
 
 /// Install Debian packages where that is possible: apt, as root.

@@ -5,6 +5,7 @@
 mod licences;
 mod machine;
 
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 const USAGE: &str = "cargo xtask CHORE
@@ -55,12 +56,34 @@ fn demo() -> Result<(), String> {
 
 fn test() -> Result<(), String> {
     machine::need_c_compiler()?;
+    let python = machine::need_python()?;
     cargo(&["test", "--workspace", "--locked", "--doc"])?;
+    cargo(&["build", "--locked", "--package", "palpate-cli"])?;
+    python_tests(&python)?;
     if machine::runs("cargo", &["nextest", "--version"]) {
         return cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"]);
     }
     eprintln!("cargo-nextest is not installed: using cargo test, which comes to the same end more slowly");
-    cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests"])
+    cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests", "--examples"])
+}
+
+/// What Python sees of stores, and the recording on Dask and Slurm, with the binary of the tests.
+fn python_tests(python: &Path) -> Result<(), String> {
+    let status = Command::new(python)
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"])
+        .env("PALPATE", root().join("target/debug/palpate"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(root())
+        .status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(_) => Err("the Python tests failed".into()),
+        Err(error) => Err(format!("{} can't be started: {error}", python.display())),
+    }
+}
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
 fn verify() -> Result<(), String> {
@@ -70,9 +93,8 @@ fn verify() -> Result<(), String> {
 
 /// Run cargo in the workspace's root; its output goes to ours.
 fn cargo(arguments: &[&str]) -> Result<(), String> {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let status = Command::new(cargo).args(arguments).current_dir(root).status();
+    let status = Command::new(cargo).args(arguments).current_dir(root()).status();
     match status {
         Ok(status) if status.success() => Ok(()),
         Ok(_) => Err(format!("cargo {} failed", arguments.join(" "))),

@@ -4,14 +4,17 @@ use crate::Failure;
 use crate::progress::Bars;
 use crate::selection::{Selection, select, union};
 use clap::{Args, ValueEnum};
+use glam::DVec3;
 use palpate::{Metadata, Sampling};
 use palpate_fem::mesh::Mesh;
 use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, Recorded};
-use palpate_fem::table::{Method, TableParameters, TableRecorder};
+use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_fem::transient::follows_hz;
 use palpate_store::{
     Compression, Location, Number, Part, StoreError, TableAttributes, TableContent, TableStore,
 };
+use rayon::prelude::*;
 
 /// Options of a recorded table.
 #[derive(Args, Debug, Clone)]
@@ -50,7 +53,7 @@ pub struct DenseArguments {
     /// Write only the shards K, K+N, K+2N, … so that N machines share the work; K counts from 1 to N or from 0
     #[arg(long, value_name = "K/N", value_parser = part, requires = "dense")]
     pub shard: Option<Part>,
-    /// Columns (touchable degrees of freedom) per shard; by default as many as make 256 MB, at most 48
+    /// Columns (touchable degrees of freedom) per shard; by default as many as make 256 MB, at most 48, at which the work is quickest
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), requires = "dense")]
     pub columns_per_shard: Option<u64>,
     /// Memory to stay within, as 4GB or 500MB: makes shards smaller
@@ -200,16 +203,22 @@ impl<'a> Dense<'a> {
         let part = arguments.shard.unwrap_or(Part::ALL);
         check_standing(&store, part, progress)?;
         let missing = store.missing(part)?;
-        self.check_room(&store, &recorder)?;
+        let at_once = self.shards_at_once(&store, &recorder)?;
 
         let columns: usize = missing.iter().map(|&shard| store.columns_of(shard).len()).sum();
         if columns > 0 {
             progress.begin("impulse responses", columns as u64);
         }
         let counter = progress.counter();
-        for shard in missing {
-            let block = recorder.columns(store.columns_of(shard), &|done| counter(done));
-            store.write_shard(shard, block)?;
+        let block = block_width(store.content().attributes.columns_per_shard);
+        for shards in missing.chunks(at_once) {
+            let compute = |&shard: &usize| {
+                (shard, recorder.columns(store.columns_of(shard), block, &|done| counter(done)))
+            };
+            let blocks: Vec<_> = shards.par_iter().map(compute).collect();
+            for (shard, block) in blocks {
+                store.write_shard(shard, block)?;
+            }
         }
         progress.finish();
         store.tidy()?;
@@ -253,8 +262,14 @@ impl<'a> Dense<'a> {
                 };
                 format!("closed-form, {} modes and {residual}", recorded.modes.squares.len())
             }
-            Method::Transient { substeps } => format!("transient, order 5, {substeps} steps per sample"),
+            Method::Transient { substeps } => format!(
+                "transient, order 5, substeps {substeps}: follows waves up to {:.0} Hz to 1 % over 0.1 s",
+                follows_hz(recorder.integration_step_s().unwrap_or(parameters.step_s))
+            ),
         };
+        let centre = DVec3::from_array(recorded.system.mass.center_of_mass_m);
+        let nodes = &recorded.system.discretisation.nodes;
+        let observed_positions = parameters.observed_nodes.iter().map(|&node| nodes[node as usize] - centre);
         Ok(TableContent {
             attributes: TableAttributes {
                 store_version: palpate_store::STORE_VERSION,
@@ -272,26 +287,34 @@ impl<'a> Dense<'a> {
             samples: parameters.samples,
             touchable_dofs: recorder.touchable_dofs(),
             observed_dofs: recorder.observed_dofs(),
+            observed_positions: observed_positions.collect(),
             surface: recorded.recording.surface.clone(),
             gravity: recorder.gravity(),
         })
     }
 
-    /// Refuse work that would go beyond the limit, or beyond the memory that there is.
-    fn check_room(&self, store: &TableStore, recorder: &TableRecorder<'_>) -> Result<(), Failure> {
+    /// How many shards are computed at once, so that every core has a block of columns; refuses work that would go beyond
+    /// the limit, or beyond the memory that there is.
+    fn shards_at_once(&self, store: &TableStore, recorder: &TableRecorder<'_>) -> Result<usize, Failure> {
         let content = store.content();
-        let needed = needed_bytes(recorder, content.attributes.columns_per_shard, content.number);
-        if let Some(limit) = self.arguments.limit_memory.filter(|limit| needed > *limit) {
+        let columns = content.attributes.columns_per_shard;
+        let needed = |shards: u64| needed_bytes(recorder, shards * columns, content.number);
+        let limit = self.arguments.limit_memory.unwrap_or(u64::MAX);
+        if needed(1) > limit {
             return Err(Failure(format!(
-                "--limit-memory is {:.2} GB; shards of {} columns need {:.2} GB here. Allow more, record less (--duration, \
-                 --observed), or begin a new store with smaller --columns-per-shard",
+                "--limit-memory is {:.2} GB; shards of {columns} columns need {:.2} GB here. Allow more, record less \
+                 (--duration, --observed), or begin a new store with smaller --columns-per-shard",
                 limit as f64 / 1e9,
-                content.attributes.columns_per_shard,
-                needed as f64 / 1e9
+                needed(1) as f64 / 1e9
             )));
         }
-        let more = needed.saturating_sub(used_bytes());
-        palpate_fem::factor::check_memory(more as f64).map_err(|e| Failure(e.to_string()))
+        let room = |shards: u64| {
+            palpate_fem::factor::check_memory(needed(shards).saturating_sub(used_bytes()) as f64)
+        };
+        room(1).map_err(|e| Failure(e.to_string()))?;
+        let wanted = (block_width(columns) * rayon::current_num_threads()).div_ceil(columns as usize) as u64;
+        let fits = |&shards: &u64| needed(shards) <= limit && room(shards).is_ok();
+        Ok((1..=wanted).rev().find(fits).unwrap_or(1) as usize)
     }
 }
 
@@ -299,7 +322,12 @@ impl<'a> Dense<'a> {
 /// form before and after packing.
 fn needed_bytes(recorder: &TableRecorder<'_>, columns: u64, number: Number) -> u64 {
     let table = columns * (recorder.column_length() * 3 * number.bytes()) as u64;
-    used_bytes() + recorder.working_bytes(columns as usize) as u64 + table
+    used_bytes() + recorder.working_bytes(columns as usize, block_width(columns)) as u64 + table
+}
+
+/// Columns that are computed together: a property of the store, so that its bits don't depend on who writes it.
+fn block_width(columns_per_shard: u64) -> usize {
+    BLOCK.min(columns_per_shard as usize)
 }
 
 /// Memory [bytes] that this process uses, where the system tells.

@@ -10,6 +10,7 @@ mod path;
 mod plot;
 mod progress;
 mod report;
+mod reproduction;
 mod scene_file;
 mod selection;
 mod source;
@@ -40,6 +41,7 @@ enum Verb {
     Record(verbs::record::Arguments),
     Inspect(verbs::inspect::Arguments),
     Run(verbs::run::Arguments),
+    Reproduce(verbs::reproduce::Arguments),
     Verify(verbs::verify::Arguments),
     Bench(verbs::bench::Arguments),
 }
@@ -61,6 +63,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Record(arguments) => verbs::record::record(&arguments),
         Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
         Verb::Run(arguments) => verbs::run::run(&arguments),
+        Verb::Reproduce(arguments) => verbs::reproduce::reproduce(&arguments),
         Verb::Verify(arguments) => verbs::verify::verify(&arguments),
         Verb::Bench(arguments) => verbs::bench::bench(&arguments),
     };

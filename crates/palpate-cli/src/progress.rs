@@ -76,3 +76,16 @@ impl Drop for Bars {
         }
     }
 }
+
+/// Progress without remarks: where the paper's linear elements are what is wanted.
+pub struct WithoutRemarks<'a>(pub &'a mut Bars);
+
+impl Progress for WithoutRemarks<'_> {
+    fn begin(&mut self, stage: &str, total: u64) {
+        self.0.begin(stage, total);
+    }
+    fn advance(&mut self, units: u64) {
+        self.0.advance(units);
+    }
+    fn remark(&mut self, _text: &str) {}
+}

@@ -6,7 +6,7 @@
 use crate::discretisation::Discretisation;
 use crate::element::{Elasticity, ElementMatrices};
 use crate::material::lame_constants;
-use faer::{Mat, MatRef};
+use faer::{Mat, MatMut, MatRef};
 use glam::DMat3;
 use palpate::Material;
 use rayon::prelude::*;
@@ -99,6 +99,12 @@ impl Assembly {
     /// K·X or M·X for a block of columns with 3·nodes rows.
     pub fn multiply(&self, which: Which, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
+        self.multiply_into(which, x, y.as_mut());
+        y
+    }
+
+    /// The same into a matrix of the shape of X.
+    pub fn multiply_into(&self, which: Which, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
         y.par_col_iter_mut().zip(x.par_col_iter()).for_each(|(mut out, column)| {
             let at = |node: u32| {
                 let base = 3 * node as usize;
@@ -116,6 +122,5 @@ impl Assembly {
                 }
             }
         });
-        y
     }
 }

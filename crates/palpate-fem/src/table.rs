@@ -51,8 +51,8 @@ pub enum TableError {
     Factor(#[from] FactorError),
 }
 
-/// Columns that the integrator advances together on one core: wide enough for the solves to run at full speed.
-const COLUMNS: usize = 48;
+/// Columns that are best integrated together on one core: wide enough for the solves to run at full speed.
+pub const BLOCK: usize = 48;
 
 /// Makes the columns of a table.
 pub struct TableRecorder<'a> {
@@ -130,21 +130,37 @@ impl<'a> TableRecorder<'a> {
         self.parameters.samples * 3 * self.parameters.observed_nodes.len()
     }
 
-    /// Working memory [bytes] for a block of columns beside the columns themselves.
-    pub fn working_bytes(&self, columns: usize) -> usize {
+    /// Time [s] between two integration steps, of a table by time integration.
+    pub fn integration_step_s(&self) -> Option<f64> {
+        match &self.way {
+            Way::ClosedForm(_) => None,
+            Way::Transient { substeps, .. } => Some(substep(self.parameters) / f64::from(*substeps)),
+        }
+    }
+
+    /// Working memory [bytes] for columns in blocks of some width, beside the columns themselves.
+    pub fn working_bytes(&self, columns: usize, block: usize) -> usize {
         let dofs = self.recorded.system.discretisation.dofs();
         match &self.way {
             Way::ClosedForm(_) => {
                 8 * rayon::current_num_threads()
                     * (self.parameters.samples * self.recorded.modes.squares.len() + dofs)
             }
-            Way::Transient { .. } => 8 * 12 * dofs * columns.min(COLUMNS * rayon::current_num_threads()),
+            Way::Transient { .. } => {
+                8 * 12 * dofs * block * columns.div_ceil(block).min(rayon::current_num_threads())
+            }
         }
     }
 
-    /// A range of touchable degrees of freedom: for each its column [m/N], sample after sample. All cores are used;
-    /// the numbers don't depend on how columns are put together. `done` is called as columns are finished.
-    pub fn columns(&self, range: std::ops::Range<usize>, done: &(dyn Fn(usize) + Sync)) -> Vec<Vec<f64>> {
+    /// A range of touchable degrees of freedom: for each its column [m/N], sample after sample. All cores are used, a
+    /// `block` of columns on each; the last bits of integrated columns depend on its width, and on nothing else.
+    /// `done` is called as columns are finished.
+    pub fn columns(
+        &self,
+        range: std::ops::Range<usize>,
+        block: usize,
+        done: &(dyn Fn(usize) + Sync),
+    ) -> Vec<Vec<f64>> {
         match &self.way {
             Way::ClosedForm(form) => range
                 .into_par_iter()
@@ -155,15 +171,11 @@ impl<'a> TableRecorder<'a> {
                 })
                 .collect(),
             Way::Transient { integrator, substeps } => {
-                // Even blocks, so that no core waits for another.
-                let threads = rayon::current_num_threads();
-                let blocks = range.len().div_ceil(COLUMNS).next_multiple_of(threads);
-                let width = range.len().div_ceil(blocks).max(1);
-                let starts: Vec<usize> = range.clone().step_by(width).collect();
+                let starts: Vec<usize> = range.clone().step_by(block).collect();
                 let of_block = |&start: &usize| {
-                    let block = start..(start + width).min(range.end);
-                    let columns = self.integrate(integrator, *substeps, block.clone());
-                    done(block.len());
+                    let part = start..(start + block).min(range.end);
+                    let columns = self.integrate(integrator, *substeps, part.clone(), block);
+                    done(part.len());
                     columns
                 };
                 starts.par_iter().flat_map_iter(of_block).collect()
@@ -180,37 +192,47 @@ impl<'a> TableRecorder<'a> {
         }
         let uniform =
             Mat::from_fn(system.discretisation.dofs(), 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
-        let loads = system.mass_times(uniform.as_ref());
-        Some(match &self.way {
-            Way::ClosedForm(form) => (0..3)
-                .flat_map(|axis| {
-                    let modes = &self.recorded.modes;
-                    let gains = modes.shapes.transpose() * loads.col(axis);
-                    let still = system.elastic_compliance(loads.subcols(axis, 1).to_owned());
-                    let share = Mat::from_fn(gains.nrows(), 1, |i, _| gains[i] / modes.squares[i]);
-                    let residual = still - &modes.shapes * share;
-                    form.response(self.parameters, |i| gains[i], |dof| residual[(dof, 0)])
-                })
-                .collect(),
-            Way::Transient { integrator, substeps } => {
-                self.integrate_loads(integrator, *substeps, loads).concat()
-            }
-        })
+        Some(self.responses(system.mass_times(uniform.as_ref())).concat())
     }
 
+    /// Response to loads [N] on all degrees of freedom, each held for one step: for each column of loads T × observed
+    /// displacements [m], sample after sample.
+    pub fn responses(&self, mut loads: Mat<f64>) -> Vec<Vec<f64>> {
+        let (system, modes) = (&self.recorded.system, &self.recorded.modes);
+        match &self.way {
+            Way::ClosedForm(form) => {
+                let gains = modes.shapes.transpose() * &loads;
+                let share =
+                    Mat::from_fn(gains.nrows(), gains.ncols(), |i, j| gains[(i, j)] / modes.squares[i]);
+                let residual = system.elastic_compliance(loads) - &modes.shapes * share;
+                (0..gains.ncols())
+                    .map(|j| form.response(self.parameters, |i| gains[(i, j)], |dof| residual[(dof, j)]))
+                    .collect()
+            }
+            Way::Transient { integrator, substeps } => {
+                system.balance(&mut loads);
+                self.integrate_loads(integrator, *substeps, loads)
+            }
+        }
+    }
+
+    /// Columns of a part, filled up with zeros to the width of the block.
     fn integrate(
         &self,
         integrator: &Transient<'_>,
         substeps: u32,
-        block: std::ops::Range<usize>,
+        part: std::ops::Range<usize>,
+        block: usize,
     ) -> Vec<Vec<f64>> {
         let system = &self.recorded.system;
-        let mut loads = Mat::zeros(system.discretisation.dofs(), block.len());
-        for (column, touchable) in block.enumerate() {
+        let mut loads = Mat::zeros(system.discretisation.dofs(), block);
+        for (column, touchable) in part.clone().enumerate() {
             loads[(dof(&self.parameters.touchable_nodes, touchable), column)] = 1.0;
         }
         system.balance(&mut loads);
-        self.integrate_loads(integrator, substeps, loads)
+        let mut columns = self.integrate_loads(integrator, substeps, loads);
+        columns.truncate(part.len());
+        columns
     }
 
     fn integrate_loads(&self, integrator: &Transient<'_>, substeps: u32, loads: Mat<f64>) -> Vec<Vec<f64>> {

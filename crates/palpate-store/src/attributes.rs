@@ -1,5 +1,6 @@
 //! What a store says about itself, and what it holds beside the table.
 
+use glam::DVec3;
 use palpate::{Metadata, Sampling, Surface};
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +60,8 @@ pub struct TableContent {
     pub touchable_dofs: Vec<u32>,
     /// Numbered alike.
     pub observed_dofs: Vec<u32>,
+    /// Rest position [m, body frame] of every observed node, in the order of `observed_dofs`.
+    pub observed_positions: Vec<DVec3>,
     /// The body's surface.
     pub surface: Surface,
     /// For a body with fixed nodes: (axis·T + sample)·observed + dof [s²].

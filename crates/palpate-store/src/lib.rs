@@ -4,6 +4,7 @@
 //! OUT.zarr/                        a Zarr group; its attributes say step, sampling, hold, units, mesh, material
 //!   impulse_response/              (touchable dof, sample, observed dof) [m/N], one shard per block of touchable dofs
 //!   touchable_dofs/ observed_dofs/ 3·node + axis, nodes as in the input mesh
+//!   observed_positions/            where the observed nodes are at rest
 //!   surface_positions/ …           the body's surface, so that the store can stand alone
 //!   gravity_response/              for a body with fixed nodes: (axis, sample, observed dof) [s²]
 //! ```

@@ -100,7 +100,9 @@ pub(crate) fn root_cause(error: &dyn std::error::Error) -> String {
     while let Some(inner) = cause.source() {
         cause = inner;
     }
-    cause.to_string()
+    // What a server answers may be a page of its own.
+    let text = cause.to_string();
+    text.split("<?xml").next().unwrap_or_default().trim_end_matches([':', ' ']).to_string()
 }
 
 #[cfg(test)]

@@ -196,11 +196,14 @@ impl TableStore {
                 self.array.store_chunk_opt(&place, values, &options)
             }
         };
-        written.map_err(|e| {
-            StoreError::Place(format!(
+        match written {
+            Ok(()) => Ok(()),
+            // Another run wrote the same shard meanwhile.
+            Err(_) if self.present().is_ok_and(|present| present[shard].is_some()) => Ok(()),
+            Err(e) => Err(StoreError::Place(format!(
                 "{e}. What is finished is kept: make room or repair the cause, then run the same command again"
-            ))
-        })
+            ))),
+        }
     }
 
     /// Remove what interrupted writers left beside the shards, once the store is finished.
@@ -323,9 +326,10 @@ fn is_ours(key: &str) -> bool {
     folder == "impulse_response" || SIDE_ARRAYS.contains(&folder)
 }
 
-const SIDE_ARRAYS: [&str; 6] = [
+const SIDE_ARRAYS: [&str; 7] = [
     "touchable_dofs",
     "observed_dofs",
+    "observed_positions",
     "surface_positions",
     "surface_triangles",
     "surface_source_nodes",
@@ -400,9 +404,18 @@ fn write_side_arrays(content: &TableContent, storage: &Arc<ObjectStorage>) -> Re
     let triangles: Vec<u32> = surface.triangles.iter().flatten().copied().collect();
     let (nodes, faces) = (positions.len() as u64 / 3, triangles.len() as u64 / 3);
     let list = |values: &[u32]| vec![values.len() as u64];
-    let [touchable, observed, places, corners, sources, gravity] = SIDE_ARRAYS;
+    let [touchable, observed, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
     write_u32(storage, touchable, list(&content.touchable_dofs), &content.touchable_dofs, "3·node + axis")?;
     write_u32(storage, observed, list(&content.observed_dofs), &content.observed_dofs, "3·node + axis")?;
+    let observed_rest: Vec<f64> = content.observed_positions.iter().flat_map(|p| p.to_array()).collect();
+    let observed_nodes = content.observed_positions.len() as u64;
+    write_f64(
+        storage,
+        rest,
+        vec![observed_nodes, 3],
+        &observed_rest,
+        "m, body frame, of every observed node",
+    )?;
     write_f64(storage, places, vec![nodes, 3], &positions, "m, body frame: origin at the centre of mass")?;
     write_u32(storage, corners, vec![faces, 3], &triangles, "surface nodes, counter-clockwise from outside")?;
     write_u32(storage, sources, list(&surface.source_nodes), &surface.source_nodes, "node of the mesh")?;
@@ -489,12 +502,13 @@ fn read_content(
     let &[touchable, samples, observed] = shape.as_slice() else {
         return Err(format!("its table has {} dimensions, expected 3", shape.len()));
     };
-    let [touchables, observeds, places, corners, sources, gravity] = SIDE_ARRAYS;
+    let [touchables, observeds, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
     let touchable_dofs: Vec<u32> = read_array(storage, touchables)?;
     let observed_dofs: Vec<u32> = read_array(storage, observeds)?;
     if touchable_dofs.len() as u64 != touchable || observed_dofs.len() as u64 != observed {
         return Err("its table and its lists of degrees of freedom don't fit together".into());
     }
+    let rest: Vec<f64> = read_array(storage, rest)?;
     let positions: Vec<f64> = read_array(storage, places)?;
     let triangles: Vec<u32> = read_array(storage, corners)?;
     let surface = Surface {
@@ -516,6 +530,7 @@ fn read_content(
         samples: samples as usize,
         touchable_dofs,
         observed_dofs,
+        observed_positions: rest.chunks_exact(3).map(DVec3::from_slice).collect(),
         surface,
         gravity,
     })

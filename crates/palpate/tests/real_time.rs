@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
-    SurfacePoint, Twist, step,
+    ColumnsInMemory, DeviceInput, Grasp, ImpulseResponse, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint, Twist, step,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -43,6 +43,26 @@ fn recording(bytes: &[u8]) -> Arc<Recording> {
     Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
 }
 
+/// A table in which every node answers for itself alone: R[s] falls off over 50 samples.
+fn table(recording: &Recording) -> ImpulseResponse {
+    let (dofs, samples) = (3 * recording.surface.positions.len(), 50);
+    let mut values = vec![0.0; dofs * samples * dofs];
+    for (dof, sample) in (0..dofs).flat_map(|dof| (0..samples).map(move |sample| (dof, sample))) {
+        values[(dof * samples + sample) * dofs + dof] = 0.01 * 0.9_f64.powi(sample as i32);
+    }
+    let numbers: Vec<u32> =
+        recording.surface.source_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    ImpulseResponse {
+        step_s: 1e-3,
+        samples,
+        sampling: Sampling::End,
+        touchable_dofs: numbers.clone(),
+        observed_dofs: numbers,
+        gravity: None,
+        columns: Box::new(ColumnsInMemory::new(&values, samples * dofs)),
+    }
+}
+
 #[test]
 fn a_step_makes_no_allocation() {
     let free = recording(include_bytes!("../../../data/recordings/v1/free.palp"));
@@ -50,9 +70,14 @@ fn a_step_makes_no_allocation() {
     let start =
         |x: f64| ObjectStart { pose: Pose { position: DVec3::X * x, ..Pose::IDENTITY }, twist: Twist::ZERO };
     let parameters = ModelParameters { devices: 4, gravity: DVec3::Y * -9.81, ..ModelParameters::default() };
+    let convolved = ModelObject {
+        recording: free.clone(),
+        response: ResponseForm::Fir(Arc::new(table(&free))),
+        start: start(2.0),
+    };
     let model = Model::new(
         parameters,
-        vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed, start(1.0))],
+        vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed, start(1.0)), convolved],
     )
     .expect("a good model");
     let mut state = State::new(&model);
@@ -65,8 +90,10 @@ fn a_step_makes_no_allocation() {
         // New grasps, old ones, none, one that does not exist, one on the same point, a hand that is no number.
         for (device, entry) in input.devices.iter_mut().enumerate() {
             let device = device as u32;
-            entry.grasp = match (number / 7 + device) % 5 {
+            entry.grasp = match (number / 7 + device) % 7 {
                 0 => None,
+                5 => grasp(2, device),
+                6 => grasp(2, number / 2 % 90),
                 1 => grasp(0, device),
                 2 => grasp(1, 3),
                 3 => grasp(0, 999),

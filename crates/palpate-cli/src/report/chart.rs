@@ -5,11 +5,9 @@
 //! tell series apart without them. Lengths are in units of the view box, pixels where the page has room.
 
 use super::look::looks;
-pub use super::marks::Mark;
 use super::text::{Anchor, LINE, short, text, width, wrapped};
-pub use super::ticks::Scale;
 use super::ticks::{Span, Tick};
-use super::{escape, marks};
+use super::{Mark, Scale, escape, marks};
 use glam::DVec2;
 
 /// A chart of lines or markers over two axes.

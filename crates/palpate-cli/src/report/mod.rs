@@ -9,6 +9,9 @@ pub mod picture;
 mod text;
 mod ticks;
 
+pub use marks::Mark;
+pub use ticks::Scale;
+
 /// The whole page.
 #[derive(Clone, Debug)]
 pub struct Page {

@@ -2,14 +2,13 @@
 
 use crate::Failure;
 use crate::plot::{Curve, plot};
-use crate::progress::Bars;
+use crate::progress::{Bars, WithoutRemarks};
 use crate::verbs::run::{self, simulate};
 use crate::verbs::{inspect, print, read_recording, write_whole};
 use clap::Args;
 use palpate::{Damping, Material, Recording};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
-use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, record};
 use palpate_fem::residual::ResidualChoice;
 use std::f64::consts::PI;
@@ -148,10 +147,10 @@ pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Rec
     crate::tell(&format!(
         "recording the paper's cube, {cells}³ cells, {modes} modes (once; it is kept for the next time)"
     ));
-    let mut progress = Quiet(Bars::new());
+    let mut progress = Bars::new();
     let mesh = box_mesh([0.1; 3], [cells; 3])?;
-    let recording = record(mesh, &paper_cube(cells, modes), &mut progress)?.recording;
-    progress.0.finish();
+    let recording = record(mesh, &paper_cube(cells, modes), &mut WithoutRemarks(&mut progress))?.recording;
+    progress.finish();
     // A cache that can't be written costs time the next time, nothing else.
     if let (Some(folder), Some(path)) = (folder, path)
         && std::fs::create_dir_all(&folder).is_ok()
@@ -163,19 +162,6 @@ pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Rec
         ));
     }
     Ok(recording)
-}
-
-/// Bars without remarks: the paper's linear elements are what is wanted here.
-struct Quiet(Bars);
-
-impl Progress for Quiet {
-    fn begin(&mut self, stage: &str, total: u64) {
-        self.0.begin(stage, total);
-    }
-    fn advance(&mut self, units: u64) {
-        self.0.advance(units);
-    }
-    fn remark(&mut self, _text: &str) {}
 }
 
 fn cache_folder() -> Option<PathBuf> {

@@ -5,6 +5,7 @@
 
 mod compliance;
 mod frequencies;
+mod impulse;
 mod motion;
 mod pinch;
 mod spheres;
@@ -115,6 +116,11 @@ pub const CASES: &[Case] = &[
         name: "pinch",
         about: "pinching the paper's cube against the solution with all 6585 modes",
         run: pinch::pinch,
+    },
+    Case {
+        name: "impulse",
+        about: "a point's impulse response by time integration against all 6585 modes of the paper's cube",
+        run: impulse::impulse,
     },
     Case {
         name: "shaken-block",

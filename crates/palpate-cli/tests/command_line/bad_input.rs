@@ -25,7 +25,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "recording = \"cube.palp\"",
             "recording = \"cube.palp\"\nspeed = 1",
             7,
-            "`name`, `recording`, `position`, `orientation`, `velocity`, `angular_velocity`",
+            "`name`, `recording`, `response`, `table`, `position`, `orientation`, `velocity`, `angular_velocity`",
         ),
         ("mode = \"held\"", "mode = \"held\"\nforce = 1", 11, "`name`, `mode`, `attach`, `path`"),
         ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "`file`"),
@@ -229,7 +229,7 @@ fn damaged_recordings_are_refused_wherever_the_damage_is() {
         workplace.fail(&["inspect", "no.palp"]),
         "cannot read the recording no.palp: No such file or directory (os error 2)"
     );
-    assert_eq!(workplace.fail(&["inspect", "."]), "cannot read the recording .: it is not a file");
+    assert_eq!(workplace.fail(&["inspect", "."]), ".: there is no store of impulse responses");
 }
 
 #[test]
@@ -265,7 +265,8 @@ fn a_failed_recording_says_why_and_leaves_what_was_there() {
     );
     assert_eq!(
         with(&["--fix", "foot"]),
-        "--fix \"foot\" is neither a group of the mesh nor a condition such as 'x<0.001' or 'y>=0.1 & z<0'; the mesh \
+        "--fix \"foot\" is neither a group of the mesh nor a condition such as 'x<0.001' or 'y>=0.1 & z<0', nor all, surface, \
+         region:NAME or nodes:1,5-9; the mesh \
          names no groups"
     );
     assert_eq!(

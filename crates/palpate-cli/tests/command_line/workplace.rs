@@ -73,7 +73,9 @@ impl Workplace {
 
     /// Write a file.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        std::fs::write(self.path(name), content).expect("a writable folder");
+        let path = self.path(name);
+        path.parent().map(std::fs::create_dir_all).transpose().expect("a writable folder");
+        std::fs::write(path, content).expect("a writable folder");
     }
 
     /// Read a file.

@@ -1,0 +1,71 @@
+//! The paper's table and figures, made again: what `palpate reproduce` measures and writes.
+
+mod agreement;
+pub mod cost;
+mod impulses;
+mod passivity;
+mod recording;
+
+use crate::Failure;
+use crate::progress::Bars;
+use crate::report::Section;
+use crate::verbs::demo::paper_cube;
+use palpate_fem::mesh::box_mesh;
+use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
+use std::fmt::Write;
+
+/// A file of numbers beside the report.
+pub struct DataFile {
+    /// Its name.
+    pub name: String,
+    /// Its text.
+    pub text: String,
+}
+
+/// One part of the report.
+pub struct Chapter {
+    /// What the page shows.
+    pub section: Section,
+    /// The numbers behind it.
+    pub data: Vec<DataFile>,
+}
+
+/// How thorough the measurements are.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Cells along a side of the cube; the paper's has 12.
+    pub cells: u32,
+    /// Columns of the table that are timed.
+    pub columns: usize,
+    /// Steps that are timed per point of a curve.
+    pub steps: usize,
+}
+
+/// All chapters, in the order of the paper.
+pub fn chapters(effort: Effort, progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
+    let body = cube(effort.cells, 200, progress)?;
+    Ok(vec![
+        recording::chapter(&body, effort, progress)?,
+        impulses::chapter(&body, progress)?,
+        passivity::chapter(&body, progress)?,
+        agreement::chapter(progress)?,
+        cost::chapter(effort, progress)?,
+    ])
+}
+
+/// The paper's cube with so many cells along a side, without certificate.
+fn cube(cells: u32, modes: usize, progress: &mut Bars) -> Result<Recorded, Failure> {
+    let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, modes) };
+    let mut quiet = crate::progress::WithoutRemarks(progress);
+    Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, &mut quiet)?)
+}
+
+/// Lines of comma-separated numbers under a header.
+fn csv(name: &str, header: &str, rows: impl Iterator<Item = Vec<f64>>) -> DataFile {
+    let mut text = format!("{header}\n");
+    for row in rows {
+        let numbers: Vec<String> = row.iter().map(f64::to_string).collect();
+        let _ = writeln!(text, "{}", numbers.join(","));
+    }
+    DataFile { name: name.into(), text }
+}

@@ -1,0 +1,73 @@
+//! The impulse response of the middle of the paper's top face, by time integration, against all 6585 modes.
+
+use super::{Check, recorded};
+use crate::Failure;
+use crate::verbs::demo::paper_cube;
+use faer::Mat;
+use glam::DVec3;
+use palpate::Sampling;
+use palpate_fem::mesh::box_mesh;
+use palpate_fem::record::{Extent, RecordParameters};
+use palpate_fem::table::{Method, TableParameters, TableRecorder};
+
+const REFERENCE: &str = include_str!("../../../../data/reference/impulse_response_top_centre_1ms.csv");
+
+/// Nodes of the reference's columns: middle of the top and of the bottom, a top corner, the middle of a side.
+const PLACES: [DVec3; 4] = [
+    DVec3::new(0.0, 0.05, 0.0),
+    DVec3::new(0.0, -0.05, 0.0),
+    DVec3::new(0.05, 0.05, 0.05),
+    DVec3::new(0.05, 0.0, 0.0),
+];
+
+/// Samples that are compared: after 40 ms the waves have crossed the cube several times.
+const SAMPLES: usize = 40;
+
+/// Errors with one, two and four integration steps per sample.
+pub fn impulse() -> Result<Vec<Check>, Failure> {
+    let rows = REFERENCE.lines().skip(1).take(SAMPLES);
+    let reference: Vec<Vec<f64>> =
+        rows.map(|row| row.split(',').skip(1).filter_map(|cell| cell.parse().ok()).collect()).collect();
+    let parameters = RecordParameters { extent: Extent::Body, ..paper_cube(12, 1) };
+    let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
+    let nodes = &body.system.discretisation.nodes;
+    let place = |p: DVec3| {
+        let off = |node: &u32| (nodes[*node as usize] - p).length();
+        (0..nodes.len() as u32).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+    };
+    let observed = PLACES.map(place);
+    let mut order: Vec<usize> = (0..4).collect();
+    order.sort_by_key(|&at| observed[at]);
+    let mut loads = Mat::zeros(body.system.discretisation.dofs(), 1);
+    loads[(3 * observed[0] as usize + 1, 0)] = 1.0;
+    let peak = reference.iter().flatten().fold(0.0_f64, |peak, u| peak.max(u.abs()));
+    let mut errors = Vec::new();
+    for substeps in [1, 2, 4] {
+        let parameters = TableParameters {
+            step_s: 1e-3,
+            samples: SAMPLES,
+            sampling: Sampling::End,
+            method: Method::Transient { substeps },
+            touchable_nodes: vec![observed[0]],
+            observed_nodes: order.iter().map(|&at| observed[at]).collect(),
+        };
+        let recorder = TableRecorder::new(&body, &parameters).map_err(|e| Failure(e.to_string()))?;
+        let response = recorder.responses(loads.clone()).concat();
+        let mut error = 0.0_f64;
+        for (sample, expected) in response.chunks_exact(12).zip(&reference) {
+            for (at, &node) in order.iter().enumerate() {
+                for axis in 0..3 {
+                    error = error.max((sample[3 * at + axis] - expected[3 * node + axis]).abs());
+                }
+            }
+        }
+        errors.push(error / peak);
+    }
+    let check = |quantity, error, allowed| Check::new(quantity, error, 0.0, allowed);
+    Ok(vec![
+        // Measured, with half a digit; the reference is the other route.
+        check("largest error over 40 ms, one step per sample", errors[0], 0.02),
+        check("the same, two steps per sample", errors[1], 5e-4),
+        check("the same, four steps per sample", errors[2], 5e-5).with_order(errors[0], errors[1], 2.0, 5.0),
+    ])
+}

@@ -1,0 +1,170 @@
+//! The table R[s], two ways: closed form against time integration, identities, selections.
+
+use palpate::{Damping, Material, Sampling};
+use palpate_fem::element::Order;
+use palpate_fem::mesh::box_mesh;
+use palpate_fem::progress::Silent;
+use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
+use palpate_fem::residual::ResidualChoice;
+use palpate_fem::table::{Method, TableParameters, TableRecorder};
+
+const MODES_OF_ALL: usize = 1_000_000;
+
+fn body(order: Order, damping: Damping, fix: bool) -> Recorded {
+    let mesh = box_mesh([0.1, 0.06, 0.05], [3, 2, 2]).expect("a good box");
+    let fixed_nodes = if fix {
+        (0..mesh.nodes.len() as u32).filter(|&node| mesh.nodes[node as usize].x < -0.049).collect()
+    } else {
+        Vec::new()
+    };
+    let parameters = RecordParameters {
+        materials: vec![Material {
+            region: String::new(),
+            young_pa: 2e3,
+            poisson: 0.4,
+            density_kg_m3: 200.0,
+        }],
+        order,
+        modes: MODES_OF_ALL,
+        damping,
+        residual: ResidualChoice::None,
+        fixed_nodes,
+        source: "block".into(),
+        extent: Extent::Uncertified,
+    };
+    record(mesh, &parameters, &mut Silent).expect("a good recording")
+}
+
+fn parameters(recorded: &Recorded, sampling: Sampling, method: Method) -> TableParameters {
+    let nodes: Vec<u32> = (0..recorded.system.discretisation.nodes.len() as u32).collect();
+    TableParameters {
+        step_s: 2e-3,
+        samples: 60,
+        sampling,
+        method,
+        touchable_nodes: recorded.system.discretisation.surface_nodes(),
+        observed_nodes: nodes,
+    }
+}
+
+fn columns(
+    recorded: &Recorded,
+    parameters: &TableParameters,
+    range: std::ops::Range<usize>,
+) -> Vec<Vec<f64>> {
+    TableRecorder::new(recorded, parameters).expect("good parameters").columns(range, 12, &|_| {})
+}
+
+fn largest(values: &[Vec<f64>]) -> f64 {
+    values.iter().flatten().fold(0.0, |a, b| a.max(b.abs()))
+}
+
+fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    a.iter().flatten().zip(b.iter().flatten()).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+}
+
+const TRANSIENT: Method = Method::Transient { substeps: 1 };
+const RAYLEIGH: Damping = Damping::Rayleigh { alpha: 2.0, beta: 1e-3 };
+
+#[test]
+fn time_integration_comes_to_the_closed_form_of_all_modes_with_order_five() {
+    for (order, fix) in [(Order::Linear, false), (Order::Linear, true), (Order::Quadratic, false)] {
+        for sampling in [Sampling::End, Sampling::Mean] {
+            let recorded = body(order, RAYLEIGH, fix);
+            let of = |method| TableParameters { samples: 20, ..parameters(&recorded, sampling, method) };
+            let exact = columns(&recorded, &of(Method::ClosedForm), 60..72);
+            let errors = [4, 8].map(|substeps| {
+                let computed = columns(&recorded, &of(Method::Transient { substeps }), 60..72);
+                difference(&exact, &computed) / largest(&exact)
+            });
+            let observed = (errors[0] / errors[1]).log2();
+            assert!(
+                observed > 4.7 && errors[1] < 1e-4,
+                "{order:?} {fix} {sampling:?}: {errors:?}, order {observed}"
+            );
+        }
+    }
+}
+
+#[test]
+fn time_integration_without_damping_neither_grows_nor_rings() {
+    let recorded = body(Order::Linear, Damping::Ratio(0.0), false);
+    let parameters = TableParameters { samples: 3000, ..parameters(&recorded, Sampling::End, TRANSIENT) };
+    let column = &columns(&recorded, &parameters, 0..1)[0];
+    let width = 3 * parameters.observed_nodes.len();
+    let size =
+        |from: usize| column[from * width..][..200 * width].iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    assert!(size(2800) < size(0), "{} {}", size(2800), size(0));
+}
+
+#[test]
+fn the_table_is_reciprocal_and_free_of_rigid_motion() {
+    let recorded = body(Order::Linear, RAYLEIGH, false);
+    for method in [TRANSIENT, Method::ClosedForm] {
+        let nodes: Vec<u32> = (0..recorded.system.discretisation.nodes.len() as u32).collect();
+        let parameters =
+            TableParameters { touchable_nodes: nodes, ..parameters(&recorded, Sampling::End, method) };
+        let dofs = 3 * parameters.observed_nodes.len();
+        let table = columns(&recorded, &parameters, 0..dofs);
+        let scale = largest(&table);
+        let mut total = faer::Mat::<f64>::zeros(dofs, parameters.samples);
+        for (i, j, s) in (0..dofs).flat_map(|i| (0..dofs).map(move |j| (i, j, (i + 3 * j) % 60))) {
+            // Solves of a system with condition up to 1e6 keep ten of sixteen digits.
+            let apart = (table[i][s * dofs + j] - table[j][s * dofs + i]).abs();
+            assert!(apart < 1e-10 * scale, "{method:?} {i} {j} {s}: {apart:e}");
+        }
+        for s in 0..parameters.samples {
+            (0..dofs).for_each(|i| total[(i, s)] = table[4][s * dofs + i]);
+        }
+        let before = total.clone();
+        recorded.system.remove_rigid(&mut total);
+        total -= &before;
+        assert!(total.norm_max() < 1e-12 * scale, "{method:?}: rigid part {:e}", total.norm_max());
+    }
+}
+
+#[test]
+fn columns_do_not_depend_on_how_they_are_put_together() {
+    let recorded = body(Order::Linear, RAYLEIGH, false);
+    for method in [TRANSIENT, Method::ClosedForm] {
+        let parameters = parameters(&recorded, Sampling::End, method);
+        let together = columns(&recorded, &parameters, 0..30);
+        let apart = [0..7, 7..8, 8..30].map(|range| columns(&recorded, &parameters, range)).concat();
+        assert!(together == apart, "{method:?}");
+    }
+}
+
+#[test]
+fn a_held_body_answers_gravity_both_ways() {
+    let recorded = body(Order::Linear, RAYLEIGH, true);
+    let of = |method| {
+        let parameters = parameters(&recorded, Sampling::End, method);
+        let recorder = TableRecorder::new(&recorded, &parameters).expect("good parameters");
+        recorder.gravity().expect("a body with fixed nodes")
+    };
+    let (exact, computed) = (vec![of(Method::ClosedForm)], vec![of(Method::Transient { substeps: 8 })]);
+    assert!(difference(&exact, &computed) < 1e-4 * largest(&exact));
+    let free = body(Order::Linear, RAYLEIGH, false);
+    let parameters = parameters(&free, Sampling::End, TRANSIENT);
+    assert!(TableRecorder::new(&free, &parameters).expect("good parameters").gravity().is_none());
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let recorded = body(Order::Linear, Damping::Ratio(0.05), false);
+    let refusal = |change: &dyn Fn(&mut TableParameters)| {
+        let mut parameters = parameters(&recorded, Sampling::End, Method::ClosedForm);
+        change(&mut parameters);
+        TableRecorder::new(&recorded, &parameters).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    assert_eq!(
+        refusal(&|p| p.step_s = f64::NAN),
+        "the table's step is NaN s, expected above 0 and at most 1"
+    );
+    assert_eq!(refusal(&|p| p.samples = 0), "the table has 0 samples: the duration is shorter than a step");
+    assert_eq!(
+        refusal(&|p| p.method = TRANSIENT),
+        "the same damping ratio for every mode is no damping matrix that can be integrated: use Rayleigh damping \
+         (--rayleigh), or the closed form"
+    );
+}

@@ -1,0 +1,276 @@
+//! Direct convolution of a recorded table: the same forces as the modal form, whatever the contacts do.
+
+use glam::DVec3;
+use palpate::{
+    ColumnsInMemory, DeviceInput, Grasp, HeldOscillator, ImpulseResponse, Input, Model, ModelObject,
+    ModelParameters, ObjectStart, Oscillation, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint,
+    Twist, step,
+};
+use std::sync::Arc;
+
+const H: f64 = 1e-3;
+
+fn recording(bytes: &[u8]) -> Arc<Recording> {
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+fn free() -> Arc<Recording> {
+    recording(include_bytes!("../../../data/recordings/v1/free.palp"))
+}
+
+fn fixed() -> Arc<Recording> {
+    recording(include_bytes!("../../../data/recordings/v1/fixed.palp"))
+}
+
+/// R[s] = Φ·g(s)·Φᵀ, and S added to R[0], of a recording's own modes.
+fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
+    let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
+    let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
+    let answers: Vec<Vec<f64>> = pairs
+        .map(|(&omega, &zeta)| {
+            let oscillator = HeldOscillator::new(omega, zeta, step_s);
+            let mut state = Oscillation::default();
+            (0..samples)
+                .map(|s| {
+                    state = oscillator.advance(state, if s == 0 { 1.0 } else { 0.0 });
+                    state.q
+                })
+                .collect()
+        })
+        .collect();
+    let row = |dof: usize| recording.modes.row(dof / 3, dof % 3);
+    // Responses to modal forces, with a displacement that is there in the first sample only.
+    let respond = |forces: &[f64], still: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let mut column = Vec::with_capacity(samples * dofs);
+        for s in 0..samples {
+            for i in 0..dofs {
+                let modal: f64 = (0..m).map(|k| row(i)[k] * answers[k][s] * forces[k]).sum();
+                column.push(if s == 0 { modal + still(i) } else { modal });
+            }
+        }
+        column
+    };
+    let columns = (0..dofs)
+        .flat_map(|j| respond(row(j), &|i| recording.residual.block(i / 3, j / 3).col(j % 3)[i % 3]));
+    let values: Vec<f64> = columns.collect();
+    let gravity = recording.gravity.as_ref().map(|gravity| {
+        let along = |axis: usize| {
+            let unit = DVec3::from_array(std::array::from_fn(|a| f64::from(u8::from(a == axis))));
+            let forces = &gravity.modal_forces[axis * m..(axis + 1) * m];
+            respond(forces, &|i| gravity.residual_displacement(i / 3, unit)[i % 3])
+        };
+        (0..3).flat_map(along).collect()
+    });
+    let dof_numbers: Vec<u32> =
+        recording.surface.source_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+    ImpulseResponse {
+        step_s,
+        samples,
+        sampling: Sampling::End,
+        touchable_dofs: dof_numbers.clone(),
+        observed_dofs: dof_numbers,
+        gravity,
+        columns: Box::new(ColumnsInMemory::new(&values, samples * dofs)),
+    }
+}
+
+fn scene(recording: &Arc<Recording>, form: ResponseForm, parameters: ModelParameters) -> (Model, State) {
+    let twist = match recording.metadata.support {
+        palpate::Support::Free => {
+            Twist { linear: DVec3::new(0.1, 0.0, -0.05), angular: DVec3::new(1.0, -2.0, 0.5) }
+        }
+        palpate::Support::Fixed => Twist::ZERO,
+    };
+    let start = ObjectStart { pose: Pose::IDENTITY, twist };
+    let object = ModelObject { recording: recording.clone(), response: form, start };
+    let model = Model::new(parameters, vec![object]).expect("a good model");
+    let state = State::new(&model);
+    (model, state)
+}
+
+/// Movable points of a recording, one per triangle, with all three weights.
+fn points(recording: &Recording) -> Vec<SurfacePoint> {
+    let point = |triangle: u32| SurfacePoint { triangle, weights: [0.2, 0.3, 0.5] };
+    let all = (0..recording.surface.triangles.len() as u32).map(point);
+    all.filter(|point| recording.is_movable(point)).collect()
+}
+
+/// Largest difference of forces and of surface displacements between the two forms, as shares of the largest,
+/// with two hands that do what `grasps` says.
+fn differences(
+    recording: &Arc<Recording>,
+    samples: usize,
+    steps: usize,
+    gravity: DVec3,
+    grasps: impl Fn(usize) -> [Option<SurfacePoint>; 2],
+) -> (f64, f64) {
+    let parameters = ModelParameters { devices: 2, gravity, ..ModelParameters::default() };
+    let fir = ResponseForm::Fir(Arc::new(table(recording, samples, H)));
+    let mut scenes = [ResponseForm::Modal, fir].map(|form| scene(recording, form, parameters.clone()));
+    let nodes = recording.surface.positions.len();
+    let (mut worst, mut largest) = ([0.0_f64; 2], [0.0_f64; 2]);
+    for number in 0..steps {
+        let t = number as f64 * H;
+        let devices = grasps(number).into_iter().enumerate().map(|(device, point)| {
+            // Hands sway about where the points of the moving body are.
+            let pose = scenes[0].1.output().objects[0].pose;
+            let sway =
+                3e-4 * DVec3::new((40.0 * t).sin(), (70.0 * t).cos(), (25.0 * t + device as f64).sin());
+            let rest = point.map_or(DVec3::ZERO, |p| recording.surface.rest_position(&p));
+            let grasp = point.map(|point| Grasp { object: 0, point });
+            DeviceInput { position: pose.world_from_body(rest) + sway, grasp }
+        });
+        let input = Input { devices: devices.collect() };
+        let mut forces = [[DVec3::ZERO; 2]; 2];
+        let mut shapes = [vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]];
+        for (at, (model, state)) in scenes.iter_mut().enumerate() {
+            let output = step(model, state, &input);
+            assert_eq!(output.status.rejected_devices + output.status.unsolved_objects, 0, "step {number}");
+            forces[at] = [output.devices[0].force_on_hand, output.devices[1].force_on_hand];
+            state.surface_displacement(model, 0, &mut shapes[at]);
+        }
+        for (modal, fir) in forces[0].iter().zip(&forces[1]) {
+            worst[0] = worst[0].max((*modal - *fir).length());
+            largest[0] = largest[0].max(modal.length());
+        }
+        for (modal, fir) in shapes[0].iter().zip(&shapes[1]) {
+            worst[1] = worst[1].max((*modal - *fir).length());
+            largest[1] = largest[1].max(modal.length());
+        }
+    }
+    assert!(largest[0] > 1e-3 && largest[1] > 1e-6, "the hands do something: {largest:?}");
+    (worst[0] / largest[0], worst[1] / largest[1])
+}
+
+/// Sums of a few hundred terms, in another order, and a solution of a system with condition below 1e3.
+const ROUND_OFF: f64 = 1e-11;
+
+#[test]
+fn forces_and_shapes_are_those_of_the_modal_form() {
+    let recording = free();
+    let held = points(&recording);
+    let (force, shape) =
+        differences(&recording, 300, 300, DVec3::ZERO, |_| [Some(held[3]), Some(held[held.len() / 2])]);
+    assert!(force < ROUND_OFF && shape < ROUND_OFF, "{force:e} {shape:e}");
+}
+
+/// The same, where every step pulls two new points to where hands are: round-off comes back enlarged, step after step.
+const FED_BACK: f64 = 1e-9;
+
+#[test]
+fn contacts_come_go_and_wander_while_the_history_remembers_them() {
+    let recording = free();
+    let held = points(&recording);
+    // Every second step another point, more points than the history has room to copy series for; the second hand lets
+    // go now and then.
+    let (force, shape) = differences(&recording, 300, 300, DVec3::ZERO, |number| {
+        let first = held[(number / 2 * 7) % held.len()];
+        let second = held[(number / 40 * 5 + 3) % held.len()];
+        [Some(first), (number % 40 < 25 && first != second).then_some(second)]
+    });
+    assert!(force < FED_BACK && shape < FED_BACK, "{force:e} {shape:e}");
+}
+
+#[test]
+fn a_body_with_fixed_nodes_sags_under_gravity_as_in_modal_form() {
+    let recording = fixed();
+    let held = points(&recording);
+    let gravity = DVec3::new(1.0, -9.81, 0.5);
+    let (force, shape) = differences(&recording, 300, 300, gravity, |number| {
+        [(number > 50).then_some(held[2]), (number % 100 < 60).then_some(held[held.len() / 2])]
+    });
+    assert!(force < ROUND_OFF && shape < ROUND_OFF, "{force:e} {shape:e}");
+}
+
+#[test]
+fn what_lies_more_than_the_window_back_is_forgotten() {
+    let recording = free();
+    let held = points(&recording);
+    let samples = 20;
+    let form = ResponseForm::Fir(Arc::new(table(&recording, samples, H)));
+    let (model, mut state) =
+        scene(&recording, form, ModelParameters { devices: 1, ..ModelParameters::default() });
+    let rest = recording.surface.rest_position(&held[0]);
+    let push =
+        DeviceInput { position: rest + DVec3::X * 1e-3, grasp: Some(Grasp { object: 0, point: held[0] }) };
+    step(&model, &mut state, &Input { devices: vec![push] });
+    let mut shape = vec![DVec3::ZERO; recording.surface.positions.len()];
+    for number in 1..=samples {
+        state.surface_displacement(&model, 0, &mut shape);
+        assert!(shape.iter().any(|u| *u != DVec3::ZERO), "step {number}");
+        step(&model, &mut state, &Input { devices: vec![] });
+    }
+    state.surface_displacement(&model, 0, &mut shape);
+    assert!(shape.iter().all(|u| *u == DVec3::ZERO));
+}
+
+#[test]
+fn the_energy_that_hands_gave_is_in_motion_and_deformation() {
+    let recording = free();
+    let held = points(&recording);
+    let form = ResponseForm::Fir(Arc::new(table(&recording, 200, H)));
+    let (model, mut state) =
+        scene(&recording, form, ModelParameters { devices: 1, ..ModelParameters::default() });
+    let rest = recording.surface.rest_position(&held[5]);
+    for number in 1..400 {
+        let position = rest + DVec3::new(0.0, 3e-3 * (0.05 * f64::from(number)).sin(), 0.0);
+        let grasp = (number % 90 < 70).then_some(Grasp { object: 0, point: held[5] });
+        let energy =
+            step(&model, &mut state, &Input { devices: vec![DeviceInput { position, grasp }] }).energy;
+        assert!(energy.defect.abs() < 1e-13 * (energy.input.abs() + energy.stored()), "{number}: {energy:?}");
+    }
+}
+
+#[test]
+fn tables_that_do_not_fit_are_refused() {
+    let recording = free();
+    let refusal = |change: &dyn Fn(&mut ImpulseResponse)| {
+        let mut table = table(&recording, 5, H);
+        change(&mut table);
+        let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+        let object =
+            ModelObject { recording: recording.clone(), response: ResponseForm::Fir(Arc::new(table)), start };
+        Model::new(ModelParameters::default(), vec![object]).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    assert_eq!(
+        refusal(&|table| table.step_s = 2e-3),
+        "object 0: the impulse response was recorded with a step of 0.002 s, the scene's step is 0.001 s"
+    );
+    assert_eq!(
+        refusal(&|table| table.samples = 4),
+        format!(
+            "object 0: columns of the impulse response hold {} numbers, expected {}",
+            15 * recording.surface.positions.len(),
+            12 * recording.surface.positions.len()
+        )
+    );
+    assert_eq!(
+        refusal(&|table| table.observed_dofs[0] = u32::MAX),
+        "object 0: the impulse response has touchable nodes that are not observed"
+    );
+    assert_eq!(refusal(&|table| table.samples = 0), "object 0: the impulse response holds nothing");
+}
+
+#[test]
+fn a_point_that_is_not_touchable_can_not_be_held() {
+    let recording = free();
+    let mut table = table(&recording, 5, H);
+    // The first node's columns are named as another's.
+    table.touchable_dofs[0] = u32::MAX;
+    let node = recording.surface.triangles.iter().position(|t| t.contains(&0)).expect("a triangle") as u32;
+    let point = SurfacePoint { triangle: node, weights: [1.0 / 3.0; 3] };
+    assert_eq!(
+        table.prepare(&recording.surface, &point).err().map(|e| e.to_string()).unwrap_or_default(),
+        format!(
+            "the point is not touchable in the impulse response: node {} was left out when it was recorded",
+            recording.surface.source_nodes[0]
+        )
+    );
+    let (model, mut state) = scene(
+        &recording,
+        ResponseForm::Fir(Arc::new(table)),
+        ModelParameters { devices: 1, ..Default::default() },
+    );
+    let device = DeviceInput { position: DVec3::ZERO, grasp: Some(Grasp { object: 0, point }) };
+    assert_eq!(step(&model, &mut state, &Input { devices: vec![device] }).status.rejected_devices, 1);
+}
