@@ -148,7 +148,7 @@ impl<'a> Dense<'a> {
             return Err(Failure(format!("--step is {step} s, expected above 0 and at most 1")));
         }
         let samples = (duration / step).round();
-        if !(samples >= 1.0 && samples <= 1e8) {
+        if !(1.0..=1e8).contains(&samples) {
             return Err(Failure(format!(
                 "--duration is {duration} s, expected at least one --step of {step} s, and at most 1e8 of them"
             )));

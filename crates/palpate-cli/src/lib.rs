@@ -38,7 +38,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Verb {
     Demo(verbs::demo::Arguments),
-    Record(verbs::record::Arguments),
+    Record(Box<verbs::record::Arguments>),
     Inspect(verbs::inspect::Arguments),
     Run(verbs::run::Arguments),
     Reproduce(verbs::reproduce::Arguments),

@@ -6,7 +6,7 @@
 use crate::discretisation::Discretisation;
 use crate::element::{Elasticity, ElementMatrices};
 use crate::material::lame_constants;
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatRef};
 use glam::DMat3;
 use palpate::Material;
 use rayon::prelude::*;
@@ -99,12 +99,6 @@ impl Assembly {
     /// K·X or M·X for a block of columns with 3·nodes rows.
     pub fn multiply(&self, which: Which, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
-        self.multiply_into(which, x, y.as_mut());
-        y
-    }
-
-    /// The same into a matrix of the shape of X.
-    pub fn multiply_into(&self, which: Which, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
         y.par_col_iter_mut().zip(x.par_col_iter()).for_each(|(mut out, column)| {
             let at = |node: u32| {
                 let base = 3 * node as usize;
@@ -122,5 +116,21 @@ impl Assembly {
                 }
             }
         });
+        y
+    }
+
+    /// X·M for vectors that lie side by side, a row each, in whole columns: 3·nodes columns.
+    pub fn mass_times_rows(&self, x: &Mat<f64>, y: &mut Mat<f64>) {
+        for node in 0..self.nodes() {
+            for axis in 0..3 {
+                let sum = y.col_as_slice_mut(3 * node + axis);
+                sum.fill(0.0);
+                for at in self.offsets[node]..self.offsets[node + 1] {
+                    let other = x.col_as_slice(3 * self.columns[at] as usize + axis);
+                    let mass = self.mass[at];
+                    sum.iter_mut().zip(other).for_each(|(sum, x)| *sum += mass * x);
+                }
+            }
+        }
     }
 }

@@ -251,7 +251,7 @@ impl<'a> TableRecorder<'a> {
                 }
             }
             let Some(motion) = &motion else { continue };
-            let mut displacement = motion.displacement.clone();
+            let mut displacement = motion.displacement();
             self.recorded.system.remove_rigid(&mut displacement);
             for (j, column) in columns.iter_mut().enumerate() {
                 let sample = &mut column[look / looks * width..][..width];

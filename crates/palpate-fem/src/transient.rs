@@ -18,11 +18,9 @@
 //! K·u is carried along, since D·v' tells K·v'. A free body's load is balanced first, so that the rigid motion
 //! stays out. Reference: Hairer & Wanner, *Solving Ordinary Differential Equations II*, IV.6 (γ in table 6.4).
 
-use crate::assembly::Which;
-use crate::factor::{Factor, FactorError};
+use crate::factor::{Factor, FactorError, SolveRoom};
 use crate::system::System;
-use faer::reborrow::ReborrowMut;
-use faer::{ColMut, Mat};
+use faer::Mat;
 
 /// γ for which five stages give order 5.
 const GAMMA: f64 = 0.278_053_841_136_452_3;
@@ -43,10 +41,10 @@ pub struct Transient<'a> {
     held: [f64; STAGES],
 }
 
-/// Displacement u, velocity v, and K·u, M·v, a column per load; with room for a step.
+/// Displacement u, velocity v, and K·u, M·v, a row per load and a column per degree of freedom, so that the loads' values
+/// lie side by side; with room for a step.
 pub struct Motion {
-    /// u [m].
-    pub displacement: Mat<f64>,
+    displacement: Mat<f64>,
     velocity: Mat<f64>,
     elastic_force: Mat<f64>,
     momentum: Mat<f64>,
@@ -55,6 +53,7 @@ pub struct Motion {
     stage_momentum: Mat<f64>,
     right: Mat<f64>,
     solved: Mat<f64>,
+    room: SolveRoom,
 }
 
 impl<'a> Transient<'a> {
@@ -73,7 +72,7 @@ impl<'a> Transient<'a> {
 
     /// The motion after a step from rest in which `loads` [N], balanced already, are held.
     pub fn push(&self, loads: &Mat<f64>) -> Motion {
-        let mut motion = Motion::at_rest(loads.nrows(), loads.ncols());
+        let mut motion = Motion::at_rest(loads.ncols(), loads.nrows());
         self.hold(&mut motion, loads);
         motion
     }
@@ -88,7 +87,7 @@ impl<'a> Transient<'a> {
     fn hold(&self, motion: &mut Motion, loads: &Mat<f64>) {
         // b = (0, M⁻¹·f): its first multiplication by w solves D·v' = f.
         motion.stage_force.fill(0.0);
-        motion.stage_momentum.copy_from(loads);
+        motion.stage_momentum.copy_from(loads.transpose());
         self.stages(motion, self.held);
     }
 
@@ -110,20 +109,6 @@ impl<'a> Transient<'a> {
         for (k, &c) in coefficients.iter().enumerate() {
             // How often v_k counts in Σ c·u.
             let d = g * coefficients[k..].iter().sum::<f64>();
-            for_each(
-                [&mut motion.right, &mut motion.solved],
-                [&motion.stage_momentum, &motion.stage_force],
-                |to, from| {
-                    to[0] = (from[0] - g * from[1]) / share;
-                    to[1] = to[0];
-                },
-            );
-            self.factor.solve(motion.solved.as_mut());
-            self.system.assembly.multiply_into(
-                Which::Mass,
-                motion.solved.as_ref(),
-                motion.stage_momentum.as_mut(),
-            );
             let Motion {
                 displacement,
                 velocity,
@@ -133,7 +118,14 @@ impl<'a> Transient<'a> {
                 stage_momentum,
                 right,
                 solved,
+                room,
             } = motion;
+            for_each([right, solved], [stage_momentum, stage_force], |to, [mv, ku]| {
+                to[0] = (mv - g * ku) / share;
+                to[1] = to[0];
+            });
+            self.factor.solve_side_by_side(solved.as_mut(), room);
+            self.system.assembly.mass_times_rows(solved, stage_momentum);
             for_each(
                 [displacement, velocity, elastic_force, momentum, stage_force],
                 [solved, stage_momentum, right],
@@ -152,8 +144,13 @@ impl<'a> Transient<'a> {
 }
 
 impl Motion {
-    fn at_rest(n: usize, columns: usize) -> Self {
-        let zero = || Mat::zeros(n, columns);
+    /// u [m], a column per load.
+    pub fn displacement(&self) -> Mat<f64> {
+        self.displacement.transpose().to_owned()
+    }
+
+    fn at_rest(loads: usize, dofs: usize) -> Self {
+        let zero = || Mat::zeros(loads, dofs);
         Self {
             displacement: zero(),
             velocity: zero(),
@@ -163,6 +160,7 @@ impl Motion {
             stage_momentum: zero(),
             right: zero(),
             solved: zero(),
+            room: SolveRoom::default(),
         }
     }
 }
@@ -174,9 +172,9 @@ fn for_each<const N: usize, const M: usize>(
     change: impl Fn(&mut [f64; N], [f64; M]),
 ) {
     let (rows, columns) = (from[0].nrows(), from[0].ncols());
-    let mut to = to.map(|matrix| matrix.as_mut());
+    let mut to = to;
     for j in 0..columns {
-        let mut targets = to.each_mut().map(|matrix| column(matrix.rb_mut().col_mut(j)));
+        let mut targets = to.each_mut().map(|matrix| matrix.col_as_slice_mut(j));
         let sources = from.map(|matrix| matrix.col_as_slice(j));
         for i in 0..rows {
             let mut values = std::array::from_fn(|k| targets[k][i]);
@@ -184,11 +182,6 @@ fn for_each<const N: usize, const M: usize>(
             targets.iter_mut().zip(values).for_each(|(target, value)| target[i] = value);
         }
     }
-}
-
-/// A column of a matrix that we made, as numbers one after the other.
-fn column(column: ColMut<'_, f64>) -> &mut [f64] {
-    column.try_as_col_major_mut().map_or(&mut [], |column| column.as_slice_mut())
 }
 
 /// Up to which frequency [Hz] the integrator follows a wave to 1 % over 0.1 s, with steps of `step_s` [s].
@@ -228,11 +221,10 @@ fn coefficients() -> [f64; STAGES] {
     }
     // Gauss elimination; the matrix of binomials is well behaved without pivoting.
     for i in 0..STAGES {
-        for j in i + 1..STAGES {
-            let share = rows[j][i] / rows[i][i];
-            for k in i..=STAGES {
-                rows[j][k] -= share * rows[i][k];
-            }
+        let pivot = rows[i];
+        for row in &mut rows[i + 1..] {
+            let share = row[i] / pivot[i];
+            row.iter_mut().zip(pivot).for_each(|(entry, above)| *entry -= share * above);
         }
     }
     let mut solution = [0.0; STAGES];

@@ -26,25 +26,26 @@ fn fixed() -> Arc<Recording> {
 fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
     let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
     let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
-    let answers: Vec<Vec<f64>> = pairs
-        .map(|(&omega, &zeta)| {
-            let oscillator = HeldOscillator::new(omega, zeta, step_s);
-            let mut state = Oscillation::default();
-            (0..samples)
-                .map(|s| {
-                    state = oscillator.advance(state, if s == 0 { 1.0 } else { 0.0 });
-                    state.q
-                })
-                .collect()
+    // For each sample the answers of all modes.
+    let mut oscillators: Vec<(HeldOscillator, Oscillation)> = pairs
+        .map(|(&omega, &zeta)| (HeldOscillator::new(omega, zeta, step_s), Oscillation::default()))
+        .collect();
+    let answers: Vec<Vec<f64>> = (0..samples)
+        .map(|s| {
+            let advance = |(oscillator, state): &mut (HeldOscillator, Oscillation)| {
+                *state = oscillator.advance(*state, if s == 0 { 1.0 } else { 0.0 });
+                state.q
+            };
+            oscillators.iter_mut().map(advance).collect()
         })
         .collect();
     let row = |dof: usize| recording.modes.row(dof / 3, dof % 3);
     // Responses to modal forces, with a displacement that is there in the first sample only.
     let respond = |forces: &[f64], still: &dyn Fn(usize) -> f64| -> Vec<f64> {
         let mut column = Vec::with_capacity(samples * dofs);
-        for s in 0..samples {
+        for (s, answers) in answers.iter().enumerate() {
             for i in 0..dofs {
-                let modal: f64 = (0..m).map(|k| row(i)[k] * answers[k][s] * forces[k]).sum();
+                let modal: f64 = (0..m).map(|k| row(i)[k] * answers[k] * forces[k]).sum();
                 column.push(if s == 0 { modal + still(i) } else { modal });
             }
         }

@@ -283,12 +283,12 @@ mod tests {
 
     fn attribute<'a>(svg: &'a str, name: &str) -> Vec<&'a str> {
         let key = format!(" {name}=\"");
-        svg.split(&key).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
+        svg.split(&key).skip(1).map(|rest| rest.split('"').next().expect("as it was drawn")).collect()
     }
 
     /// Places of all texts and of the absolute corners of all paths.
     fn places(svg: &str) -> Vec<(f64, f64)> {
-        let number = |text: &&str| text.parse::<f64>().unwrap();
+        let number = |text: &&str| text.parse::<f64>().expect("as it was drawn");
         let texts = attribute(svg, "x")
             .iter()
             .zip(&attribute(svg, "y"))
@@ -297,8 +297,8 @@ mod tests {
         let mut all: Vec<(f64, f64)> = texts;
         for path in attribute(svg, "d") {
             for corner in path.split(['M', 'L']).skip(1) {
-                let corner = corner.split(|c: char| c.is_ascii_alphabetic()).next().unwrap();
-                let (x, y) = corner.split_once(' ').unwrap();
+                let corner = corner.split(|c: char| c.is_ascii_alphabetic()).next().expect("as it was drawn");
+                let (x, y) = corner.split_once(' ').expect("as it was drawn");
                 all.push((number(&x), number(&y)));
             }
         }
@@ -306,7 +306,8 @@ mod tests {
     }
 
     fn assert_inside(svg: &str) {
-        let size: Vec<f64> = attribute(svg, "viewBox")[0].split(' ').map(|v| v.parse().unwrap()).collect();
+        let size: Vec<f64> =
+            attribute(svg, "viewBox")[0].split(' ').map(|v| v.parse().expect("as it was drawn")).collect();
         for (x, y) in places(svg) {
             assert!((0.0..=size[2]).contains(&x) && (0.0..=size[3]).contains(&y), "{x} {y} outside {size:?}");
         }

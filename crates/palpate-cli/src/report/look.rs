@@ -153,7 +153,7 @@ mod tests {
         let kept = thinned(&run);
         assert!(kept.len() < 150, "{} corners", kept.len());
         for at in &run {
-            let next = kept.iter().position(|corner| corner.x >= at.x).unwrap().max(1);
+            let next = kept.iter().position(|corner| corner.x >= at.x).expect("as it was drawn").max(1);
             let (a, b) = (kept[next - 1], kept[next]);
             let height = a.y + (b.y - a.y) * (at.x - a.x) / (b.x - a.x);
             // Steepest slope of the curve is 4.4.

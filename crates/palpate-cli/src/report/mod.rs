@@ -180,7 +180,7 @@ mod tests {
             let (tag, text) = piece.split_once('>').expect("a tag ends");
             assert!(!text.contains('>'), "stray > after <{tag}>");
             assert_eq!(tag.matches('"').count() % 2, 0, "quotes in <{tag}>");
-            let name = tag.trim_start_matches('/').split([' ', '/']).next().unwrap();
+            let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("as it was drawn");
             match tag {
                 _ if tag.starts_with('!') || name == "meta" || tag.ends_with('/') => {}
                 _ if tag.starts_with('/') => assert_eq!(open.pop(), Some(name)),
@@ -205,8 +205,8 @@ mod tests {
     fn page_is_well_formed_and_the_same_every_time() {
         let html = page().html();
         // A style sheet may hold >, which is no tag's end.
-        let (before, rest) = html.split_once("<style>").unwrap();
-        let (_, after) = rest.split_once("</style>").unwrap();
+        let (before, rest) = html.split_once("<style>").expect("as it was drawn");
+        let (_, after) = rest.split_once("</style>").expect("as it was drawn");
         assert_well_formed(&format!("{before}{after}"));
         assert_eq!(html, page().html());
     }

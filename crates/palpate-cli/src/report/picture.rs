@@ -331,7 +331,7 @@ mod tests {
         let mut picture = picture(&positions, &[[0, 1, 2], [3, 4, 5]], &[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
         picture.view = View { azimuth_deg: 0.0, elevation_deg: 0.0 };
         let svg = picture.svg();
-        let last = svg.lines().rfind(|line| line.starts_with("<path")).unwrap();
+        let last = svg.lines().rfind(|line| line.starts_with("<path")).expect("as it was drawn");
         let [r, g, b] = picture.colour(1.0, DVec3::Z.dot(LIGHT.normalize()));
         assert!(last.contains(&format!("#{r:02x}{g:02x}{b:02x}")));
     }
@@ -358,7 +358,15 @@ mod tests {
         assert!(svg.len() < 60_000, "{} bytes", svg.len());
         assert_well_formed(&svg);
         assert_eq!(svg, picture(&positions, &triangles, &values).svg());
-        let height: f64 = svg.split("240 ").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+        let height: f64 = svg
+            .split("240 ")
+            .nth(1)
+            .expect("as it was drawn")
+            .split('"')
+            .next()
+            .expect("as it was drawn")
+            .parse()
+            .expect("as it was drawn");
         let picture = picture(&positions, &triangles, &values);
         for [x, y] in picture.facets(height - CAPTION).iter().flat_map(|facet| facet.corners) {
             assert!((0..=24_000).contains(&x) && (0..=(100.0 * (height - CAPTION)) as i32).contains(&y));

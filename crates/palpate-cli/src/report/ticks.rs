@@ -255,7 +255,7 @@ mod tests {
             let labelled: Vec<&Tick> = ticks.iter().filter(|tick| tick.label.is_some()).collect();
             assert!(labelled.len() >= 2);
             for pair in labelled.windows(2) {
-                let widths = pair.iter().map(|tick| width(tick.label.as_ref().unwrap()));
+                let widths = pair.iter().map(|tick| width(tick.label.as_ref().expect("as it was drawn")));
                 assert!((pair[1].share - pair[0].share) * 300.0 > widths.sum::<f64>() / 2.0);
             }
         }
@@ -266,8 +266,8 @@ mod tests {
         assert!(Span::around([f64::NAN, f64::INFINITY].into_iter(), Scale::Linear).is_none());
         assert!(Span::around([0.0, -1.0].into_iter(), Scale::Log).is_none());
         for (value, scale) in [(0.0, Scale::Linear), (-3.0, Scale::Linear), (4e-7, Scale::Log)] {
-            let span = Span::around([value, value].into_iter(), scale).unwrap();
-            assert!((span.share(value).unwrap() - 0.5).abs() < 1e-9);
+            let span = Span::around([value, value].into_iter(), scale).expect("as it was drawn");
+            assert!((span.share(value).expect("as it was drawn") - 0.5).abs() < 1e-9);
         }
     }
 }

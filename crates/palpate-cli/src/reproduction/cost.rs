@@ -15,7 +15,6 @@ use palpate::{
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::{Progress, Silent};
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
-use palpate_fem::residual::ResidualChoice;
 use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
 use std::sync::Arc;
 use std::time::Instant;
@@ -43,14 +42,9 @@ const STEP_S: f64 = 1e-3;
 const USUAL_SAMPLES: usize = 500;
 const USUAL_POINTS: usize = 2;
 
-/// A cube for timing: few modes and no residual, since the numbers in the table don't change its cost.
+/// A cube for timing: few modes, since the numbers in the table don't change its cost.
 pub fn body(cells: u32) -> Result<Recorded, Failure> {
-    let parameters = RecordParameters {
-        extent: Extent::Uncertified,
-        residual: ResidualChoice::None,
-        modes: 20,
-        ..paper_cube(cells, 20)
-    };
+    let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, 60) };
     Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, &mut Silent)?)
 }
 
@@ -116,9 +110,12 @@ pub fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Re
         };
         let input = Input { devices: held.iter().map(device).collect() };
         let before = Instant::now();
-        step(&model, &mut state, &input);
+        let status = step(&model, &mut state, &input).status;
         if number >= samples {
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
+        }
+        if status.unsolved_objects + status.rejected_devices > 0 {
+            return Err(Failure(format!("the cost of a step can't be measured: {status:?}")));
         }
     }
     times.sort_unstable();
@@ -187,8 +184,8 @@ pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> 
     let of = |costs: &[Cost], x: fn(&Cost) -> usize, y: fn(&Cost) -> f64| -> Vec<(f64, f64)> {
         costs.iter().map(|cost| (x(cost) as f64, y(cost))).collect()
     };
-    let (force, deformation): (fn(&Cost) -> f64, fn(&Cost) -> f64) =
-        (|cost| cost.force_p50_us, |cost| cost.deformation_us);
+    let force: fn(&Cost) -> f64 = |cost| cost.force_p50_us;
+    let deformation: fn(&Cost) -> f64 = |cost| cost.deformation_us;
     let chart = |title: &str, x: &str, series: Vec<Series>| {
         Chart {
             title: title.into(),

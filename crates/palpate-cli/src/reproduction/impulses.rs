@@ -21,8 +21,11 @@ const SAMPLES: usize = 160;
 /// Moments that are shown [ms].
 const SHOWN_MS: [f64; 8] = [2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 40.0, 72.0];
 
-/// Largest displacement in the pictures, as a share of the cube's side: they are exaggerated to that.
-const SHOWN_SHARE: f64 = 0.25;
+/// Displacement in the pictures, as a share of the cube's side: that of the travelling wave, from this moment [ms] on, and
+/// the largest of all. They are exaggerated to the lesser of the two.
+const TRAVELLING_MS: f64 = 8.0;
+const SHOWN_SHARE: f64 = 0.12;
+const LARGEST_SHARE: f64 = 0.35;
 
 /// Shares of the peak at which a node counts as reached by the wave.
 const THRESHOLDS: [f64; 9] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2];
@@ -204,15 +207,20 @@ fn pictures(body: &Recorded, surface: &[u32], wave: &Wave, caption: &str) -> Str
         .iter()
         .filter_map(|&ms| Some((ms, wave.frames.get((ms * 1e-3 / STEP_S).round() as usize - 1)?)))
         .collect();
-    let shown_peak = frames.iter().flat_map(|(_, f)| f.iter()).fold(0.0_f64, |peak, u| peak.max(u.length()));
-    let scale = SHOWN_SHARE * 0.1 / shown_peak;
+    let peak_from = |from_ms: f64| {
+        let late = frames.iter().filter(|(ms, _)| *ms >= from_ms).flat_map(|(_, frame)| frame.iter());
+        late.fold(0.0_f64, |peak, u| peak.max(u.length()))
+    };
+    // The wave is to be seen, the first dent to stay a dent.
+    let (travelling, first) = (peak_from(TRAVELLING_MS), peak_from(0.0));
+    let scale = (SHOWN_SHARE * 0.1 / travelling).min(LARGEST_SHARE * 0.1 / first);
     let deformed: Vec<Vec<DVec3>> = frames
         .iter()
         .map(|(_, frame)| rest.iter().zip(*frame).map(|(p, u)| *p + *u * scale).collect())
         .collect();
     let view = View { azimuth_deg: 30.0, elevation_deg: 25.0 };
     let frame = Frame::around(deformed.iter().flatten(), view);
-    let range = (0.0, 1e3 * shown_peak);
+    let range = (0.0, 1e3 * travelling);
     let drawn: Vec<String> = frames
         .iter()
         .zip(&deformed)
@@ -222,7 +230,7 @@ fn pictures(body: &Recorded, surface: &[u32], wave: &Wave, caption: &str) -> Str
             Picture { positions, triangles: &triangles, values: &values, range, view, frame, caption }.svg()
         })
         .collect();
-    let key = colour_bar(range, "displacement [mm]");
+    let key = colour_bar(range, "displacement [mm]; yellow: this and more");
     gallery(&drawn, &key, &format!("{caption} Displacements are drawn {scale:.1} times as large."))
 }
 

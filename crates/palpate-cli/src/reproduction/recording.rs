@@ -76,8 +76,8 @@ pub fn chapter(body: &Recorded, effort: Effort, progress: &mut Bars) -> Result<C
             processor()
         ))
         + &code(
-            "palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 \\\n    --rayleigh 2,2e-4 \
-             --dense cube.zarr --method transient --sampling mean --step 0.002 --duration 1",
+            "palpate record box:0.1x0.1x0.1/12x12x12 --order 1 \\\n    --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 \\\n    \
+             --dense cube.zarr --method transient --sampling mean \\\n    --step 0.002 --duration 1",
         );
     let section = Section { id: "recording".into(), heading: "Recording (Table 1)".into(), body: html };
     let data = csv(
