@@ -14,6 +14,7 @@
 //! shards. Within a shard every column is a chunk of its own, compressed and with a checksum, so a reader touches
 //! only the columns that it uses.
 
+mod arrays;
 mod attributes;
 mod error;
 mod location;

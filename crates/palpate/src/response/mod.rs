@@ -3,9 +3,10 @@
 
 mod fir;
 mod modal;
+mod oscillator;
 
 pub(crate) use modal::{Acting, ModalPoints};
-pub use modal::{HeldOscillator, Oscillation};
+pub use oscillator::{HeldOscillator, Oscillation};
 
 use crate::error::Error;
 use crate::recording::{ImpulseResponse, Recording};

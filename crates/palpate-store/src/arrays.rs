@@ -1,0 +1,226 @@
+//! The arrays of a store: how the table and what stands beside it are laid out in Zarr.
+
+use crate::attributes::{Compression, Number, TableAttributes, TableContent};
+use crate::object_storage::ObjectStorage;
+use glam::DVec3;
+use palpate::Surface;
+use serde_json::{Map, json};
+use std::sync::Arc;
+use zarrs::array::codec::{
+    BloscCodec, BloscCompressionLevel, BloscCompressor, BloscShuffleMode, Crc32cCodec, ShardingCodecOptions,
+    SubchunkWriteOrder,
+    api::{BytesToBytesCodecTraits, CodecSpecificOptions},
+};
+use zarrs::array::{Array, ArrayBuilder, CodecOptions, DataType, ElementOwned, data_type};
+
+/// The array of the table, in the store.
+const TABLE: &str = "/impulse_response";
+
+/// Keys that a store may hold before its group is written: it was interrupted while being made.
+pub(crate) fn is_ours(key: &str) -> bool {
+    let folder = key.split('/').next().unwrap_or_default();
+    folder == "impulse_response" || SIDE_ARRAYS.contains(&folder)
+}
+
+const SIDE_ARRAYS: [&str; 7] = [
+    "touchable_dofs",
+    "observed_dofs",
+    "observed_positions",
+    "surface_positions",
+    "surface_triangles",
+    "surface_source_nodes",
+    "gravity_response",
+];
+
+/// Whatever went wrong, for a text.
+pub(crate) type Anyhow = Box<dyn std::error::Error>;
+
+/// The array of a new table.
+pub(crate) fn table_array(
+    content: &TableContent,
+    storage: Arc<ObjectStorage>,
+) -> Result<Array<ObjectStorage>, Anyhow> {
+    let attributes = &content.attributes;
+    let (samples, observed) = (content.samples as u64, content.observed_dofs.len() as u64);
+    let shape = vec![content.touchable_dofs.len() as u64, samples, observed];
+    let shard = vec![attributes.columns_per_shard, samples, observed];
+    let mut builder = match content.number {
+        Number::F32 => ArrayBuilder::new(shape, shard, data_type::float32(), f32::NAN),
+        Number::F64 => ArrayBuilder::new(shape, shard, data_type::float64(), f64::NAN),
+    };
+    let mut codecs: Vec<Arc<dyn BytesToBytesCodecTraits>> = Vec::new();
+    if attributes.compression == Compression::Zstd {
+        let level =
+            BloscCompressionLevel::try_from(1).map_err(|level| format!("compression level {level}"))?;
+        let size = Some(content.number.bytes());
+        codecs.push(Arc::new(BloscCodec::new(
+            BloscCompressor::Zstd,
+            level,
+            None,
+            BloscShuffleMode::Shuffle,
+            size,
+        )?));
+    }
+    codecs.push(Arc::new(Crc32cCodec::new()));
+    let mut own = Map::new();
+    own.insert("units".into(), json!("m/N"));
+    own.insert("step_s".into(), json!(attributes.step_s));
+    own.insert("sampling".into(), json!(attributes.sampling));
+    own.insert("hold".into(), json!(attributes.recording.hold));
+    own.insert("mesh_hash".into(), json!(attributes.recording.provenance.mesh_hash));
+    builder
+        .subchunk_shape(vec![1, samples, observed])
+        .bytes_to_bytes_codecs(codecs)
+        .attributes(own)
+        .dimension_names(Some(["touchable_dof", "sample", "observed_dof"]));
+    Ok(builder.build(storage, TABLE)?)
+}
+
+/// The table's array as it stands in a store, set to write the columns of a shard in their order, so that the same
+/// table gives the same bytes.
+pub(crate) fn open_array(storage: &Arc<ObjectStorage>) -> Result<Array<ObjectStorage>, Anyhow> {
+    let array = Array::open(storage.clone(), TABLE)?;
+    let order = ShardingCodecOptions::default().with_subchunk_write_order(SubchunkWriteOrder::C);
+    let options = CodecSpecificOptions::default().with_option(order);
+    Ok(array.with_codec_specific_options(&options))
+}
+
+/// Write what stands beside the table.
+pub(crate) fn write_side_arrays(content: &TableContent, storage: &Arc<ObjectStorage>) -> Result<(), Anyhow> {
+    let surface = &content.surface;
+    let positions: Vec<f64> = surface.positions.iter().flat_map(|p| p.to_array()).collect();
+    let triangles: Vec<u32> = surface.triangles.iter().flatten().copied().collect();
+    let (nodes, faces) = (positions.len() as u64 / 3, triangles.len() as u64 / 3);
+    let list = |values: &[u32]| vec![values.len() as u64];
+    let [touchable, observed, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
+    write_u32(storage, touchable, list(&content.touchable_dofs), &content.touchable_dofs, "3·node + axis")?;
+    write_u32(storage, observed, list(&content.observed_dofs), &content.observed_dofs, "3·node + axis")?;
+    let observed_rest: Vec<f64> = content.observed_positions.iter().flat_map(|p| p.to_array()).collect();
+    let observed_nodes = content.observed_positions.len() as u64;
+    write_f64(
+        storage,
+        rest,
+        vec![observed_nodes, 3],
+        &observed_rest,
+        "m, body frame, of every observed node",
+    )?;
+    write_f64(storage, places, vec![nodes, 3], &positions, "m, body frame: origin at the centre of mass")?;
+    write_u32(storage, corners, vec![faces, 3], &triangles, "surface nodes, counter-clockwise from outside")?;
+    write_u32(storage, sources, list(&surface.source_nodes), &surface.source_nodes, "node of the mesh")?;
+    if let Some(response) = &content.gravity {
+        let shape = vec![3, content.samples as u64, content.observed_dofs.len() as u64];
+        write_f64(storage, gravity, shape, response, "m per m/s² held for one step, along each axis")?;
+    }
+    Ok(())
+}
+
+fn write_u32(
+    storage: &Arc<ObjectStorage>,
+    name: &str,
+    shape: Vec<u64>,
+    values: &[u32],
+    meaning: &str,
+) -> Result<(), Anyhow> {
+    write_array(storage, name, shape, data_type::uint32(), meaning, |array, place| {
+        Ok(array.store_chunk_opt(
+            place,
+            values.to_vec(),
+            &CodecOptions::default().with_store_empty_chunks(true),
+        )?)
+    })
+}
+
+fn write_f64(
+    storage: &Arc<ObjectStorage>,
+    name: &str,
+    shape: Vec<u64>,
+    values: &[f64],
+    meaning: &str,
+) -> Result<(), Anyhow> {
+    write_array(storage, name, shape, data_type::float64(), meaning, |array, place| {
+        Ok(array.store_chunk_opt(
+            place,
+            values.to_vec(),
+            &CodecOptions::default().with_store_empty_chunks(true),
+        )?)
+    })
+}
+
+/// One chunk with a checksum.
+fn write_array(
+    storage: &Arc<ObjectStorage>,
+    name: &str,
+    shape: Vec<u64>,
+    number: DataType,
+    meaning: &str,
+    store: impl Fn(&Array<ObjectStorage>, &[u64]) -> Result<(), Anyhow>,
+) -> Result<(), Anyhow> {
+    let mut attributes = Map::new();
+    attributes.insert("meaning".into(), json!(meaning));
+    let place = vec![0; shape.len()];
+    let array = ArrayBuilder::new(shape.clone(), shape, number, 0)
+        .bytes_to_bytes_codecs(vec![Arc::new(Crc32cCodec::new())])
+        .attributes(attributes)
+        .build(storage.clone(), &format!("/{name}"))?;
+    store(&array, &place)?;
+    array.store_metadata()?;
+    Ok(())
+}
+
+fn read_array<T: ElementOwned>(storage: &Arc<ObjectStorage>, name: &str) -> Result<Vec<T>, String>
+where
+    Vec<T>: zarrs::array::FromArrayBytes,
+{
+    let said = |e: &dyn std::fmt::Display| format!("{name}: {e}");
+    let array = Array::open(storage.clone(), &format!("/{name}")).map_err(|e| said(&e))?;
+    array.retrieve_array_subset::<Vec<T>>(&array.subset_all()).map_err(|e| said(&e))
+}
+
+/// Everything but the numbers of the table.
+pub(crate) fn read_content(
+    attributes: TableAttributes,
+    array: &Array<ObjectStorage>,
+    storage: &Arc<ObjectStorage>,
+) -> Result<TableContent, String> {
+    let number = match array.data_type() {
+        t if *t == data_type::float32() => Number::F32,
+        t if *t == data_type::float64() => Number::F64,
+        other => return Err(format!("its numbers are {other:?}, expected float32 or float64")),
+    };
+    let shape = array.shape().to_vec();
+    let &[touchable, samples, observed] = shape.as_slice() else {
+        return Err(format!("its table has {} dimensions, expected 3", shape.len()));
+    };
+    let [touchables, observeds, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
+    let touchable_dofs: Vec<u32> = read_array(storage, touchables)?;
+    let observed_dofs: Vec<u32> = read_array(storage, observeds)?;
+    if touchable_dofs.len() as u64 != touchable || observed_dofs.len() as u64 != observed {
+        return Err("its table and its lists of degrees of freedom don't fit together".into());
+    }
+    let rest: Vec<f64> = read_array(storage, rest)?;
+    let positions: Vec<f64> = read_array(storage, places)?;
+    let triangles: Vec<u32> = read_array(storage, corners)?;
+    let surface = Surface {
+        positions: positions.chunks_exact(3).map(DVec3::from_slice).collect(),
+        triangles: triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        source_nodes: read_array(storage, sources)?,
+    };
+    let fixed = attributes.recording.support == palpate::Support::Fixed;
+    let gravity: Option<Vec<f64>> = if fixed { Some(read_array(storage, gravity)?) } else { None };
+    if gravity.as_ref().is_some_and(|g| g.len() as u64 != 3 * samples * observed) {
+        return Err("its gravity response does not fit its table".into());
+    }
+    if attributes.columns_per_shard == 0 {
+        return Err("its shards hold no columns".into());
+    }
+    Ok(TableContent {
+        attributes,
+        number,
+        samples: samples as usize,
+        touchable_dofs,
+        observed_dofs,
+        observed_positions: rest.chunks_exact(3).map(DVec3::from_slice).collect(),
+        surface,
+        gravity,
+    })
+}
