@@ -198,11 +198,11 @@ impl<'a> Dense<'a> {
         };
         let failed = |e: palpate_fem::table::TableError| Failure(e.to_string());
         let recorder = TableRecorder::new(recorded, &parameters).map_err(failed)?;
-        let content = self.content(recorded, &parameters, &recorder)?;
-        let store = TableStore::create(&self.location, &content)?;
+        let content = self.content(recorded, &parameters, &recorder);
+        let store = TableStore::create(&self.location, content, || recorder.gravity())?;
         let part = arguments.shard.unwrap_or(Part::ALL);
-        check_standing(&store, part, progress)?;
         let missing = store.missing(part)?;
+        check_standing(&store, part, &missing, progress)?;
         let at_once = self.shards_at_once(&store, &recorder)?;
 
         let columns: usize = missing.iter().map(|&shard| store.columns_of(shard).len()).sum();
@@ -230,7 +230,7 @@ impl<'a> Dense<'a> {
         recorded: &Recorded,
         parameters: &TableParameters,
         recorder: &TableRecorder<'_>,
-    ) -> Result<TableContent, Failure> {
+    ) -> TableContent {
         let number = match self.arguments.dtype {
             NumberOption::F32 => Number::F32,
             NumberOption::F64 => Number::F64,
@@ -270,7 +270,7 @@ impl<'a> Dense<'a> {
         let centre = DVec3::from_array(recorded.system.mass.center_of_mass_m);
         let nodes = &recorded.system.discretisation.nodes;
         let observed_positions = parameters.observed_nodes.iter().map(|&node| nodes[node as usize] - centre);
-        Ok(TableContent {
+        TableContent {
             attributes: TableAttributes {
                 store_version: palpate_store::STORE_VERSION,
                 step_s: parameters.step_s,
@@ -289,8 +289,9 @@ impl<'a> Dense<'a> {
             observed_dofs: recorder.observed_dofs(),
             observed_positions: observed_positions.collect(),
             surface: recorded.recording.surface.clone(),
-            gravity: recorder.gravity(),
-        })
+            // Only a new store needs it, and then it is long work.
+            gravity: None,
+        }
     }
 
     /// How many shards are computed at once, so that every core has a block of columns; refuses work that would go beyond
@@ -338,8 +339,12 @@ fn used_bytes() -> u64 {
 }
 
 /// What stands already must be sound before more is added.
-fn check_standing(store: &TableStore, part: Part, progress: &mut Bars) -> Result<(), Failure> {
-    let missing = store.missing(part)?;
+fn check_standing(
+    store: &TableStore,
+    part: Part,
+    missing: &[usize],
+    progress: &mut Bars,
+) -> Result<(), Failure> {
     let standing: Vec<usize> =
         (0..store.shards()).filter(|shard| part.holds(*shard) && !missing.contains(shard)).collect();
     if standing.is_empty() {

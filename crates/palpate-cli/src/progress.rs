@@ -78,7 +78,7 @@ impl Drop for Bars {
 }
 
 /// Progress without remarks: where the paper's linear elements are what is wanted.
-pub struct WithoutRemarks<'a>(pub &'a mut Bars);
+pub struct WithoutRemarks<'a>(pub &'a mut dyn Progress);
 
 impl Progress for WithoutRemarks<'_> {
     fn begin(&mut self, stage: &str, total: u64) {

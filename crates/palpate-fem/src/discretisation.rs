@@ -104,6 +104,12 @@ impl Discretisation {
         chosen
     }
 
+    /// The node nearest to a position [m].
+    pub fn node_at(&self, position: DVec3) -> usize {
+        let off = |node: &usize| (self.nodes[*node] - position).length();
+        (0..self.nodes.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+    }
+
     /// Nodes on the boundary, ascending.
     pub fn surface_nodes(&self) -> Vec<u32> {
         let mut nodes: Vec<u32> = self.triangles.iter().flatten().copied().collect();

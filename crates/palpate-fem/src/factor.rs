@@ -207,8 +207,8 @@ impl Default for SolveRoom {
 
 impl Factor {
     /// Solve for loads whose values lie side by side: a row per load, a column per degree of freedom. For many solves
-    /// with a few dozen loads twice as fast as [`Self::solve`]: what is gathered and scattered are whole columns.
-    /// Without constraints only; the bits depend on the number of loads.
+    /// with a few dozen loads quicker than [`Self::solve`]: what is gathered and scattered are whole columns. The bits
+    /// depend on the number of loads.
     pub fn solve_side_by_side(&self, mut loads: MatMut<'_, f64>, room: &mut SolveRoom) {
         let (k, n) = (loads.nrows(), loads.ncols());
         if k < SIDE_BY_SIDE_FROM {
@@ -223,8 +223,8 @@ impl Factor {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return };
         let factor = SupernodalLltRef::new(symbolic, &self.values);
         let supernodes = || (0..symbolic.n_supernodes()).map(|s| factor.supernode(s));
-        let widest = supernodes().map(|supernode| supernode.pattern().len()).max().unwrap_or(0);
         if room.permuted.nrows() != k || room.permuted.ncols() != n {
+            let widest = supernodes().map(|supernode| supernode.pattern().len()).max().unwrap_or(0);
             *room = SolveRoom { permuted: Mat::zeros(k, n), below: Mat::zeros(k, widest) };
         }
         let SolveRoom { permuted: x, below } = room;
@@ -248,8 +248,7 @@ impl Factor {
             }
         }
         // Xᵀ ← L⁻ᵀ·Xᵀ, backwards.
-        for s in (0..symbolic.n_supernodes()).rev() {
-            let supernode = factor.supernode(s);
+        for supernode in supernodes().rev() {
             let (block, rows) = (supernode.val(), supernode.pattern());
             let (start, width) = (supernode.start(), block.ncols());
             let (diagonal, off) = block.split_at_row(width);

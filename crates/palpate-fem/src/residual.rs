@@ -64,6 +64,12 @@ fn dof(surface_nodes: &[u32], touchable: usize) -> usize {
     3 * surface_nodes[touchable / 3] as usize + touchable % 3
 }
 
+/// Static displacements [m] under loads [N] that the kept modes miss, (G − Φ·Λ⁻¹·Φᵀ)·B; `gains` is Φᵀ·B.
+pub(crate) fn missed(system: &System, modes: &Modes, loads: Mat<f64>, gains: &Mat<f64>) -> Mat<f64> {
+    let shares = Mat::from_fn(gains.nrows(), gains.ncols(), |i, j| gains[(i, j)] / modes.squares[i]);
+    system.elastic_compliance(loads) - &modes.shapes * shares
+}
+
 /// Columns of S at the surface for a range of touchable degrees of freedom: columns[j][i] = S_ij.
 fn columns(
     system: &System,
@@ -76,12 +82,10 @@ fn columns(
     for (column, touchable) in range.clone().enumerate() {
         loads[(dof(surface_nodes, touchable), column)] = 1.0;
     }
-    let mut solved = system.elastic_compliance(loads);
-    // Less what the modes give: Φ·(Λ⁻¹·Φᵀ·e).
-    let shares = Mat::from_fn(modes.squares.len(), range.len(), |i, column| {
-        modes.shapes[(dof(surface_nodes, range.start + column), i)] / modes.squares[i]
+    let gains = Mat::from_fn(modes.squares.len(), range.len(), |i, column| {
+        modes.shapes[(dof(surface_nodes, range.start + column), i)]
     });
-    solved -= &modes.shapes * shares;
+    let solved = missed(system, modes, loads, &gains);
     let at_surface = |column: usize| {
         (0..3 * surface_nodes.len()).map(|row| solved[(dof(surface_nodes, row), column)]).collect()
     };
@@ -189,12 +193,9 @@ fn near_field(
 /// Response of a body with fixed nodes to uniform acceleration: modal forces Φᵀ·M·e and the static
 /// displacement (G − Φ·Λ⁻¹·Φᵀ)·M·e that the modes miss, for the three axes e.
 pub fn gravity_response(system: &System, modes: &Modes, surface_nodes: &[u32]) -> GravityResponse {
-    let n = system.discretisation.dofs();
-    let uniform = Mat::from_fn(n, 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
-    let weight = system.mass_times(uniform.as_ref());
+    let weight = system.uniform_weight();
     let forces = modes.shapes.transpose() * &weight;
-    let shares = Mat::from_fn(modes.squares.len(), 3, |i, axis| forces[(i, axis)] / modes.squares[i]);
-    let residual = system.elastic_compliance(weight) - &modes.shapes * shares;
+    let residual = missed(system, modes, weight, &forces);
     GravityResponse {
         modal_forces: (0..3)
             .flat_map(|axis| (0..forces.nrows()).map(move |i| (i, axis)))

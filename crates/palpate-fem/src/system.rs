@@ -149,6 +149,12 @@ impl System {
         }
     }
 
+    /// Loads [N] of a uniform unit acceleration along each axis, M·e: three columns.
+    pub fn uniform_weight(&self) -> Mat<f64> {
+        let along = |dof: usize, axis: usize| f64::from(u8::from(dof % 3 == axis));
+        self.mass_times(Mat::from_fn(self.discretisation.dofs(), 3, along).as_ref())
+    }
+
     /// M·X.
     pub fn mass_times(&self, x: MatRef<'_, f64>) -> Mat<f64> {
         self.assembly.multiply(Which::Mass, x)

@@ -6,8 +6,10 @@
 
 use crate::factor::FactorError;
 use crate::record::Recorded;
+use crate::residual::missed;
 use crate::transient::{Motion, Transient};
-use faer::{Mat, Par};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, Par};
 use palpate::{Damping, HeldOscillator, Oscillation, ResidualCompliance, Sampling};
 use rayon::prelude::*;
 
@@ -73,6 +75,8 @@ struct ClosedForm {
     observed: Mat<f64>,
     /// For each node of the discretisation, its place on the recording's surface.
     on_surface: Vec<Option<u32>>,
+    /// Whether nodes inside the body are observed.
+    sees_inside: bool,
 }
 
 impl<'a> TableRecorder<'a> {
@@ -107,7 +111,7 @@ impl<'a> TableRecorder<'a> {
                     Damping::Rayleigh { alpha, beta } => (alpha, beta),
                     Damping::Ratio(_) => (0.0, 0.0),
                 };
-                let step = substep(parameters) / f64::from(substeps);
+                let step = between_looks(parameters) / f64::from(substeps);
                 let integrator = Transient::new(&recorded.system, alpha, beta, step)?;
                 Way::Transient { integrator, substeps }
             }
@@ -134,7 +138,7 @@ impl<'a> TableRecorder<'a> {
     pub fn integration_step_s(&self) -> Option<f64> {
         match &self.way {
             Way::ClosedForm(_) => None,
-            Way::Transient { substeps, .. } => Some(substep(self.parameters) / f64::from(*substeps)),
+            Way::Transient { substeps, .. } => Some(between_looks(self.parameters) / f64::from(*substeps)),
         }
     }
 
@@ -187,12 +191,7 @@ impl<'a> TableRecorder<'a> {
     /// (axis·T + sample)·observed + dof.
     pub fn gravity(&self) -> Option<Vec<f64>> {
         let system = &self.recorded.system;
-        if system.fixed_nodes.is_empty() {
-            return None;
-        }
-        let uniform =
-            Mat::from_fn(system.discretisation.dofs(), 3, |dof, axis| f64::from(u8::from(dof % 3 == axis)));
-        Some(self.responses(system.mass_times(uniform.as_ref())).concat())
+        (!system.fixed_nodes.is_empty()).then(|| self.responses(system.uniform_weight()).concat())
     }
 
     /// Response to loads [N] on all degrees of freedom, each held for one step: for each column of loads T × observed
@@ -202,9 +201,7 @@ impl<'a> TableRecorder<'a> {
         match &self.way {
             Way::ClosedForm(form) => {
                 let gains = modes.shapes.transpose() * &loads;
-                let share =
-                    Mat::from_fn(gains.nrows(), gains.ncols(), |i, j| gains[(i, j)] / modes.squares[i]);
-                let residual = system.elastic_compliance(loads) - &modes.shapes * share;
+                let residual = missed(system, modes, loads, &gains);
                 (0..gains.ncols())
                     .map(|j| form.response(self.parameters, |i| gains[(i, j)], |dof| residual[(dof, j)]))
                     .collect()
@@ -240,7 +237,7 @@ impl<'a> TableRecorder<'a> {
         let width = 3 * observed_nodes.len();
         let mut columns = vec![vec![0.0; samples * width]; loads.ncols()];
         // With the mean, two halves of a step are looked at; the force is held through both.
-        let looks = if *sampling == Sampling::Mean { 2 } else { 1 };
+        let looks = looks(*sampling);
         let mut motion: Option<Motion> = None;
         for look in 0..samples * looks {
             for _ in 0..substeps {
@@ -269,10 +266,10 @@ impl ClosedForm {
         let modes = &recorded.modes;
         let m = modes.squares.len();
         let mut answers = vec![0.0; parameters.samples * m];
-        let looks = if parameters.sampling == Sampling::Mean { 2 } else { 1 };
+        let looks = looks(parameters.sampling);
         for (i, square) in modes.squares.iter().enumerate() {
             let omega = square.sqrt();
-            let oscillator = HeldOscillator::new(omega, damping.ratio(omega), substep(parameters));
+            let oscillator = HeldOscillator::new(omega, damping.ratio(omega), between_looks(parameters));
             let mut state = Oscillation::default();
             for look in 0..parameters.samples * looks {
                 state = oscillator.advance(state, if look < looks { 1.0 } else { 0.0 });
@@ -286,7 +283,9 @@ impl ClosedForm {
         for (at, &node) in recorded.system.discretisation.surface_nodes().iter().enumerate() {
             on_surface[node as usize] = Some(at as u32);
         }
-        Self { answers, observed, on_surface }
+        let inside = |node: &u32| on_surface[*node as usize].is_none();
+        let sees_inside = parameters.observed_nodes.iter().any(inside);
+        Self { answers, observed, on_surface, sees_inside }
     }
 
     /// One column: the modes' part, and the residual compliance in the first sample.
@@ -295,14 +294,12 @@ impl ClosedForm {
         let shapes = &recorded.modes.shapes;
         // Between surface nodes the recording's own numbers, rounded and tapered as they are, so that both forms of the
         // response are one; elsewhere S = G − Φ·Λ⁻¹·Φᵀ afresh.
-        let inside = self.on_surface[load / 3].is_none()
-            || parameters.observed_nodes.iter().any(|&node| self.on_surface[node as usize].is_none());
-        let fresh = (inside && recorded.recording.residual != ResidualCompliance::None).then(|| {
-            let system = &recorded.system;
-            let mut unit = Mat::zeros(system.discretisation.dofs(), 1);
+        let inside = self.sees_inside || self.on_surface[load / 3].is_none();
+        let fresh = (inside && !matches!(recorded.recording.residual, ResidualCompliance::None)).then(|| {
+            let mut unit = Mat::zeros(recorded.system.discretisation.dofs(), 1);
             unit[(load, 0)] = 1.0;
-            let share = Mat::from_fn(shapes.ncols(), 1, |i, _| shapes[(load, i)] / recorded.modes.squares[i]);
-            system.elastic_compliance(unit) - shapes * share
+            let gains = shapes.subrows(load, 1).transpose().to_owned();
+            missed(&recorded.system, &recorded.modes, unit, &gains)
         });
         let residual = |row: usize| match (self.on_surface[row / 3], self.on_surface[load / 3]) {
             (Some(i), Some(j)) => {
@@ -324,15 +321,8 @@ impl ClosedForm {
         let coordinates =
             Mat::from_fn(m, parameters.samples, |i, sample| self.answers[sample * m + i] * gain(i));
         let mut values = vec![0.0; rows * parameters.samples];
-        let target = faer::MatMut::from_column_major_slice_mut(&mut values, rows, parameters.samples);
-        faer::linalg::matmul::matmul(
-            target,
-            faer::Accum::Replace,
-            self.observed.as_ref(),
-            coordinates.as_ref(),
-            1.0,
-            Par::Seq,
-        );
+        let target = MatMut::from_column_major_slice_mut(&mut values, rows, parameters.samples);
+        matmul(target, Accum::Replace, self.observed.as_ref(), coordinates.as_ref(), 1.0, Par::Seq);
         for (row, value) in values[..rows].iter_mut().enumerate() {
             *value += residual(dof(&parameters.observed_nodes, row));
         }
@@ -340,12 +330,17 @@ impl ClosedForm {
     }
 }
 
-/// Time [s] between two looks at the motion.
-fn substep(parameters: &TableParameters) -> f64 {
-    match parameters.sampling {
-        Sampling::End => parameters.step_s,
-        Sampling::Mean => 0.5 * parameters.step_s,
+/// How often the motion is looked at for a sample.
+fn looks(sampling: Sampling) -> usize {
+    match sampling {
+        Sampling::End => 1,
+        Sampling::Mean => 2,
     }
+}
+
+/// Time [s] between two looks.
+fn between_looks(parameters: &TableParameters) -> f64 {
+    parameters.step_s / looks(parameters.sampling) as f64
 }
 
 /// Row of the system for a place among the degrees of freedom of some nodes.

@@ -187,16 +187,9 @@ fn for_each<const N: usize, const M: usize>(
 /// Up to which frequency [Hz] the integrator follows a wave to 1 % over 0.1 s, with steps of `step_s` [s].
 pub fn follows_hz(step_s: f64) -> f64 {
     let c = coefficients();
-    // |R(iy) − e^{iy}| with w = (1 + iγy)/(1 + γ²y²).
     let error = |y: f64| {
-        let size = 1.0 + (GAMMA * y).powi(2);
-        let w = [1.0 / size, GAMMA * y / size];
-        let (mut power, mut sum) = ([1.0, 0.0], [-y.cos(), -y.sin()]);
-        for c in c {
-            power = [power[0] * w[0] - power[1] * w[1], power[0] * w[1] + power[1] * w[0]];
-            sum = [sum[0] + c * power[0], sum[1] + c * power[1]];
-        }
-        sum[0].hypot(sum[1])
+        let [re, im] = on_imaginary_axis(c, y);
+        (re - y.cos()).hypot(im - y.sin())
     };
     let allowed = 0.01 * (step_s / 0.1).min(1.0);
     let (mut low, mut high) = (0.0, std::f64::consts::PI);
@@ -205,6 +198,18 @@ pub fn follows_hz(step_s: f64) -> f64 {
         if error(middle) < allowed { low = middle } else { high = middle }
     }
     low / (std::f64::consts::TAU * step_s)
+}
+
+/// R(iy), real and imaginary part, with w = (1 + iγy)/(1 + γ²y²).
+fn on_imaginary_axis(c: [f64; STAGES], y: f64) -> [f64; 2] {
+    let size = 1.0 + (GAMMA * y).powi(2);
+    let w = [1.0 / size, GAMMA * y / size];
+    let (mut power, mut sum) = ([1.0, 0.0], [0.0, 0.0]);
+    for c in c {
+        power = [power[0] * w[0] - power[1] * w[1], power[0] * w[1] + power[1] * w[0]];
+        sum = [sum[0] + c * power[0], sum[1] + c * power[1]];
+    }
+    sum
 }
 
 /// c_k: Σ_k c_k·w^k agrees with e^z up to z⁴, and by the choice of γ up to z⁵.
@@ -258,16 +263,9 @@ mod tests {
             let factorial: f64 = (1..=n).map(|i| i as f64).product();
             assert!((got * factorial - 1.0).abs() < 1e-12, "z^{n}: {got}");
         }
-        // |R(iy)| ≤ 1 with complex arithmetic by hand: w = (1 + iγy)/(1 + γ²y²).
         for y in (0..400).map(|i| 10_f64.powf(-2.0 + 0.0125 * f64::from(i))) {
-            let size = 1.0 + (GAMMA * y).powi(2);
-            let w = [1.0 / size, GAMMA * y / size];
-            let (mut power, mut sum) = ([1.0, 0.0], [0.0, 0.0]);
-            for c in c {
-                power = [power[0] * w[0] - power[1] * w[1], power[0] * w[1] + power[1] * w[0]];
-                sum = [sum[0] + c * power[0], sum[1] + c * power[1]];
-            }
-            assert!(sum[0].hypot(sum[1]) < 1.0 + 1e-12, "y = {y}");
+            let [re, im] = on_imaginary_axis(c, y);
+            assert!(re.hypot(im) < 1.0 + 1e-12, "y = {y}");
         }
     }
 }

@@ -11,7 +11,9 @@ use zarrs::array::codec::{
     SubchunkWriteOrder,
     api::{BytesToBytesCodecTraits, CodecSpecificOptions},
 };
-use zarrs::array::{Array, ArrayBuilder, CodecOptions, DataType, ElementOwned, data_type};
+use zarrs::array::{
+    Array, ArrayBuilder, CodecOptions, DataType, Element, ElementOwned, IntoArrayBytes, data_type,
+};
 
 /// The array of the table, in the store.
 const TABLE: &str = "/impulse_response";
@@ -91,70 +93,41 @@ pub(crate) fn write_side_arrays(content: &TableContent, storage: &Arc<ObjectStor
     let positions: Vec<f64> = surface.positions.iter().flat_map(|p| p.to_array()).collect();
     let triangles: Vec<u32> = surface.triangles.iter().flatten().copied().collect();
     let (nodes, faces) = (positions.len() as u64 / 3, triangles.len() as u64 / 3);
-    let list = |values: &[u32]| vec![values.len() as u64];
-    let [touchable, observed, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
-    write_u32(storage, touchable, list(&content.touchable_dofs), &content.touchable_dofs, "3·node + axis")?;
-    write_u32(storage, observed, list(&content.observed_dofs), &content.observed_dofs, "3·node + axis")?;
     let observed_rest: Vec<f64> = content.observed_positions.iter().flat_map(|p| p.to_array()).collect();
     let observed_nodes = content.observed_positions.len() as u64;
-    write_f64(
-        storage,
-        rest,
-        vec![observed_nodes, 3],
-        &observed_rest,
-        "m, body frame, of every observed node",
-    )?;
-    write_f64(storage, places, vec![nodes, 3], &positions, "m, body frame: origin at the centre of mass")?;
-    write_u32(storage, corners, vec![faces, 3], &triangles, "surface nodes, counter-clockwise from outside")?;
-    write_u32(storage, sources, list(&surface.source_nodes), &surface.source_nodes, "node of the mesh")?;
+    let numbers = |name: &str, shape: Vec<u64>, values: &[u32], meaning: &str| {
+        write_array(storage, name, data_type::uint32(), shape, values, meaning)
+    };
+    let lengths = |name: &str, shape: Vec<u64>, values: &[f64], meaning: &str| {
+        write_array(storage, name, data_type::float64(), shape, values, meaning)
+    };
+    let list = |values: &[u32]| vec![values.len() as u64];
+    let [touchable, observed, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
+    numbers(touchable, list(&content.touchable_dofs), &content.touchable_dofs, "3·node + axis")?;
+    numbers(observed, list(&content.observed_dofs), &content.observed_dofs, "3·node + axis")?;
+    lengths(rest, vec![observed_nodes, 3], &observed_rest, "m, body frame, of every observed node")?;
+    lengths(places, vec![nodes, 3], &positions, "m, body frame: origin at the centre of mass")?;
+    numbers(corners, vec![faces, 3], &triangles, "surface nodes, counter-clockwise from outside")?;
+    numbers(sources, list(&surface.source_nodes), &surface.source_nodes, "node of the mesh")?;
     if let Some(response) = &content.gravity {
         let shape = vec![3, content.samples as u64, content.observed_dofs.len() as u64];
-        write_f64(storage, gravity, shape, response, "m per m/s² held for one step, along each axis")?;
+        lengths(gravity, shape, response, "m per m/s² held for one step, along each axis")?;
     }
     Ok(())
 }
 
-fn write_u32(
-    storage: &Arc<ObjectStorage>,
-    name: &str,
-    shape: Vec<u64>,
-    values: &[u32],
-    meaning: &str,
-) -> Result<(), Anyhow> {
-    write_array(storage, name, shape, data_type::uint32(), meaning, |array, place| {
-        Ok(array.store_chunk_opt(
-            place,
-            values.to_vec(),
-            &CodecOptions::default().with_store_empty_chunks(true),
-        )?)
-    })
-}
-
-fn write_f64(
-    storage: &Arc<ObjectStorage>,
-    name: &str,
-    shape: Vec<u64>,
-    values: &[f64],
-    meaning: &str,
-) -> Result<(), Anyhow> {
-    write_array(storage, name, shape, data_type::float64(), meaning, |array, place| {
-        Ok(array.store_chunk_opt(
-            place,
-            values.to_vec(),
-            &CodecOptions::default().with_store_empty_chunks(true),
-        )?)
-    })
-}
-
 /// One chunk with a checksum.
-fn write_array(
+fn write_array<T: Element + Clone>(
     storage: &Arc<ObjectStorage>,
     name: &str,
-    shape: Vec<u64>,
     number: DataType,
+    shape: Vec<u64>,
+    values: &[T],
     meaning: &str,
-    store: impl Fn(&Array<ObjectStorage>, &[u64]) -> Result<(), Anyhow>,
-) -> Result<(), Anyhow> {
+) -> Result<(), Anyhow>
+where
+    Vec<T>: IntoArrayBytes<'static>,
+{
     let mut attributes = Map::new();
     attributes.insert("meaning".into(), json!(meaning));
     let place = vec![0; shape.len()];
@@ -162,7 +135,8 @@ fn write_array(
         .bytes_to_bytes_codecs(vec![Arc::new(Crc32cCodec::new())])
         .attributes(attributes)
         .build(storage.clone(), &format!("/{name}"))?;
-    store(&array, &place)?;
+    let options = CodecOptions::default().with_store_empty_chunks(true);
+    array.store_chunk_opt(&place, values.to_vec(), &options)?;
     array.store_metadata()?;
     Ok(())
 }

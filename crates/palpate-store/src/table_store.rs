@@ -42,12 +42,17 @@ impl Part {
 
 impl TableStore {
     /// Make a store, or open the one that stands there if it is of the same table; its way of packing then counts.
+    /// `gravity` gives [`TableContent::gravity`] for a new one.
     ///
     /// # Errors
     /// When the place can't be written, or what stands there is another table: the text says which difference.
-    pub fn create(location: &Location, content: &TableContent) -> Result<Self, StoreError> {
+    pub fn create(
+        location: &Location,
+        mut content: TableContent,
+        gravity: impl FnOnce() -> Option<Vec<f64>>,
+    ) -> Result<Self, StoreError> {
         if let Some(standing) = Self::open_if_there(location)? {
-            return match standing.content.difference(content) {
+            return match standing.content.difference(&content) {
                 None => Ok(standing),
                 Some(difference) => Err(StoreError::Content(format!(
                     "the store {location} holds another table: {difference}. Give another name, or remove it"
@@ -64,8 +69,9 @@ impl TableStore {
         }
         let failed =
             |e: &dyn std::fmt::Display| StoreError::Place(format!("cannot write the store {location}: {e}"));
-        let array = table_array(content, storage.clone()).map_err(|e| failed(&e))?;
-        write_side_arrays(content, &storage).map_err(|e| failed(&e))?;
+        content.gravity = gravity();
+        let array = table_array(&content, storage.clone()).map_err(|e| failed(&e))?;
+        write_side_arrays(&content, &storage).map_err(|e| failed(&e))?;
         array.store_metadata().map_err(|e| failed(&e))?;
         // The group comes last: a store without it was never finished being made.
         let attributes = serde_json::to_value(&content.attributes).map_err(|e| failed(&e))?;

@@ -1,20 +1,18 @@
 //! The two forms of the response against each other, and the two ways of recording.
 
-use super::{Chapter, csv};
+use super::{Chapter, csv, cube, table_in_memory};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Scale, Section, figure, paragraph, table};
-use crate::verbs::demo::paper_cube;
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, Grasp, ImpulseResponse, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Pose, ResponseForm, Sampling, State, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, ResponseForm,
+    Sampling, State, Twist, step,
 };
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::{Progress, Silent};
-use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
-use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_fem::record::Recorded;
+use palpate_fem::table::{Method, TableParameters, TableRecorder};
 use std::sync::Arc;
 
 /// Small enough for all its modes.
@@ -25,9 +23,7 @@ const STEP_S: f64 = 1e-3;
 /// fir against modal, and time integration against the closed form of all modes.
 pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
     progress.begin("agreement", 1);
-    let parameters =
-        RecordParameters { extent: Extent::Uncertified, modes: usize::MAX, ..paper_cube(CELLS, 1) };
-    let body = record(box_mesh([0.1; 3], [CELLS; 3])?, &parameters, &mut Silent)?;
+    let body = cube(CELLS, usize::MAX, &mut Silent)?;
     let mut rows = Vec::new();
     for (number, narrow) in [("double precision", false), ("single precision", true)] {
         let error = largest_force_difference(&body, narrow)?;
@@ -93,30 +89,9 @@ pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
 
 /// Largest difference of forces between both forms, as a share of the largest force.
 fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, Failure> {
+    let rounded = |value: f64| if narrow { f64::from(value as f32) } else { value };
     let surface = body.system.discretisation.surface_nodes();
-    let parameters = TableParameters {
-        step_s: STEP_S,
-        samples: SAMPLES,
-        sampling: Sampling::End,
-        method: Method::ClosedForm,
-        touchable_nodes: surface.clone(),
-        observed_nodes: surface,
-    };
-    let recorder = TableRecorder::new(body, &parameters).map_err(|e| Failure(e.to_string()))?;
-    let dofs = recorder.touchable_dofs();
-    let mut values = recorder.columns(0..dofs.len(), BLOCK, &|_| {}).concat();
-    if narrow {
-        values.iter_mut().for_each(|value| *value = f64::from(*value as f32));
-    }
-    let table = ImpulseResponse {
-        step_s: STEP_S,
-        samples: SAMPLES,
-        sampling: Sampling::End,
-        observed_dofs: recorder.observed_dofs(),
-        touchable_dofs: dofs,
-        gravity: None,
-        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length())),
-    };
+    let table = table_in_memory(body, STEP_S, SAMPLES, surface, rounded)?;
     let recording = Arc::new(body.recording.clone());
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let forms = [ResponseForm::Modal, ResponseForm::Fir(Arc::new(table))];

@@ -1,27 +1,24 @@
 //! The cost of direct convolution against what section 2.5 of the paper says of it.
 
-use super::{Chapter, Effort, csv};
+use super::{Chapter, Effort, csv, cube, table_in_memory};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Scale, Section, figure, paragraph};
-use crate::verbs::demo::paper_cube;
 use crate::verbs::run::percentile_us;
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, Grasp, ImpulseResponse, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint, Twist, step,
+    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording,
+    ResponseForm, State, SurfacePoint, Twist, step,
 };
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::{Progress, Silent};
-use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
-use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_fem::record::Recorded;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// One measured configuration.
 #[derive(Debug, Clone, Copy)]
-pub struct Cost {
+struct Cost {
     /// Observed degrees of freedom n.
     pub observed: usize,
     /// Degrees of freedom in contact, n_c.
@@ -42,11 +39,8 @@ const STEP_S: f64 = 1e-3;
 const USUAL_SAMPLES: usize = 500;
 const USUAL_POINTS: usize = 2;
 
-/// A cube for timing: few modes, since the numbers in the table don't change its cost.
-pub fn body(cells: u32) -> Result<Recorded, Failure> {
-    let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, 60) };
-    Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, &mut Silent)?)
-}
+/// Few: the numbers in the table don't change its cost.
+const MODES: usize = 60;
 
 /// Surface nodes spread over the body, each as a point of one of its triangles.
 fn points(recording: &Recording, count: usize) -> Vec<SurfacePoint> {
@@ -61,7 +55,7 @@ fn points(recording: &Recording, count: usize) -> Vec<SurfacePoint> {
 }
 
 /// Measure one configuration: all hands move, and the history is full.
-pub fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result<Cost, Failure> {
+fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result<Cost, Failure> {
     let recording = Arc::new(body.recording.clone());
     let surface_nodes = body.system.discretisation.surface_nodes();
     let held = points(&recording, held);
@@ -73,26 +67,8 @@ pub fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Re
         .collect();
     touchable.sort_unstable();
     touchable.dedup();
-    let parameters = TableParameters {
-        step_s: STEP_S,
-        samples,
-        sampling: Sampling::End,
-        method: Method::ClosedForm,
-        touchable_nodes: touchable,
-        observed_nodes: surface_nodes,
-    };
-    let recorder = TableRecorder::new(body, &parameters).map_err(|e| Failure(e.to_string()))?;
-    let touchable_dofs = recorder.touchable_dofs();
-    let values = recorder.columns(0..touchable_dofs.len(), BLOCK, &|_| {}).concat();
-    let table = ImpulseResponse {
-        step_s: STEP_S,
-        samples,
-        sampling: Sampling::End,
-        touchable_dofs,
-        observed_dofs: recorder.observed_dofs(),
-        gravity: None,
-        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length())),
-    };
+    let table = table_in_memory(body, STEP_S, samples, touchable, |value| value)?;
+    let table_bytes = 8 * table.touchable_dofs.len() * table.columns.column_length();
     let observed = table.observed_dofs.len();
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let object =
@@ -135,7 +111,7 @@ pub fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Re
         force_p50_us: percentile_us(&times, 0.5),
         force_p99_us: percentile_us(&times, 0.99),
         deformation_us: percentile_us(&shapes, 0.5),
-        table_bytes: 8 * values.len(),
+        table_bytes,
     })
 }
 
@@ -167,9 +143,9 @@ pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> 
     };
     let mut by_nodes = Vec::new();
     for cells in cells {
-        by_nodes.push(over(&body(cells)?, USUAL_POINTS, USUAL_SAMPLES)?);
+        by_nodes.push(over(&cube(cells, MODES, &mut Silent)?, USUAL_POINTS, USUAL_SAMPLES)?);
     }
-    let usual = body(8)?;
+    let usual = cube(8, MODES, &mut Silent)?;
     let by_contacts = contacts.map(|points| over(&usual, points, USUAL_SAMPLES));
     let by_samples = windows.map(|samples| over(&usual, USUAL_POINTS, samples));
     let by_contacts: Vec<Cost> = by_contacts.into_iter().collect::<Result<_, _>>()?;

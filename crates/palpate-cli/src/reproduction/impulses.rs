@@ -85,13 +85,7 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
     let discretisation = &body.system.discretisation;
     let surface = discretisation.surface_nodes();
     let top = |p: &DVec3| p.y > 0.05 - 1e-9;
-    let centre = (0..discretisation.nodes.len())
-        .filter(|&node| top(&discretisation.nodes[node]))
-        .min_by(|&a, &b| {
-            let off = |node: usize| discretisation.nodes[node].with_y(0.0).length();
-            off(a).total_cmp(&off(b))
-        })
-        .unwrap_or(0);
+    let centre = discretisation.node_at(DVec3::new(0.0, 0.05, 0.0));
     let on_top: Vec<usize> =
         (0..discretisation.nodes.len()).filter(|&node| top(&discretisation.nodes[node])).collect();
     // Downward: 1 N on the middle node; 1 N over the whole face, the same on each of its nodes.

@@ -1,17 +1,20 @@
 //! The paper's table and figures, made again: what `palpate reproduce` measures and writes.
 
 mod agreement;
-pub mod cost;
+mod cost;
 mod impulses;
 mod passivity;
 mod recording;
 
 use crate::Failure;
-use crate::progress::Bars;
+use crate::progress::{Bars, WithoutRemarks};
 use crate::report::Section;
 use crate::verbs::demo::paper_cube;
+use palpate::{ColumnsInMemory, ImpulseResponse, Sampling};
 use palpate_fem::mesh::box_mesh;
+use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
+use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
 use std::fmt::Write;
 
 /// A file of numbers beside the report.
@@ -43,7 +46,7 @@ pub struct Effort {
 
 /// All chapters, in the order of the paper.
 pub fn chapters(effort: Effort, progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
-    let body = cube(effort.cells, 200, progress)?;
+    let body = cube(effort.cells, 200, &mut WithoutRemarks(progress))?;
     Ok(vec![
         recording::chapter(&body, effort, progress)?,
         impulses::chapter(&body, progress)?,
@@ -54,10 +57,40 @@ pub fn chapters(effort: Effort, progress: &mut Bars) -> Result<Vec<Chapter>, Fai
 }
 
 /// The paper's cube with so many cells along a side, without certificate.
-fn cube(cells: u32, modes: usize, progress: &mut Bars) -> Result<Recorded, Failure> {
+fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<Recorded, Failure> {
     let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, modes) };
-    let mut quiet = crate::progress::WithoutRemarks(progress);
-    Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, &mut quiet)?)
+    Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
+}
+
+/// A table in closed form of a free body, end of step, in memory; `change` is done to every number.
+fn table_in_memory(
+    body: &Recorded,
+    step_s: f64,
+    samples: usize,
+    touchable_nodes: Vec<u32>,
+    change: impl Fn(f64) -> f64,
+) -> Result<ImpulseResponse, Failure> {
+    let parameters = TableParameters {
+        step_s,
+        samples,
+        sampling: Sampling::End,
+        method: Method::ClosedForm,
+        touchable_nodes,
+        observed_nodes: body.system.discretisation.surface_nodes(),
+    };
+    let recorder = TableRecorder::new(body, &parameters).map_err(|e| Failure(e.to_string()))?;
+    let touchable_dofs = recorder.touchable_dofs();
+    let columns = recorder.columns(0..touchable_dofs.len(), BLOCK, &|_| {});
+    let values: Vec<f64> = columns.into_iter().flatten().map(change).collect();
+    Ok(ImpulseResponse {
+        step_s,
+        samples,
+        sampling: Sampling::End,
+        touchable_dofs,
+        observed_dofs: recorder.observed_dofs(),
+        gravity: None,
+        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length())),
+    })
 }
 
 /// Lines of comma-separated numbers under a header.

@@ -14,6 +14,7 @@ use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Mark, Scale, Section, figure, paragraph, table};
 use faer::Mat;
+use glam::DVec3;
 use palpate::{Damping, HeldOscillator, Oscillation};
 use palpate_fem::progress::Progress;
 use palpate_fem::record::Recorded;
@@ -166,9 +167,7 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
     progress.begin("passivity", 1);
     let light = Damping::Rayleigh { alpha: 2.0, beta: 0.0 };
     let usual = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
-    let nodes = &body.system.discretisation.nodes;
-    let off = |node: usize| (nodes[node] - glam::DVec3::new(0.0, 0.05, 0.0)).length();
-    let node = (0..nodes.len()).min_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
+    let node = body.system.discretisation.node_at(DVec3::new(0.0, 0.05, 0.0));
     let whole = port(body, node, 1, light)?;
     let of_modes = recipes(|hertz| single(hertz, light), &single(11.65, usual));
     let of_cube = recipes(|_| whole.clone(), &whole);

@@ -11,13 +11,6 @@ use palpate_fem::mesh::box_mesh;
 use palpate_fem::modes::{all_modes, orthonormality_error};
 use palpate_fem::progress::Silent;
 use palpate_fem::reference::Reference;
-use palpate_fem::system::System;
-
-fn node_at(system: &System, position: DVec3) -> usize {
-    let nodes = system.discretisation.nodes.iter().enumerate();
-    let near = |p: &DVec3| (*p - position).length();
-    nodes.min_by(|a, b| near(a.1).total_cmp(&near(b.1))).map_or(0, |(node, _)| node)
-}
 
 /// Vertical compliance of three points of the paper's cube, elastic part: static, and at the end of a step of 1 ms.
 pub fn points() -> Result<Vec<Check>, Failure> {
@@ -34,7 +27,8 @@ pub fn points() -> Result<Vec<Check>, Failure> {
     let parameters = undamped(2000.0, 0.49, 110.0, Order::Linear, 100);
     let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
     let dofs = body.system.discretisation.dofs();
-    let nodes = TABLE.map(|(_, position, ..)| node_at(&body.system, DVec3::from_array(position)));
+    let nodes =
+        TABLE.map(|(_, position, ..)| body.system.discretisation.node_at(DVec3::from_array(position)));
     let mut loads = Mat::<f64>::zeros(dofs, 9);
     for (place, axis) in (0..3).flat_map(|place| (0..3).map(move |axis| (place, axis))) {
         loads[(3 * nodes[place] + axis, 3 * place + axis)] = 1.0;

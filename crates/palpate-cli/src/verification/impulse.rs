@@ -30,12 +30,7 @@ pub fn impulse() -> Result<Vec<Check>, Failure> {
         rows.map(|row| row.split(',').skip(1).filter_map(|cell| cell.parse().ok()).collect()).collect();
     let parameters = RecordParameters { extent: Extent::Body, ..paper_cube(12, 1) };
     let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
-    let nodes = &body.system.discretisation.nodes;
-    let place = |p: DVec3| {
-        let off = |node: &u32| (nodes[*node as usize] - p).length();
-        (0..nodes.len() as u32).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
-    };
-    let observed = PLACES.map(place);
+    let observed = PLACES.map(|p| body.system.discretisation.node_at(p) as u32);
     let mut order: Vec<usize> = (0..4).collect();
     order.sort_by_key(|&at| observed[at]);
     let mut loads = Mat::zeros(body.system.discretisation.dofs(), 1);

@@ -34,7 +34,7 @@ pub(crate) struct Fir {
     gravity: Option<Arc<[f64]>>,
 }
 
-/// Room for copies of series between two nodes, per object [bytes].
+/// Room for copies of series between two points, per object [bytes].
 const COPIES_BYTES: usize = 64 << 20;
 
 /// Marks an empty place.
