@@ -1,25 +1,41 @@
-//! The path of a device: positions over time, linear between rows, constant before and after.
+//! The path of a device or an obstacle: poses over time, linear between rows, constant before and after.
 
 use crate::Failure;
 use crate::scene_file::LARGEST;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
+use palpate::Pose;
 use std::path::Path;
 
-/// Rows (t [s], position [m, world]), t ascending.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DevicePath {
-    rows: Vec<(f64, DVec3)>,
+/// What a path file may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Columns {
+    /// t, x, y, z.
+    Position,
+    /// t, x, y, z, and perhaps the orientation qw, qx, qy, qz.
+    Pose,
 }
 
-impl DevicePath {
-    /// Read a CSV file with the columns t, x, y, z; a header line and lines that start with # are passed over.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+/// Rows (t [s], place in the world), t ascending.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionPath {
+    rows: Vec<(f64, Pose)>,
+    turns: bool,
+}
+
+const POSITION: [&str; 4] = ["t", "x", "y", "z"];
+const POSE: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
+
+impl MotionPath {
+    /// Read a CSV file with such columns; a header line and lines that start with # are passed over.
+    pub fn read(path: &Path, columns: Columns) -> Result<Self, Failure> {
         let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the path", path, &e))?;
-        Self::parse(&text).map_err(|what| Failure(format!("path {}: {what}", path.display())))
+        Self::parse(&text, columns).map_err(|what| Failure(format!("path {}: {what}", path.display())))
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let mut rows: Vec<(f64, DVec3)> = Vec::new();
+    fn parse(text: &str, columns: Columns) -> Result<Self, String> {
+        let mut rows: Vec<(f64, Pose)> = Vec::new();
+        // How many columns all rows have: those of the first.
+        let mut width = None;
         let mut may_be_header = true;
         for (at, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
             let line = line.trim();
@@ -33,40 +49,74 @@ impl DevicePath {
             let numbers = match numbers {
                 Ok(numbers) => numbers,
                 Err(_) if header && cells.iter().all(|cell| cell.parse::<f64>().is_err()) => {
-                    if cells != ["t", "x", "y", "z"] {
+                    if cells != POSITION && (columns == Columns::Position || cells != POSE) {
                         return Err(format!(
-                            "{place}: the columns are {}, expected t,x,y,z",
-                            cells.join(",")
+                            "{place}: the columns are {}, expected {}",
+                            cells.join(","),
+                            columns.names()
                         ));
                     }
+                    width = Some(cells.len());
                     continue;
                 }
-                Err(_) => return Err(format!("{place}: {:?} is not four numbers t,x,y,z", short(line))),
+                Err(_) => {
+                    return Err(format!(
+                        "{place}: {:?} is not {}",
+                        short(line),
+                        columns.numbers(width, " numbers")
+                    ));
+                }
             };
-            let [t, x, y, z] = numbers[..] else {
-                return Err(format!("{place}: {} numbers, expected the four t,x,y,z", numbers.len()));
-            };
+            let whole = numbers.len() == 4 || (columns == Columns::Pose && numbers.len() == 8);
+            if !whole || width.is_some_and(|width| width != numbers.len()) {
+                return Err(format!(
+                    "{place}: {} numbers, expected the {}",
+                    numbers.len(),
+                    columns.numbers(width, "")
+                ));
+            }
+            width = Some(numbers.len());
             if !numbers.iter().all(|number| number.abs() < LARGEST) {
                 return Err(format!("{place}: {:?} must be finite and below {LARGEST:e}", short(line)));
             }
+            let t = numbers[0];
             if let Some((last, _)) = rows.last().filter(|(last, _)| *last >= t) {
                 return Err(format!("{place}: time {t} s does not come after {last} s"));
             }
-            rows.push((t, DVec3::new(x, y, z)));
+            let orientation = match numbers[4..] {
+                [w, x, y, z] => unit(w, x, y, z).map_err(|what| format!("{place}: {what}"))?,
+                _ => DQuat::IDENTITY,
+            };
+            rows.push((t, Pose { position: DVec3::new(numbers[1], numbers[2], numbers[3]), orientation }));
         }
         if rows.is_empty() {
-            return Err("no rows, expected lines t,x,y,z in s and m".into());
+            return Err(format!("no rows, expected lines {} in s and m", columns.names()));
         }
-        Ok(Self { rows })
+        Ok(Self { rows, turns: width == Some(POSE.len()) })
     }
 
-    /// Position [m, world] at a time [s].
-    pub fn at(&self, t: f64) -> DVec3 {
+    /// Whether it has orientations.
+    pub fn turns(&self) -> bool {
+        self.turns
+    }
+
+    /// Pose [m, world] at a time [s]; without orientations it is not turned.
+    pub fn at(&self, t: f64) -> Pose {
         let after = self.rows.partition_point(|(time, _)| *time <= t);
         match (after.checked_sub(1).map(|before| self.rows[before]), self.rows.get(after)) {
-            (Some((t0, p0)), Some((t1, p1))) => p0 + (*p1 - p0) * ((t - t0) / (t1 - t0)),
-            (Some((_, p)), None) => p,
-            (None, first) => first.map_or(DVec3::ZERO, |(_, p)| *p),
+            (Some((t0, from)), Some((t1, to))) => {
+                let share = (t - t0) / (t1 - t0);
+                let position = from.position + (to.position - from.position) * share;
+                let orientation = if self.turns {
+                    // The short way round.
+                    from.orientation.slerp(to.orientation, share)
+                } else {
+                    DQuat::IDENTITY
+                };
+                Pose { position, orientation }
+            }
+            (Some((_, pose)), None) => pose,
+            (None, first) => first.map_or(Pose::IDENTITY, |(_, pose)| *pose),
         }
     }
 
@@ -74,6 +124,35 @@ impl DevicePath {
     pub fn end(&self) -> f64 {
         self.rows.last().map_or(0.0, |(t, _)| *t)
     }
+}
+
+impl Columns {
+    fn names(self) -> &'static str {
+        match self {
+            Self::Position => "t,x,y,z",
+            Self::Pose => "t,x,y,z or t,x,y,z,qw,qx,qy,qz",
+        }
+    }
+
+    /// What a row of so many columns is; of any allowed number when it is not known yet.
+    fn numbers(self, width: Option<usize>, numbers: &str) -> String {
+        let (four, eight) = (format!("four{numbers} t,x,y,z"), format!("eight{numbers} t,x,y,z,qw,qx,qy,qz"));
+        match (self, width) {
+            (Self::Pose, Some(8)) => eight,
+            (Self::Pose, None) => format!("{four} or the {eight}"),
+            _ => four,
+        }
+    }
+}
+
+/// An orientation from a file.
+pub fn unit(w: f64, x: f64, y: f64, z: f64) -> Result<DQuat, String> {
+    let orientation = DQuat::from_xyzw(x, y, z, w);
+    let length = orientation.length();
+    if !(0.99..=1.01).contains(&length) {
+        return Err(format!("orientation has length {length}, expected a unit quaternion w, x, y, z"));
+    }
+    Ok(orientation.normalize())
 }
 
 /// A line as it may stand in a message.
@@ -87,21 +166,60 @@ mod tests {
 
     #[test]
     fn positions_are_linear_between_rows_and_constant_outside() {
-        let path = DevicePath::parse("t,x,y,z\n0.5,0,0,0\n1.5,2,0,4\n").expect("a good path");
-        assert_eq!(path.at(0.0), DVec3::ZERO);
-        assert_eq!(path.at(1.0), DVec3::new(1.0, 0.0, 2.0));
-        assert_eq!(path.at(9.0), DVec3::new(2.0, 0.0, 4.0));
+        let path =
+            MotionPath::parse("t,x,y,z\n0.5,0,0,0\n1.5,2,0,4\n", Columns::Position).expect("a good path");
+        assert_eq!(path.at(0.0), Pose::IDENTITY);
+        assert_eq!(path.at(1.0).position, DVec3::new(1.0, 0.0, 2.0));
+        assert_eq!(path.at(9.0).position, DVec3::new(2.0, 0.0, 4.0));
         assert_eq!(path.end(), 1.5);
+        assert!(!path.turns());
+    }
+
+    #[test]
+    fn orientations_turn_evenly_and_the_short_way() {
+        // From 0 to 90° about z, the second given with the other sign.
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let text = format!("0,0,0,0,1,0,0,0\n1,0,0,1,-{half},0,0,-{half}\n");
+        let path = MotionPath::parse(&text, Columns::Pose).expect("a good path");
+        assert!(path.turns());
+        for share in [0.0, 0.25, 0.5, 1.0, 2.0] {
+            let turned = path.at(share).orientation * DVec3::X;
+            let angle = std::f64::consts::FRAC_PI_2 * share.min(1.0);
+            assert!(
+                (turned - DVec3::new(angle.cos(), angle.sin(), 0.0)).length() < 1e-15,
+                "{share}: {turned}"
+            );
+        }
     }
 
     #[test]
     fn bad_rows_are_named_by_line() {
-        let error = |text: &str| DevicePath::parse(text).err().unwrap_or_default();
+        let error = |text: &str| MotionPath::parse(text, Columns::Position).err().unwrap_or_default();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z in s and m");
         assert_eq!(error("t,x,y\n"), "line 1: the columns are t,x,y, expected t,x,y,z");
         assert_eq!(error("0,0,0,0\n1,2,NaN,0\n"), "line 2: \"1,2,NaN,0\" must be finite and below 1e6");
         assert_eq!(error("0,0,0,0\n1,2,a,0\n"), "line 2: \"1,2,a,0\" is not four numbers t,x,y,z");
         assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,x,y,z");
+        assert_eq!(error("0,0,0,0,1,0,0,0\n"), "line 1: 8 numbers, expected the four t,x,y,z");
         assert_eq!(error("1,0,0,0\n1,0,0,0\n"), "line 2: time 1 s does not come after 1 s");
+        let error = |text: &str| MotionPath::parse(text, Columns::Pose).err().unwrap_or_default();
+        assert_eq!(error(""), "no rows, expected lines t,x,y,z or t,x,y,z,qw,qx,qy,qz in s and m");
+        assert_eq!(
+            error("t,x,y,z,q\n"),
+            "line 1: the columns are t,x,y,z,q, expected t,x,y,z or t,x,y,z,qw,qx,qy,qz"
+        );
+        assert_eq!(
+            error("0,0,0,0,1\n"),
+            "line 1: 5 numbers, expected the four t,x,y,z or the eight t,x,y,z,qw,qx,qy,qz"
+        );
+        assert_eq!(error("0,0,0,0\n1,0,0,0,1,0,0,0\n"), "line 2: 8 numbers, expected the four t,x,y,z");
+        assert_eq!(
+            error("t,x,y,z,qw,qx,qy,qz\n0,0,0,0\n"),
+            "line 2: 4 numbers, expected the eight t,x,y,z,qw,qx,qy,qz"
+        );
+        assert_eq!(
+            error("0,0,0,0,1,1,0,0\n"),
+            "line 1: orientation has length 1.4142135623730951, expected a unit quaternion w, x, y, z"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! Where a mesh comes from: a primitive's text or a file.
 
 use crate::Failure;
-use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh, gmsh, vtk};
+use palpate_fem::mesh::{Mesh, SurfaceMesh, ball_mesh, box_mesh, gmsh, obj, stl, vtk};
 use std::path::Path;
 
 /// Read or make a mesh.
@@ -25,8 +25,7 @@ pub fn mesh(source: &str) -> Result<Mesh, Failure> {
         return Ok(ball_mesh(radius, layers)?);
     }
     let path = Path::new(source);
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
+    match extension(path).as_str() {
         "msh" => Ok(gmsh::read(path)?),
         "vtk" => Ok(vtk::read(path)?),
         _ => Err(Failure(format!(
@@ -34,6 +33,37 @@ pub fn mesh(source: &str) -> Result<Mesh, Failure> {
              box:LXxLYxLZ/NXxNYxNZ or sphere:RADIUS/N"
         ))),
     }
+}
+
+/// Read the surface of something rigid: triangles, or the boundary of tetrahedra.
+pub fn surface(path: &Path) -> Result<SurfaceMesh, Failure> {
+    let around = |mesh: Mesh| {
+        if mesh.tets.is_empty() {
+            return Err(Failure(format!(
+                "{}: the mesh has no tetrahedra; give a surface as .obj or .stl",
+                path.display()
+            )));
+        }
+        SurfaceMesh::around(mesh).map_err(|error| Failure(format!("{}: {error}", path.display())))
+    };
+    let mut surface = match extension(path).as_str() {
+        "obj" => obj::read(path)?,
+        "stl" => stl::read(path)?,
+        "msh" => return around(gmsh::read(path)?),
+        "vtk" => return around(vtk::read(path)?),
+        _ => {
+            return Err(Failure(format!(
+                "{} is no mesh that palpate reads: give a closed surface (.obj, .stl) or a body of tetrahedra (.msh, .vtk)",
+                path.display()
+            )));
+        }
+    };
+    surface.weld();
+    Ok(surface)
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
 /// What to call the source in a recording: no folders.

@@ -88,6 +88,15 @@ fn target(path: &Path, inputs: &[&Path]) -> Result<PathBuf, Failure> {
     Ok(real)
 }
 
+/// Whether two outputs would be one file; what can't be written is told of elsewhere.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
+    };
+    real(a).is_some_and(|a| real(b) == Some(a))
+}
+
 /// Check before long work that an output can be written.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
     WholeFile::create(path, inputs).map(drop)

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
-    Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, State, Twist, step,
 };
 use std::sync::Arc;
 
@@ -12,10 +12,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (point, _) = block.surface.nearest(DVec3::new(0.1, 0.05, 0.05)).ok_or("no surface")?;
     let hand = block.surface.rest_position(&point) + DVec3::X * 0.001;
     let input =
-        Input { devices: vec![DeviceInput { position: hand, grasp: Some(Grasp { object: 0, point }) }] };
+        Input { devices: vec![DeviceInput::held(hand, Grasp { object: 0, point })], ..Input::default() };
 
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let parameters = ModelParameters { devices: 1, ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![DeviceParameters::default()], ..ModelParameters::default() };
     let model = Model::new(parameters, vec![ModelObject::new(Arc::new(block), start)])?;
     let mut state = State::new(&model);
     let output = step(&model, &mut state, &input);

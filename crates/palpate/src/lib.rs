@@ -29,6 +29,7 @@ mod contact;
 mod energy;
 mod error;
 mod motion;
+mod obstacle;
 mod recording;
 mod response;
 mod scene;
@@ -37,18 +38,23 @@ mod state;
 mod step;
 mod surface;
 
-pub use contact::Grasp;
+pub use contact::{Against, Grasp};
 pub use energy::EnergyLedger;
 pub use error::Error;
 pub use motion::MotionRule;
+pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     Certificate, CertificateEvent, Column, ColumnsInMemory, Damping, FORMAT_VERSION, GravityResponse,
     ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField,
     Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
 pub use response::{HeldOscillator, Oscillation, ResponseForm};
-pub use scene::{Model, ModelObject, ModelParameters, ObjectStart, RigidCompliance};
+pub use scene::{
+    Coupling, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, RigidCompliance,
+};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
-pub use state::{DeviceInput, DeviceOutput, Input, ObjectOutput, Output, State, StepStatus};
+pub use state::{
+    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, State, StepStatus,
+};
 pub use step::step;
 pub use surface::{Surface, SurfacePoint};

@@ -30,6 +30,16 @@ pub enum MotionRule {
     Paper,
 }
 
+impl MotionRule {
+    /// c in the displacement c·h²·F/m at the end of a step under a held force.
+    pub(crate) fn held_factor(self) -> f64 {
+        match self {
+            Self::ExactHeld => 0.5,
+            Self::Paper => 1.0,
+        }
+    }
+}
+
 /// Mass and inertia about the centre of mass, in body axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inertia {
@@ -154,24 +164,6 @@ impl Inertia {
         // cay(h·ω̄)·R = R·cay(h·Ω̄).
         let orientation = (from_world * cayley(mean * h)).normalize();
         (orientation, from_world * mean * h, miss)
-    }
-
-    /// Displacement at the end of the step of arm `a` [m, world] per held unit force at arm `b`:
-    /// c·h²·(1/m − â·I⁻¹·b̂) [m/N], with c = ½ for the exact update and 1 for the paper's.
-    pub(crate) fn mobility(
-        &self,
-        rule: MotionRule,
-        h: f64,
-        inverse_in_world: DMat3,
-        a: DVec3,
-        b: DVec3,
-    ) -> DMat3 {
-        let factor = match rule {
-            MotionRule::ExactHeld => 0.5 * h * h,
-            MotionRule::Paper => h * h,
-        };
-        let linear = DMat3::from_diagonal(DVec3::splat(1.0 / self.mass));
-        (linear - cross_matrix(a) * inverse_in_world * cross_matrix(b)) * factor
     }
 }
 

@@ -1,10 +1,11 @@
 //! The model: what does not change while a scene runs.
 
-use crate::contact::Grasp;
+use crate::contact::{Grasp, is_place};
 use crate::error::Error;
-use crate::motion::{Inertia, MotionRule};
+use crate::motion::{Inertia, MotionRule, RigidState, RigidStep};
+use crate::obstacle::Obstacle;
 use crate::recording::{Recording, Support};
-use crate::response::{Response, ResponseForm};
+use crate::response::{Body, Place, Reading, Response, ResponseForm};
 use crate::spatial::{Pose, Twist};
 use alloc::format;
 use alloc::sync::Arc;
@@ -21,6 +22,36 @@ pub enum RigidCompliance {
     Dropped,
 }
 
+/// A spring and damper between a device and its proxy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coupling {
+    /// k [N/m], positive.
+    pub stiffness: f64,
+    /// d [N·s/m], not negative.
+    pub damping: f64,
+}
+
+/// What a device is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceParameters {
+    /// Radius of the tip that touches [m]; 0 for a point.
+    pub tip_radius: f64,
+    /// Radius of the patch that a touch is spread over [m]; 0 for a point. From about one and a half edges of the mesh on,
+    /// the feel does not show the mesh.
+    pub patch_radius: f64,
+    /// Coulomb's coefficient of a touch [1]; 0 for a wet finger on ice.
+    pub friction: f64,
+    /// Between the device and its proxy; none holds the proxy to the device.
+    pub coupling: Option<Coupling>,
+}
+
+impl Default for DeviceParameters {
+    /// A point without friction, held to its device: nothing that was not asked for.
+    fn default() -> Self {
+        Self { tip_radius: 0.0, patch_radius: 0.0, friction: 0.0, coupling: None }
+    }
+}
+
 /// What holds for a whole scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelParameters {
@@ -32,19 +63,25 @@ pub struct ModelParameters {
     pub motion: MotionRule,
     /// Whether rigid motion counts within the step.
     pub rigid_compliance: RigidCompliance,
-    /// Number of devices.
-    pub devices: usize,
+    /// The devices.
+    pub devices: Vec<DeviceParameters>,
+    /// Planes and rigid obstacles.
+    pub obstacles: Vec<Obstacle>,
+    /// Most contact points of one object, 9·n² numbers of memory. Beyond it contacts are left out, and the status says so.
+    pub most_contact_points: usize,
 }
 
 impl Default for ModelParameters {
-    /// 1 kHz, the rate of common haptic devices; no gravity; no device.
+    /// 1 kHz, the rate of common haptic devices; no gravity; no device; room for the face of a cube of 20³ cells.
     fn default() -> Self {
         Self {
             step_s: 1e-3,
             gravity: DVec3::ZERO,
             motion: MotionRule::default(),
             rigid_compliance: RigidCompliance::default(),
-            devices: 0,
+            devices: Vec::new(),
+            obstacles: Vec::new(),
+            most_contact_points: 512,
         }
     }
 }
@@ -67,20 +104,26 @@ pub struct ModelObject {
     pub response: ResponseForm,
     /// Where it is at the start.
     pub start: ObjectStart,
+    /// Coulomb's coefficient against other objects [1]; between two, the geometric mean of theirs.
+    pub friction: f64,
 }
+
+/// Friction between objects when nothing is said: rubber on wood.
+const FRICTION: f64 = 0.5;
 
 impl ModelObject {
     /// An object with the modal form of its response.
     pub fn new(recording: Arc<Recording>, start: ObjectStart) -> Self {
-        Self { recording, response: ResponseForm::Modal, start }
+        Self { recording, response: ResponseForm::Modal, start, friction: FRICTION }
     }
 }
 
 /// One object of a scene.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneObject {
-    pub(crate) recording: Arc<Recording>,
+    pub(crate) body: Body,
     pub(crate) response: Response,
+    pub(crate) friction: f64,
     /// None for a body with fixed nodes.
     pub(crate) inertia: Option<Inertia>,
     pub(crate) start: ObjectStart,
@@ -108,6 +151,12 @@ impl Model {
         if !parameters.gravity.is_finite() {
             return Err(Error::Model(format!("gravity is {}, expected finite numbers", parameters.gravity)));
         }
+        for (at, device) in parameters.devices.iter().enumerate() {
+            device.check(at)?;
+        }
+        for (at, obstacle) in parameters.obstacles.iter().enumerate() {
+            obstacle.check(at)?;
+        }
         let objects = objects.into_iter().enumerate();
         let objects: Result<_, _> =
             objects.map(|(at, object)| SceneObject::new(at, object, &parameters)).collect();
@@ -121,24 +170,45 @@ impl Model {
 
     /// The recordings, in the order of the objects.
     pub fn recordings(&self) -> impl Iterator<Item = &Recording> {
-        self.objects.iter().map(|object| &*object.recording)
+        self.objects.iter().map(|object| &*object.body.recording)
     }
 
     /// Whether a grasp names an object, a triangle and weights that exist.
     pub(crate) fn accepts(&self, grasp: &Grasp) -> bool {
         self.objects.get(grasp.object).is_some_and(|object| {
-            let [a, b, c] = grasp.point.weights;
-            (grasp.point.triangle as usize) < object.recording.surface.triangles.len()
-                && libm::fabs(a + b + c - 1.0) < 1e-9
-                && [a, b, c].iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))
-                && object.response.accepts(&grasp.point)
+            let place = Place { point: grasp.point, reading: Reading::Point };
+            is_place(&object.body, &place) && object.response.accepts(&grasp.point)
         })
+    }
+}
+
+impl DeviceParameters {
+    /// Refuse numbers out of range.
+    fn check(&self, at: usize) -> Result<(), Error> {
+        let fail = |what| Err(Error::Model(format!("device {at}: {what}")));
+        for (name, value) in [("tip_radius", self.tip_radius), ("patch_radius", self.patch_radius)] {
+            if !(0.0..1e6).contains(&value) {
+                return fail(format!("{name} is {value} m, expected a number not below 0"));
+            }
+        }
+        if !(0.0..1e6).contains(&self.friction) {
+            return fail(format!("friction is {}, expected a number not below 0", self.friction));
+        }
+        match self.coupling {
+            Some(Coupling { stiffness, .. }) if !(stiffness > 0.0 && stiffness < 1e18) => {
+                fail(format!("coupling stiffness is {stiffness} N/m, expected a positive number"))
+            }
+            Some(Coupling { damping, .. }) if !(0.0..1e18).contains(&damping) => {
+                fail(format!("coupling damping is {damping} N·s/m, expected a number not below 0"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
 impl SceneObject {
     fn new(at: usize, object: ModelObject, parameters: &ModelParameters) -> Result<Self, Error> {
-        let ModelObject { recording, response, start } = object;
+        let ModelObject { recording, response, start, friction } = object;
         let ObjectStart { mut pose, twist } = start;
         let refusal = |what| Error::Model(format!("object {at}: {what}"));
         let fail = |what| Err(refusal(what));
@@ -164,8 +234,55 @@ impl SceneObject {
                 "has fixed nodes, and its impulse response does not tell how it sags under gravity".into(),
             );
         }
+        if !(0.0..1e6).contains(&friction) {
+            return fail(format!("friction is {friction}, expected a number not below 0"));
+        }
         let radius = recording.surface.radius();
-        Ok(Self { recording, response, inertia, start: ObjectStart { pose, twist }, radius })
+        let mut radii: Vec<f64> = parameters.devices.iter().map(|device| device.patch_radius).collect();
+        radii.retain(|radius| *radius > 0.0);
+        radii.sort_unstable_by(f64::total_cmp);
+        radii.dedup();
+        let body = Body::new(recording, &radii);
+        Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
+    }
+
+    /// Room for contact points: every device's faces and its held point, and where there is something to lie on as
+    /// many as there are surface nodes, within the allowed.
+    pub(crate) fn capacity(&self, parameters: &ModelParameters, objects: usize) -> usize {
+        let devices = parameters.devices.len();
+        if !self.is_searched() {
+            return devices;
+        }
+        let surface = if parameters.obstacles.is_empty() && objects < 2 {
+            0
+        } else {
+            self.body.recording.surface.positions.len().min(parameters.most_contact_points)
+        };
+        5 * devices + surface
+    }
+
+    /// Whether contacts can be looked for on it: a table tells only of points that are known beforehand.
+    pub(crate) fn is_searched(&self) -> bool {
+        matches!(self.response, Response::Modal(_))
+    }
+
+    /// Rigid motion over a step under contact force [N] and torque [N·m], with weight; a fixed body stays.
+    ///
+    /// # Real time
+    pub(crate) fn advance_rigid(
+        &self,
+        parameters: &ModelParameters,
+        start: &RigidState,
+        force: DVec3,
+        torque: DVec3,
+    ) -> RigidStep {
+        match &self.inertia {
+            Some(inertia) => {
+                let force = force + parameters.gravity * inertia.mass;
+                inertia.advance(parameters.motion, start, parameters.step_s, force, torque)
+            }
+            None => RigidStep { end: *start, turn: DVec3::ZERO, miss: 0.0 },
+        }
     }
 
     /// Gravity [m/s²] in body axes.

@@ -1,29 +1,69 @@
 //! What changes while a scene runs, what a step takes and what it gives.
 
-use crate::contact::{Grasp, HeldPoints, HeldSystem};
+use crate::contact::{
+    Against, Contact, ContactPoints, DeviceState, Grasp, Lift, NodeCache, Search, Solver, Vicinity,
+    WantedList,
+};
 use crate::energy::EnergyLedger;
-use crate::motion::RigidState;
-use crate::response::{ModalPoints, Oscillation, ResponseState};
+use crate::motion::{RigidState, RigidStep};
+use crate::response::{Oscillation, ResponseState};
 use crate::scene::{Model, SceneObject};
 use crate::spatial::{Pose, Twist};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
+/// What a device does in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum DeviceMode {
+    /// Nothing: it is away.
+    #[default]
+    Away,
+    /// It holds a point in all directions.
+    Held(Grasp),
+    /// Its tip touches whatever it meets.
+    Touch,
+}
+
 /// One device's part of a step's input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceInput {
     /// Interface point at the end of the step [m, world].
     pub position: DVec3,
-    /// The point it holds; none lets go.
-    pub grasp: Option<Grasp>,
+    /// What it does.
+    pub mode: DeviceMode,
 }
 
-/// Input of a step: one entry per device of the model.
-#[derive(Debug, Clone, PartialEq)]
+impl From<Option<Grasp>> for DeviceMode {
+    fn from(grasp: Option<Grasp>) -> Self {
+        grasp.map_or(Self::Away, Self::Held)
+    }
+}
+
+impl DeviceInput {
+    /// A device that is away.
+    pub fn away() -> Self {
+        Self { position: DVec3::ZERO, mode: DeviceMode::Away }
+    }
+
+    /// A device that holds a point.
+    pub fn held(position: DVec3, grasp: Grasp) -> Self {
+        Self { position, mode: DeviceMode::Held(grasp) }
+    }
+
+    /// A device that touches.
+    pub fn touching(position: DVec3) -> Self {
+        Self { position, mode: DeviceMode::Touch }
+    }
+}
+
+/// Input of a step.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Input {
-    /// In the order of the model's devices. Missing entries hold nothing.
+    /// In the order of the model's devices. Missing entries are away.
     pub devices: Vec<DeviceInput>,
+    /// Where the obstacles are at the end of the step, in the order of the model's. Missing entries stay.
+    pub obstacles: Vec<Pose>,
 }
 
 /// One device's part of a step's output.
@@ -31,9 +71,28 @@ pub struct Input {
 pub struct DeviceOutput {
     /// Force on the hand [N, world]: the reaction, held over the step.
     pub force_on_hand: DVec3,
-    /// Where the held point is at the end of the step [m, world]; the device's position if it
-    /// holds nothing.
+    /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
+    /// the device's position if it meets nothing.
+    pub proxy: DVec3,
+}
+
+/// A contact that carries force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactOutput {
+    /// Position of the object in the model.
+    pub object: usize,
+    /// What it is in contact with.
+    pub against: Against,
+    /// Where on the object's surface, at the end of the step [m, world].
     pub point: DVec3,
+    /// Out of the object [world].
+    pub normal: DVec3,
+    /// Force on the object [N, world], held over the step.
+    pub force: DVec3,
+    /// Gap at the end of the step [m], negative when penetrating.
+    pub gap: f64,
+    /// Speed of slip over the step [m/s].
+    pub slip_speed: f64,
 }
 
 /// One object's part of a step's output.
@@ -50,17 +109,20 @@ pub struct ObjectOutput {
 /// How a step went. A step can't fail; this says what it met.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepStatus {
-    /// Largest miss of a held point [m].
+    /// Largest miss of a contact's law [m].
     pub solver_residual_m: f64,
     /// Most repetitions that an object needed.
     pub iterations: u32,
-    /// Devices whose position was not finite or whose grasp does not exist; they hold nothing.
+    /// Devices and obstacles whose position was not finite or whose grasp does not exist; the device is away, the
+    /// obstacle stays.
     pub rejected_devices: u32,
     /// Held directions that repeat others and got no force.
     pub dependent_rows: u32,
-    /// Objects whose held points could not be met, or whose turn could not be found, because a hand or the body moves
-    /// too far in a step; they moved freely in this step.
+    /// Objects, or groups of them, whose contacts could not be solved, or whose turn could not be found, because a hand
+    /// or a body moves too far in a step; they moved freely in this step.
     pub unsolved_objects: u32,
+    /// Contacts for which an object had no room.
+    pub dropped_contacts: u32,
 }
 
 /// Output of a step.
@@ -72,7 +134,9 @@ pub struct Output {
     pub devices: Vec<DeviceOutput>,
     /// Per object.
     pub objects: Vec<ObjectOutput>,
-    /// Sum over objects.
+    /// The contacts that carry force, held points apart.
+    pub contacts: Vec<ContactOutput>,
+    /// Sum over objects, with what devices and obstacles do.
     pub energy: EnergyLedger,
     /// How it went.
     pub status: StepStatus,
@@ -83,37 +147,17 @@ pub struct Output {
 pub(crate) struct ObjectState {
     pub(crate) rigid: RigidState,
     pub(crate) response: ResponseState,
+    pub(crate) points: ContactPoints,
+    /// The step without contact force, and as it is solved.
+    pub(crate) free: RigidStep,
+    pub(crate) end: RigidStep,
+    pub(crate) lift: Lift,
+    /// How far the deformation moves any surface node in the step without contact force, at most [m].
+    pub(crate) surface_motion: f64,
+    /// How far contact forces moved their points in the last step, at most [m].
+    pub(crate) pushed: f64,
     pub(crate) ledger: EnergyLedger,
     pub(crate) stored_at_start: f64,
-}
-
-/// Buffers of a step, made once.
-#[derive(Debug, Clone)]
-pub(crate) struct Workspace {
-    pub(crate) system: HeldSystem,
-    pub(crate) active: Vec<ActivePoint>,
-}
-
-/// A held point while its object's step is solved.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct ActivePoint {
-    pub(crate) device: usize,
-    /// Where the hand is at the end of the step [m, world].
-    pub(crate) target: DVec3,
-    /// Arm from the centre of mass at the start of the step [m, world].
-    pub(crate) start_arm: DVec3,
-    /// Displacement at the end of the step without new force [m, body].
-    pub(crate) free: DVec3,
-    /// Force on the object [N, world].
-    pub(crate) force: DVec3,
-    /// The same in body axes.
-    pub(crate) force_in_body: DVec3,
-    /// Displacement at the end of the step [m, body].
-    pub(crate) displacement: DVec3,
-    /// Arm at the end of the step [m, world].
-    pub(crate) end_arm: DVec3,
-    /// How far the point is from the hand [m, world].
-    pub(crate) miss: DVec3,
 }
 
 /// The state of a scene.
@@ -121,37 +165,78 @@ pub(crate) struct ActivePoint {
 pub struct State {
     pub(crate) steps: u64,
     pub(crate) objects: Vec<ObjectState>,
-    pub(crate) held: HeldPoints,
-    pub(crate) modal_points: ModalPoints,
+    pub(crate) devices: Vec<DeviceState>,
+    /// Where the obstacles are.
+    pub(crate) obstacles: Vec<Pose>,
+    /// In the order of their keys.
+    pub(crate) contacts: Vec<Contact>,
+    /// Whether a device is inside an object, where it came to without crossing the surface: devices × objects.
+    pub(crate) inside: Vec<bool>,
+    /// What virtual couplings did.
+    pub(crate) couplings: EnergyLedger,
     pub(crate) workspace: Workspace,
     pub(crate) output: Output,
+}
+
+/// Buffers of a step, made once.
+#[derive(Debug, Clone)]
+pub(crate) struct Workspace {
+    pub(crate) solver: Solver,
+    pub(crate) search: Search,
+    pub(crate) caches: Vec<NodeCache>,
+    /// Devices × objects.
+    pub(crate) vicinities: Vec<Vicinity>,
+    pub(crate) near: Vec<u32>,
+    pub(crate) wanted: WantedList,
+    pub(crate) spare: Vec<Contact>,
+    pub(crate) modes: Vec<f64>,
+    pub(crate) next_obstacles: Vec<Pose>,
 }
 
 impl State {
     /// The scene at its start: undeformed, with all buffers that steps will need.
     pub fn new(model: &Model) -> Self {
-        let devices = model.parameters.devices;
-        let most_modes = model.objects.iter().map(|o| o.response.modes()).max().unwrap_or(0);
-        let objects: Vec<_> =
-            model.objects.iter().map(|o| ObjectState::new(o, devices, model.parameters.gravity)).collect();
+        let parameters = &model.parameters;
+        let devices = parameters.devices.len();
+        let objects: Vec<_> = model.objects.iter().map(|o| ObjectState::new(o, model)).collect();
         let object_outputs = model.objects.iter().zip(&objects).map(|(object, state)| ObjectOutput {
             pose: state.rigid.pose,
             twist: object.start.twist,
             energy: state.ledger,
         });
+        let contacts = objects.iter().map(|own| own.points.capacity()).sum();
         let output = Output {
             time_s: 0.0,
             devices: vec![DeviceOutput::default(); devices],
             objects: object_outputs.collect(),
+            contacts: Vec::with_capacity(contacts),
             energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
             status: StepStatus::default(),
         };
+        let most_modes = model.objects.iter().map(|o| o.response.modes()).max().unwrap_or(0);
+        let nodes = |o: &SceneObject| o.body.recording.surface.positions.len();
+        let obstacles: Vec<Pose> = parameters.obstacles.iter().map(|obstacle| obstacle.pose).collect();
         Self {
             steps: 0,
+            devices: vec![DeviceState::new(); devices],
+            contacts: Vec::with_capacity(contacts),
+            inside: vec![false; devices * model.objects.len()],
+            couplings: EnergyLedger::default(),
+            workspace: Workspace {
+                solver: Solver::new(model.objects.len(), devices, contacts),
+                search: Search::new(),
+                caches: model.objects.iter().map(|o| NodeCache::new(nodes(o))).collect(),
+                vicinities: (0..devices)
+                    .flat_map(|_| model.objects.iter().map(|o| Vicinity::new(o.response.modes())))
+                    .collect(),
+                near: Vec::with_capacity(model.objects.iter().map(nodes).max().unwrap_or(0)),
+                wanted: WantedList::new(contacts),
+                spare: Vec::with_capacity(contacts),
+                modes: vec![0.0; most_modes],
+                next_obstacles: obstacles.clone(),
+            },
+            obstacles,
             objects,
-            held: HeldPoints::new(devices),
-            modal_points: ModalPoints::new(devices, most_modes),
-            workspace: Workspace { system: HeldSystem::new(devices), active: Vec::with_capacity(devices) },
             output,
         }
     }
@@ -172,28 +257,38 @@ impl State {
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, object: usize, out: &mut [DVec3]) {
-        let SceneObject { recording, response, .. } = &model.objects[object];
-        assert_eq!(out.len(), recording.surface.positions.len(), "one entry per surface node");
+        let SceneObject { body, response, .. } = &model.objects[object];
+        assert_eq!(out.len(), body.recording.surface.positions.len(), "one entry per surface node");
         let state = &self.objects[object];
         let gravity = model.objects[object].gravity_in_body(model.parameters.gravity, &state.rigid.pose);
-        state.response.surface_displacement(response, recording, gravity, out);
+        state.response.surface_displacement(response, body, gravity, out);
     }
 }
 
 impl ObjectState {
-    fn new(object: &SceneObject, devices: usize, gravity: DVec3) -> Self {
+    fn new(object: &SceneObject, model: &Model) -> Self {
+        let parameters = &model.parameters;
+        let capacity = object.capacity(parameters, model.objects.len());
         let twist = object.start.twist;
         let pose = object.start.pose;
         let angular_momentum = object
             .inertia
             .map_or(DVec3::ZERO, |inertia| inertia.angular_momentum(pose.orientation, twist.angular));
+        let rigid = RigidState { pose, velocity: twist.linear, angular_momentum };
+        let still = RigidStep { end: rigid, turn: DVec3::ZERO, miss: 0.0 };
         let mut state = Self {
-            rigid: RigidState { pose, velocity: twist.linear, angular_momentum },
-            response: object.response.at_rest(devices),
+            rigid,
+            response: object.response.at_rest(capacity),
+            points: ContactPoints::new(capacity),
+            free: still,
+            end: still,
+            lift: Lift::default(),
+            surface_motion: 0.0,
+            pushed: 0.0,
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };
-        state.weigh(object, gravity);
+        state.weigh(object, parameters.gravity);
         state.stored_at_start = state.ledger.stored();
         state
     }
@@ -204,8 +299,8 @@ impl ObjectState {
     pub(crate) fn weigh(&mut self, object: &SceneObject, gravity: DVec3) {
         let elastic = self.response.energy(&object.response);
         let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
-        let mut potential = -object.recording.mass() * gravity.dot(self.rigid.pose.position);
-        if let Some(response) = &object.recording.gravity {
+        let mut potential = -object.body.recording.mass() * gravity.dot(self.rigid.pose.position);
+        if let Some(response) = &object.body.recording.gravity {
             let acceleration = object.gravity_in_body(gravity, &self.rigid.pose);
             let modes = self.response.modes();
             for (axis, a) in acceleration.to_array().into_iter().enumerate() {

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, Grasp, HeldOscillator, ImpulseResponse, Input, Model, ModelObject,
-    ModelParameters, ObjectStart, Oscillation, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint,
-    Twist, step,
+    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, HeldOscillator, ImpulseResponse, Input, Model,
+    ModelObject, ModelParameters, ObjectStart, Oscillation, Pose, Recording, ResponseForm, Sampling, State,
+    SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -83,7 +83,7 @@ fn scene(recording: &Arc<Recording>, form: ResponseForm, parameters: ModelParame
         palpate::Support::Fixed => Twist::ZERO,
     };
     let start = ObjectStart { pose: Pose::IDENTITY, twist };
-    let object = ModelObject { recording: recording.clone(), response: form, start };
+    let object = ModelObject { response: form, ..ModelObject::new(recording.clone(), start) };
     let model = Model::new(parameters, vec![object]).expect("a good model");
     let state = State::new(&model);
     (model, state)
@@ -105,7 +105,11 @@ fn differences(
     gravity: DVec3,
     grasps: impl Fn(usize) -> [Option<SurfacePoint>; 2],
 ) -> (f64, f64) {
-    let parameters = ModelParameters { devices: 2, gravity, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); 2],
+        gravity,
+        ..ModelParameters::default()
+    };
     let fir = ResponseForm::Fir(Arc::new(table(recording, samples, H)));
     let mut scenes = [ResponseForm::Modal, fir].map(|form| scene(recording, form, parameters.clone()));
     let nodes = recording.surface.positions.len();
@@ -119,9 +123,9 @@ fn differences(
                 3e-4 * DVec3::new((40.0 * t).sin(), (70.0 * t).cos(), (25.0 * t + device as f64).sin());
             let rest = point.map_or(DVec3::ZERO, |p| recording.surface.rest_position(&p));
             let grasp = point.map(|point| Grasp { object: 0, point });
-            DeviceInput { position: pose.world_from_body(rest) + sway, grasp }
+            DeviceInput { position: pose.world_from_body(rest) + sway, mode: grasp.into() }
         });
-        let input = Input { devices: devices.collect() };
+        let input = Input { devices: devices.collect(), ..Input::default() };
         let mut forces = [[DVec3::ZERO; 2]; 2];
         let mut shapes = [vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]];
         for (at, (model, state)) in scenes.iter_mut().enumerate() {
@@ -189,17 +193,19 @@ fn what_lies_more_than_the_window_back_is_forgotten() {
     let held = points(&recording);
     let samples = 20;
     let form = ResponseForm::Fir(Arc::new(table(&recording, samples, H)));
-    let (model, mut state) =
-        scene(&recording, form, ModelParameters { devices: 1, ..ModelParameters::default() });
+    let (model, mut state) = scene(
+        &recording,
+        form,
+        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::default() },
+    );
     let rest = recording.surface.rest_position(&held[0]);
-    let push =
-        DeviceInput { position: rest + DVec3::X * 1e-3, grasp: Some(Grasp { object: 0, point: held[0] }) };
-    step(&model, &mut state, &Input { devices: vec![push] });
+    let push = DeviceInput::held(rest + DVec3::X * 1e-3, Grasp { object: 0, point: held[0] });
+    step(&model, &mut state, &Input { devices: vec![push], ..Input::default() });
     let mut shape = vec![DVec3::ZERO; recording.surface.positions.len()];
     for number in 1..=samples {
         state.surface_displacement(&model, 0, &mut shape);
         assert!(shape.iter().any(|u| *u != DVec3::ZERO), "step {number}");
-        step(&model, &mut state, &Input { devices: vec![] });
+        step(&model, &mut state, &Input { devices: vec![], ..Input::default() });
     }
     state.surface_displacement(&model, 0, &mut shape);
     assert!(shape.iter().all(|u| *u == DVec3::ZERO));
@@ -210,14 +216,21 @@ fn the_energy_that_hands_gave_is_in_motion_and_deformation() {
     let recording = free();
     let held = points(&recording);
     let form = ResponseForm::Fir(Arc::new(table(&recording, 200, H)));
-    let (model, mut state) =
-        scene(&recording, form, ModelParameters { devices: 1, ..ModelParameters::default() });
+    let (model, mut state) = scene(
+        &recording,
+        form,
+        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::default() },
+    );
     let rest = recording.surface.rest_position(&held[5]);
     for number in 1..400 {
         let position = rest + DVec3::new(0.0, 3e-3 * (0.05 * f64::from(number)).sin(), 0.0);
         let grasp = (number % 90 < 70).then_some(Grasp { object: 0, point: held[5] });
-        let energy =
-            step(&model, &mut state, &Input { devices: vec![DeviceInput { position, grasp }] }).energy;
+        let energy = step(
+            &model,
+            &mut state,
+            &Input { devices: vec![DeviceInput { position, mode: grasp.into() }], ..Input::default() },
+        )
+        .energy;
         assert!(energy.defect.abs() < 1e-13 * (energy.input.abs() + energy.stored()), "{number}: {energy:?}");
     }
 }
@@ -229,8 +242,10 @@ fn tables_that_do_not_fit_are_refused() {
         let mut table = table(&recording, 5, H);
         change(&mut table);
         let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-        let object =
-            ModelObject { recording: recording.clone(), response: ResponseForm::Fir(Arc::new(table)), start };
+        let object = ModelObject {
+            response: ResponseForm::Fir(Arc::new(table)),
+            ..ModelObject::new(recording.clone(), start)
+        };
         Model::new(ModelParameters::default(), vec![object]).err().map(|e| e.to_string()).unwrap_or_default()
     };
     assert_eq!(
@@ -270,8 +285,13 @@ fn a_point_that_is_not_touchable_can_not_be_held() {
     let (model, mut state) = scene(
         &recording,
         ResponseForm::Fir(Arc::new(table)),
-        ModelParameters { devices: 1, ..Default::default() },
+        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..Default::default() },
     );
-    let device = DeviceInput { position: DVec3::ZERO, grasp: Some(Grasp { object: 0, point }) };
-    assert_eq!(step(&model, &mut state, &Input { devices: vec![device] }).status.rejected_devices, 1);
+    let device = DeviceInput::held(DVec3::ZERO, Grasp { object: 0, point });
+    assert_eq!(
+        step(&model, &mut state, &Input { devices: vec![device], ..Input::default() })
+            .status
+            .rejected_devices,
+        1
+    );
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, Grasp, ImpulseResponse, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint, Twist, step,
+    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
+    ModelParameters, ObjectStart, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint, Twist, step,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -69,11 +69,14 @@ fn a_step_makes_no_allocation() {
     let fixed = recording(include_bytes!("../../../data/recordings/v1/fixed.palp"));
     let start =
         |x: f64| ObjectStart { pose: Pose { position: DVec3::X * x, ..Pose::IDENTITY }, twist: Twist::ZERO };
-    let parameters = ModelParameters { devices: 4, gravity: DVec3::Y * -9.81, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); 4],
+        gravity: DVec3::Y * -9.81,
+        ..ModelParameters::default()
+    };
     let convolved = ModelObject {
-        recording: free.clone(),
         response: ResponseForm::Fir(Arc::new(table(&free))),
-        start: start(2.0),
+        ..ModelObject::new(free.clone(), start(2.0))
     };
     let model = Model::new(
         parameters,
@@ -83,14 +86,14 @@ fn a_step_makes_no_allocation() {
     let mut state = State::new(&model);
     let grasp =
         |object, triangle| Some(Grasp { object, point: SurfacePoint { triangle, weights: [0.2, 0.3, 0.5] } });
-    let mut input = Input { devices: vec![DeviceInput { position: DVec3::ZERO, grasp: None }; 4] };
+    let mut input = Input { devices: vec![DeviceInput::away(); 4], ..Input::default() };
 
     let before = ALLOCATIONS.get();
     for number in 0..200_u32 {
         // New grasps, old ones, none, one that does not exist, one on the same point, a hand that is no number.
         for (device, entry) in input.devices.iter_mut().enumerate() {
             let device = device as u32;
-            entry.grasp = match (number / 7 + device) % 7 {
+            entry.mode = match (number / 7 + device) % 7 {
                 0 => None,
                 5 => grasp(2, device),
                 6 => grasp(2, number / 2 % 90),
@@ -98,7 +101,8 @@ fn a_step_makes_no_allocation() {
                 2 => grasp(1, 3),
                 3 => grasp(0, 999),
                 _ => grasp(1, device),
-            };
+            }
+            .into();
             let sway = f64::from((number * 31 + device * 17) % 101) / 101.0;
             entry.position = DVec3::new(f64::from(device), 0.1 * sway, 0.0);
             if number % 50 == 49 {

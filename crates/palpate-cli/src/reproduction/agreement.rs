@@ -7,8 +7,8 @@ use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Scale, Section, figure, paragraph, table};
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, ResponseForm,
-    Sampling, State, Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    ResponseForm, Sampling, State, Twist, step,
 };
 use palpate_fem::progress::{Progress, Silent};
 use palpate_fem::record::Recorded;
@@ -95,10 +95,14 @@ fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, Failur
     let recording = Arc::new(body.recording.clone());
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let forms = [ResponseForm::Modal, ResponseForm::Fir(Arc::new(table))];
-    let parameters = ModelParameters { devices: 2, step_s: STEP_S, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); 2],
+        step_s: STEP_S,
+        ..ModelParameters::default()
+    };
     let mut scenes = Vec::new();
     for response in forms {
-        let object = ModelObject { recording: recording.clone(), response, start };
+        let object = ModelObject { response, ..ModelObject::new(recording.clone(), start) };
         let model = Model::new(parameters.clone(), vec![object])?;
         let state = State::new(&model);
         scenes.push((model, state));
@@ -111,9 +115,9 @@ fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, Failur
             let place = places[(number / 60) % 3] * DVec3::new(side, 1.0, side);
             let grasp = recording.surface.nearest(place).map(|(point, _)| Grasp { object: 0, point });
             let sway = DVec3::new(4e-3 * (20.0 * t).sin(), 1e-3 * (35.0 * t).sin(), 0.0);
-            DeviceInput { position: place * 0.97 + sway, grasp }
+            DeviceInput { position: place * 0.97 + sway, mode: grasp.into() }
         });
-        let input = Input { devices: devices.to_vec() };
+        let input = Input { devices: devices.to_vec(), ..Input::default() };
         let forces: Vec<Vec<DVec3>> = scenes
             .iter_mut()
             .map(|(model, state)| {

@@ -8,8 +8,8 @@ use crate::report::{Scale, Section, figure, paragraph};
 use crate::verbs::run::percentile_us;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording,
-    ResponseForm, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Pose, Recording, ResponseForm, State, SurfacePoint, Twist, step,
 };
 use palpate_fem::progress::{Progress, Silent};
 use palpate_fem::record::Recorded;
@@ -71,9 +71,14 @@ fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result
     let table_bytes = 8 * table.touchable_dofs.len() * table.columns.column_length();
     let observed = table.observed_dofs.len();
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let object =
-        ModelObject { recording: recording.clone(), response: ResponseForm::Fir(Arc::new(table)), start };
-    let parameters = ModelParameters { devices: held.len(), ..ModelParameters::default() };
+    let object = ModelObject {
+        response: ResponseForm::Fir(Arc::new(table)),
+        ..ModelObject::new(recording.clone(), start)
+    };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); held.len()],
+        ..ModelParameters::default()
+    };
     let model = Model::new(parameters, vec![object])?;
     let mut state = State::new(&model);
     let mut times = Vec::with_capacity(steps);
@@ -82,9 +87,9 @@ fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result
         let sway = DVec3::new((12.0 * t).sin(), 0.5 * (5.0 * t).sin(), 0.3 * (7.0 * t).sin()) * 0.01;
         let device = |point: &SurfacePoint| DeviceInput {
             position: recording.surface.rest_position(point) * 0.99 + sway,
-            grasp: Some(Grasp { object: 0, point: *point }),
+            mode: DeviceMode::Held(Grasp { object: 0, point: *point }),
         };
-        let input = Input { devices: held.iter().map(device).collect() };
+        let input = Input { devices: held.iter().map(device).collect(), ..Input::default() };
         let before = Instant::now();
         let status = step(&model, &mut state, &input).status;
         if number >= samples {

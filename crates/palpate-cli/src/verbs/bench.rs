@@ -7,8 +7,8 @@ use crate::verbs::{print, print_json};
 use clap::Args;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
-    Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, State, Twist, step,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -103,11 +103,14 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
         })
         .collect();
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let parameters = ModelParameters { devices: held.len(), ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); held.len()],
+        ..ModelParameters::default()
+    };
     let model = Model::new(parameters, vec![ModelObject::new(case.recording.clone(), start); case.objects])?;
     let mut state = State::new(&model);
     let rest: Vec<DVec3> = held.iter().map(|grasp| surface.rest_position(&grasp.point)).collect();
-    let mut input = Input { devices: Vec::new() };
+    let mut input = Input { devices: Vec::new(), ..Input::default() };
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps {
         let t = number as f64 * 1e-3;
@@ -115,7 +118,7 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
         input.devices = held
             .iter()
             .zip(&rest)
-            .map(|(grasp, rest)| DeviceInput { position: *rest * 0.98 + sway, grasp: Some(*grasp) })
+            .map(|(grasp, rest)| DeviceInput::held(*rest * 0.98 + sway, *grasp))
             .collect();
         let before = Instant::now();
         step(&model, &mut state, &input);

@@ -74,6 +74,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
         scene: scene_path.clone(),
         duration: Some(DURATION_S),
         csv: Some(output.join("shake.csv")),
+        contacts: None,
         vtu: Some(output.join("vtu")),
         fps: 50.0,
         json: false,

@@ -4,8 +4,8 @@ use super::{Check, recorded, undamped};
 use crate::Failure;
 use glam::{DMat3, DQuat, DVec3};
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
-    Twist, inertia_in_world, step,
+    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Pose, Recording, State, Twist, inertia_in_world, step,
 };
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
@@ -25,7 +25,12 @@ fn model(
     gravity: DVec3,
 ) -> Result<Model, Failure> {
     let start = ObjectStart { pose: Pose::IDENTITY, twist };
-    let parameters = ModelParameters { step_s, devices, gravity, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        step_s,
+        devices: vec![DeviceParameters::default(); devices],
+        gravity,
+        ..ModelParameters::default()
+    };
     Ok(Model::new(parameters, vec![ModelObject::new(recording.clone(), start)])?)
 }
 
@@ -45,7 +50,7 @@ pub fn flight() -> Result<Vec<Check>, Failure> {
         let mut state = State::new(&model);
         let energy = state.output().energy.stored();
         let before = angular_momentum(&recording, &state.output().objects[0].pose, &twist);
-        let none = Input { devices: Vec::new() };
+        let none = Input { devices: Vec::new(), ..Input::default() };
         (0..(1.0 / step_s).round() as usize).for_each(|_| {
             step(&model, &mut state, &none);
         });
@@ -90,7 +95,11 @@ pub fn momentum() -> Result<Vec<Check>, Failure> {
     let rest = recording.surface.rest_position(&point);
     let hand = rest + DVec3::new(1e-3, -2e-3, 5e-4);
     let grasp = Some(Grasp { object: 0, point });
-    let output = step(&model, &mut state, &Input { devices: vec![DeviceInput { position: hand, grasp }] });
+    let output = step(
+        &model,
+        &mut state,
+        &Input { devices: vec![DeviceInput { position: hand, mode: grasp.into() }], ..Input::default() },
+    );
     let force = -output.devices[0].force_on_hand;
     let object = &output.objects[0];
     // The deformed arm, in the mean over the step.
@@ -100,7 +109,7 @@ pub fn momentum() -> Result<Vec<Check>, Failure> {
     Ok(vec![
         Check::new("momentum against f·h, share", (p - force * h).length() / p.length(), 0.0, ROUND_OFF),
         Check::new("angular momentum against r×f·h, share", (spin - l).length() / l.length(), 0.0, ROUND_OFF),
-        Check::new("held point against hand [m]", (output.devices[0].point - hand).length(), 0.0, 1e-15),
+        Check::new("held point against hand [m]", (output.devices[0].proxy - hand).length(), 0.0, 1e-15),
     ])
 }
 
@@ -120,7 +129,7 @@ pub fn energy() -> Result<Vec<Check>, Failure> {
         seed ^= seed << 17;
         (seed >> 11) as f64 / (1_u64 << 53) as f64
     };
-    let mut input = Input { devices: vec![DeviceInput { position: DVec3::ZERO, grasp: None }; 3] };
+    let mut input = Input { devices: vec![DeviceInput::away(); 3], ..Input::default() };
     let start = state.output().energy.stored();
     let (mut gained, mut unexplained, mut backwards, mut moved) = (0.0_f64, 0.0_f64, 0.0_f64, 1e-9_f64);
     for number in 0..4000 {
@@ -131,9 +140,9 @@ pub fn energy() -> Result<Vec<Check>, Failure> {
                 let triangle = (random() * triangles as f64) as u32;
                 let weights = [0.2, 0.3, 0.5];
                 let point = palpate::SurfacePoint { triangle, weights };
-                entry.grasp = (random() < 0.7).then_some(Grasp { object: 0, point });
+                entry.mode = (random() < 0.7).then_some(Grasp { object: 0, point }).into();
             }
-            if let Some(grasp) = entry.grasp {
+            if let DeviceMode::Held(grasp) = entry.mode {
                 let at = pose.world_from_body(recording.surface.rest_position(&grasp.point));
                 let jump = DVec3::new(random() - 0.5, random() - 0.5, random() - 0.5) * 0.01;
                 let shake = if device == 0 && number % 2 == 0 { 1.0 } else { -1.0 };

@@ -5,8 +5,8 @@ use crate::Failure;
 use crate::verbs::demo::paper_cube;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, Recording, State,
-    Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, State, Twist, step,
 };
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::record::RecordParameters;
@@ -28,14 +28,18 @@ fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, Failure> {
     let grasps =
         [-REACH, REACH].map(|x| surface.nearest(DVec3::X * x).map(|(point, _)| Grasp { object: 0, point }));
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let parameters = ModelParameters { devices: 2, ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![DeviceParameters::default(); 2], ..ModelParameters::default() };
     let model = Model::new(parameters, vec![ModelObject::new(Arc::new(recording), start)])?;
     let mut state = State::new(&model);
     let forces = (1..=steps).map(|number| {
         let s = (number as f64 / 50.0).min(1.0);
         let inward = 0.005 * s * s * (3.0 - 2.0 * s);
-        let hand = |side: f64, grasp| DeviceInput { position: DVec3::X * side * (REACH - inward), grasp };
-        let input = Input { devices: vec![hand(-1.0, grasps[0]), hand(1.0, grasps[1])] };
+        let hand = |side: f64, grasp: Option<Grasp>| DeviceInput {
+            position: DVec3::X * side * (REACH - inward),
+            mode: grasp.into(),
+        };
+        let input = Input { devices: vec![hand(-1.0, grasps[0]), hand(1.0, grasps[1])], ..Input::default() };
         -step(&model, &mut state, &input).devices[0].force_on_hand.x
     });
     Ok(forces.collect())

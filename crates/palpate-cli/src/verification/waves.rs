@@ -4,8 +4,8 @@ use super::{Check, recorded, undamped};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose, State, SurfacePoint,
-    Twist, step,
+    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Pose, State, SurfacePoint, Twist, step,
 };
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
@@ -47,7 +47,11 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, Failure> {
     }
     let rest: Vec<DVec3> = grasps.iter().map(|point| surface.rest_position(point)).collect();
     let step_s = TAU / omega / 200.0;
-    let parameters = ModelParameters { step_s, devices: grasps.len(), ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        step_s,
+        devices: vec![DeviceParameters::default(); grasps.len()],
+        ..ModelParameters::default()
+    };
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let model = Model::new(parameters, vec![ModelObject::new(Arc::new(body.recording), start)])?;
     let mut state = State::new(&model);
@@ -59,10 +63,10 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, Failure> {
         let hand = DVec3::X * (AMPLITUDE * soft * phase.sin());
         let hold = |(point, rest): (&SurfacePoint, &DVec3)| DeviceInput {
             position: *rest + hand,
-            grasp: Some(Grasp { object: 0, point: *point }),
+            mode: DeviceMode::Held(Grasp { object: 0, point: *point }),
         };
         let devices = grasps.iter().zip(&rest).map(hold).collect();
-        let output = step(&model, &mut state, &Input { devices });
+        let output = step(&model, &mut state, &Input { devices, ..Input::default() });
         let force: f64 = output.devices.iter().map(|device| device.force_on_hand.x).sum();
         if share == 1.0 {
             // The force is the mean over its step: it belongs to the step's middle.

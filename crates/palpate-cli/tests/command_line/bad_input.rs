@@ -19,15 +19,20 @@ fn unknown_keys_are_errors_with_their_line() {
             "step = 0.001",
             "stepp = 0.001",
             1,
-            "`step`, `gravity`, `motion`, `rigid_compliance`, `object`, `device`",
+            "`step`, `gravity`, `motion`, `rigid_compliance`, `most_contact_points`, `object`, `plane`, `obstacle`, `device`",
         ),
         (
             "recording = \"cube.palp\"",
             "recording = \"cube.palp\"\nspeed = 1",
             7,
-            "`name`, `recording`, `response`, `table`, `position`, `orientation`, `velocity`, `angular_velocity`",
+            "`name`, `recording`, `response`, `table`, `position`, `orientation`, `velocity`, `angular_velocity`, `friction`",
         ),
-        ("mode = \"held\"", "mode = \"held\"\nforce = 1", 11, "`name`, `mode`, `attach`, `path`"),
+        (
+            "mode = \"held\"",
+            "mode = \"held\"\nforce = 1",
+            11,
+            "`name`, `mode`, `attach`, `path`, `tip_radius`, `patch_radius`, `friction`, `coupling`",
+        ),
         ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "`file`"),
     ] {
         let error = broken(&workplace, old, new);
@@ -90,7 +95,11 @@ fn what_a_scene_file_gets_wrong_is_named_with_its_line() {
             "object = \"ball\", point = [0.05",
             "scene.toml: line 17: there is no object \"ball\"; the scene has cube",
         ),
-        ("mode = \"held\"", "mode = \"touch\"", "scene.toml: line 10: mode is \"touch\", expected \"held\""),
+        (
+            "mode = \"held\"",
+            "mode = \"push\"",
+            "scene.toml: line 10: mode is \"push\", expected \"held\" or \"touch\"",
+        ),
         (
             "point = [0.05, 0.0, 0.0]",
             "point = [-0.05, 0.0, 0.0]",

@@ -1,6 +1,8 @@
 //! The command `palpate` from outside: what it prints and writes, what it refuses and how it says so.
 
+mod bad_contact_scenes;
 mod bad_input;
+mod contacts;
 mod results;
 mod stores;
 mod workplace;

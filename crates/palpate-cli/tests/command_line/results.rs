@@ -158,9 +158,10 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
     let table = Table::parse(&workplace.text("out.csv"));
     assert_eq!(
         table.header,
-        "t,left.x,left.y,left.z,left.fx,left.fy,left.fz,right.x,right.y,right.z,right.fx,right.fy,right.fz,cube.px,\
-         cube.py,cube.pz,cube.qw,cube.qx,cube.qy,cube.qz,cube.vx,cube.vy,cube.vz,cube.wx,cube.wy,cube.wz,\
-         energy.kinetic,energy.elastic,energy.residual,energy.potential,energy.input,energy.dissipated,energy.defect"
+        "t,left.x,left.y,left.z,left.fx,left.fy,left.fz,left.proxy_x,left.proxy_y,left.proxy_z,right.x,right.y,right.z,\
+         right.fx,right.fy,right.fz,right.proxy_x,right.proxy_y,right.proxy_z,cube.px,cube.py,cube.pz,cube.qw,cube.qx,\
+         cube.qy,cube.qz,cube.vx,cube.vy,cube.vz,cube.wx,cube.wy,cube.wz,energy.kinetic,energy.elastic,energy.residual,\
+         energy.potential,energy.coupling,energy.input,energy.dissipated,energy.friction,energy.impact,energy.defect"
     );
     // To the end of the longest path.
     assert_eq!(table.len(), 50);
@@ -175,6 +176,9 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
     assert!((left[49] - DVec3::new(-0.04, 0.01, 0.002)).length() < SUMMED, "{}", left[49]);
     let right = table.vectors("right", ["x", "y", "z"]);
     assert_eq!(right[49], right[39]);
+    // And so are the points that they hold.
+    let held = table.vectors("left", ["proxy_x", "proxy_y", "proxy_z"]);
+    assert!(held.iter().zip(&left).all(|(held, hand)| (held - hand).length() < SUMMED), "{held:?}");
 
     // Stored = at the start + input − dissipated + defect, and the input is Σ f·Δx of the hands.
     let energy = |name: &str| table.column(&format!("energy.{name}"));
@@ -208,7 +212,10 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
     assert!(lost > 0.0 && work > 0.0);
 
     // The summary says the same.
-    assert_eq!(names(&summary), ["devices", "energy_j", "objects", "solver", "step_s", "steps", "timing_us"]);
+    assert_eq!(
+        names(&summary),
+        ["contacts", "devices", "energy_j", "objects", "solver", "step_s", "steps", "timing_us"]
+    );
     assert_eq!((&summary["steps"], &summary["step_s"]), (&Value::from(50), &Value::from(1e-3)));
     for (at, name) in ["left", "right"].into_iter().enumerate() {
         let device = &summary["devices"][at];
@@ -224,9 +231,26 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
     assert_eq!(vector(&object["angular_velocity_rad_s"]), table.vectors("cube", ["wx", "wy", "wz"])[49]);
     let orientation = ["qw", "qx", "qy", "qz"].map(|part| table.column(&format!("cube.{part}"))[49]);
     assert_eq!(object["orientation"], serde_json::json!(orientation));
-    for name in ["kinetic", "elastic", "residual", "potential", "input", "dissipated", "defect"] {
+    for name in [
+        "kinetic",
+        "elastic",
+        "residual",
+        "potential",
+        "coupling",
+        "input",
+        "dissipated",
+        "friction",
+        "impact",
+        "defect",
+    ] {
         assert_eq!(number(&summary["energy_j"][name]), energy(name)[49], "{name}");
     }
+    // Held points are not contacts.
+    assert_eq!(summary["contacts"], serde_json::json!({ "most": 0, "most_force_n": 0.0 }));
+    assert_eq!(
+        (&summary["solver"]["dropped_contacts"], &summary["solver"]["unsolved_steps"]),
+        (&Value::from(0), &Value::from(0))
+    );
     let times = ["p50", "p99", "p999", "max"].map(|name| number(&summary["timing_us"][name]));
     assert!(times[0] >= 0.0 && times.is_sorted(), "{times:?}");
 }

@@ -14,7 +14,7 @@ const POOR_BELOW: f64 = 0.03;
 const USUAL_EXTENT: [f64; 2] = [1e-3, 3.0];
 
 /// Nodes closer than this share of the mesh's diagonal are one point: some times the rounding of a file in f32.
-const COINCIDENT: f64 = 1e-6;
+pub(super) const COINCIDENT: f64 = 1e-6;
 
 /// Signed volume [m³].
 pub(crate) fn tet_volume(nodes: &[DVec3], tet: &[u32; 4]) -> f64 {
@@ -100,7 +100,7 @@ pub fn check(mut mesh: Mesh) -> Result<Mesh, MeshError> {
     turn_upright(&mut mesh)?;
     let faces = faces(&mesh.tets);
     check_faces(&mesh, &faces)?;
-    let coincident = coincident_pairs(&mesh, &used, COINCIDENT * (high - low).length());
+    let coincident = coincident_pairs(&mesh.nodes, &used, COINCIDENT * (high - low).length());
     check_connected(&mesh, &faces, coincident.first().copied())?;
     if let Some(&(a, b)) = coincident.first() {
         mesh.remarks.push(format!(
@@ -123,7 +123,7 @@ pub fn merge_nodes(mesh: &mut Mesh) -> usize {
     known.for_each(|&node| used[node as usize] = true);
     let (low, high) = extent(mesh, &used);
     let mut first: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
-    let pairs = coincident_pairs(mesh, &used, COINCIDENT * (high - low).length());
+    let pairs = coincident_pairs(&mesh.nodes, &used, COINCIDENT * (high - low).length());
     for (a, b) in pairs {
         first[b as usize] = first[a as usize];
     }
@@ -274,7 +274,7 @@ fn check_connected(mesh: &Mesh, faces: &[Face], coincident: Option<(u32, u32)>) 
 
 /// Pairs (first, other) of used nodes within `tolerance` [m], each other node once: nodes are sorted into cells of that
 /// size and compared with those in the neighbouring cells.
-fn coincident_pairs(mesh: &Mesh, used: &[bool], tolerance: f64) -> Vec<(u32, u32)> {
+pub(super) fn coincident_pairs(places: &[DVec3], used: &[bool], tolerance: f64) -> Vec<(u32, u32)> {
     if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Vec::new();
     }
@@ -282,10 +282,9 @@ fn coincident_pairs(mesh: &Mesh, used: &[bool], tolerance: f64) -> Vec<(u32, u32
     let key = |cell: DVec3| cell.to_array().map(f64::to_bits);
     let mut firsts: std::collections::HashMap<[u64; 3], Vec<u32>> = std::collections::HashMap::new();
     let mut pairs = Vec::new();
-    let nodes =
-        (0..mesh.nodes.len() as u32).filter(|&n| used[n as usize] && mesh.nodes[n as usize].is_finite());
+    let nodes = (0..places.len() as u32).filter(|&n| used[n as usize] && places[n as usize].is_finite());
     for node in nodes {
-        let position = mesh.nodes[node as usize];
+        let position = places[node as usize];
         let home = cell(position);
         let around =
             (0..27).map(|at: i32| DVec3::new(f64::from(at % 3), f64::from(at / 3 % 3), f64::from(at / 9)));
@@ -293,7 +292,7 @@ fn coincident_pairs(mesh: &Mesh, used: &[bool], tolerance: f64) -> Vec<(u32, u32
             // Adding 0 turns −0 into 0, which has other bits.
             .filter_map(|shift| firsts.get(&key(home + shift - DVec3::ONE + DVec3::ZERO)))
             .flatten()
-            .find(|&&first| (mesh.nodes[first as usize] - position).length() <= tolerance);
+            .find(|&&first| (places[first as usize] - position).length() <= tolerance);
         match near {
             Some(&first) => pairs.push((first, node)),
             None => firsts.entry(key(home + DVec3::ZERO)).or_default().push(node),

@@ -1,15 +1,19 @@
-//! A tetrahedral mesh as it came in: nodes, tetrahedra, regions and named groups.
+//! A tetrahedral mesh as it came in: nodes, tetrahedra, regions and named groups. Triangle meshes for what is rigid.
 
 mod check;
 mod error;
 pub mod gmsh;
+pub mod obj;
 mod primitives;
 mod scan;
+pub mod stl;
+mod surface_mesh;
 pub mod vtk;
 
 pub use check::{boundary, check, merge_nodes};
 pub use error::MeshError;
 pub use primitives::{ball_mesh, box_mesh};
+pub use surface_mesh::SurfaceMesh;
 
 use glam::DVec3;
 

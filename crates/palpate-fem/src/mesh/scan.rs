@@ -66,6 +66,11 @@ impl<'a> Scan<'a> {
         Self { bytes, at, begun: at, path, encoding: Encoding::Text }
     }
 
+    /// Goes on at a byte of the file.
+    pub fn go_to(&mut self, at: usize) {
+        self.at = at;
+    }
+
     pub fn is_text(&self) -> bool {
         self.encoding == Encoding::Text
     }

@@ -11,7 +11,7 @@
 //! copied together when the two first meet, weighted with their corners. When no room is left for a copy the table
 //! itself is read: the same numbers, more slowly.
 
-use super::Acting;
+use crate::contact::ContactPoint;
 use crate::error::Error;
 use crate::recording::{ImpulseResponse, Recording};
 use crate::surface::SurfacePoint;
@@ -67,15 +67,13 @@ pub(crate) struct FirState {
     /// written twice, so that T of them always lie one after the other, from `head` on.
     forces: Vec<DVec3>,
     head: usize,
-    /// T steps of at most one stray force per device, a ring that begins at `head`.
+    /// T steps of at most one stray force per slot, a ring that begins at `head`.
     strays: Vec<Stray>,
     stray_counts: Vec<u32>,
     any_stray: usize,
-    /// What each device holds.
+    /// The point that each slot stands for.
     contacts: Vec<Option<SurfacePoint>>,
-    /// ũ of each device's point at the end of the step [m, body].
-    free: Vec<DVec3>,
-    /// Copies of series, T 3×3 blocks each, and which of them belongs to (device, source).
+    /// Copies of series, T 3×3 blocks each, and which of them belongs to (slot, source).
     copies: Vec<[f64; 9]>,
     unused: Vec<u32>,
     copy_of: Vec<u32>,
@@ -173,66 +171,65 @@ impl Fir {
 const NOWHERE: SurfacePoint = SurfacePoint { triangle: NONE, weights: [0.0; 3] };
 
 impl FirState {
-    pub(crate) fn new(fir: &Fir, devices: usize) -> Self {
+    pub(crate) fn new(fir: &Fir, slots: usize) -> Self {
         let samples = fir.table.samples;
         // Some more sources than can be in contact at once: a contact that moves leaves some behind.
-        let sources = (4 * devices).max(32).min(devices * samples);
-        let copies = (devices * sources).min(COPIES_BYTES / (72 * samples));
+        let sources = (4 * slots).max(32).min(slots * samples);
+        let copies = (slots * sources).min(COPIES_BYTES / (72 * samples));
         Self {
             steps: 0,
             sources: vec![Source { point: NOWHERE, oldest: None, newest: 0 }; sources],
             forces: vec![DVec3::ZERO; 2 * samples * sources],
             head: 0,
-            strays: vec![Stray { point: NOWHERE, force: DVec3::ZERO }; samples * devices],
+            strays: vec![Stray { point: NOWHERE, force: DVec3::ZERO }; samples * slots],
             stray_counts: vec![0; samples],
             any_stray: 0,
-            contacts: vec![None; devices],
-            free: vec![DVec3::ZERO; devices],
+            contacts: vec![None; slots],
             copies: vec![[0.0; 9]; copies * samples],
             unused: (0..copies as u32).rev().collect(),
-            copy_of: vec![NONE; devices * sources],
+            copy_of: vec![NONE; slots * sources],
             work: 0.0,
         }
     }
 
-    /// Let a device hold a point; gives where the point is now [m, body].
+    /// Let a slot stand for a point; gives where the point is now [m, body].
     ///
     /// # Real time
     /// Copies the series between the point and all sources, T samples each.
-    pub(crate) fn hold(&mut self, fir: &Fir, device: usize, point: &SurfacePoint, gravity: DVec3) -> DVec3 {
-        self.contacts[device] = Some(*point);
-        self.convolve(fir, device, point, 0) + fir.sag_of_point(point, gravity, self.steps)
+    pub(crate) fn hold(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, gravity: DVec3) -> DVec3 {
+        self.contacts[slot] = Some(*point);
+        self.convolve(fir, slot, point, 0) + fir.sag_of_point(point, gravity, self.steps)
     }
 
-    /// Let a device hold nothing.
+    /// Let a slot stand for nothing.
     ///
     /// # Real time
-    pub(crate) fn release(&mut self, device: usize) {
-        self.contacts[device] = None;
-        (0..self.sources.len()).for_each(|source| self.forget(device, source));
+    pub(crate) fn release(&mut self, slot: usize) {
+        self.contacts[slot] = None;
+        (0..self.sources.len()).for_each(|source| self.forget(slot, source));
     }
 
-    fn forget(&mut self, device: usize, source: usize) {
-        let copy = &mut self.copy_of[device * self.sources.len() + source];
+    fn forget(&mut self, slot: usize, source: usize) {
+        let copy = &mut self.copy_of[slot * self.sources.len() + source];
         if *copy != NONE {
             self.unused.push(*copy);
             *copy = NONE;
         }
     }
 
-    /// Where the copy of the series between a device's point and a source begins, made now if there is room.
-    fn copy(&mut self, fir: &Fir, device: usize, point: &SurfacePoint, source: usize) -> Option<usize> {
+    /// Where the copy of the series between a slot's point and a source begins, made now if there is room.
+    fn copy(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, source: usize) -> Option<usize> {
         let samples = fir.table.samples;
-        let slot = device * self.sources.len() + source;
-        if self.copy_of[slot] == NONE {
+        let entry = slot * self.sources.len() + source;
+        if self.copy_of[entry] == NONE {
             let copy = self.unused.pop()?;
-            self.copy_of[slot] = copy;
+            self.copy_of[entry] = copy;
             let series = &mut self.copies[copy as usize * samples..][..samples];
             for (sample, block) in series.iter_mut().enumerate() {
                 *block = fir.block(sample, point, &self.sources[source].point);
             }
         }
-        Some(self.copy_of[slot] as usize * samples)
+        Some(self.copy_of[entry] as usize * samples)
     }
 
     /// The forces of a source, the newest first, and the ages between which they are not all zero.
@@ -242,8 +239,8 @@ impl FirState {
         Some((forces, newest..(oldest? + 1).min(samples)))
     }
 
-    /// Σ R[age + ahead]·f over the history at a device's point [m, body]; age 0 is the last step.
-    fn convolve(&mut self, fir: &Fir, device: usize, point: &SurfacePoint, ahead: usize) -> DVec3 {
+    /// Σ R[age + ahead]·f over the history at a slot's point [m, body]; age 0 is the last step.
+    fn convolve(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, ahead: usize) -> DVec3 {
         let samples = fir.table.samples;
         let mut sum = [0.0; 3];
         let add = |sum: &mut [f64; 3], block: &[f64; 9], force: &DVec3| {
@@ -255,7 +252,7 @@ impl FirState {
             if self.sources[source].oldest.is_none() {
                 continue;
             }
-            let copy = self.copy(fir, device, point, source);
+            let copy = self.copy(fir, slot, point, source);
             let Some((forces, ages)) = self.window(samples, source) else { continue };
             let ages = ages.start..ages.end.min(samples - ahead);
             match copy {
@@ -290,30 +287,19 @@ impl FirState {
         })
     }
 
-    /// Find ũ of equation (5) for every device's point.
+    /// ũ of equation (5) for a slot's point [m, body].
     ///
     /// # Real time
-    /// Costs points × forces of the last T steps.
-    pub(crate) fn predict(&mut self, fir: &Fir, gravity: DVec3) {
-        for device in 0..self.contacts.len() {
-            if let Some(point) = self.contacts[device] {
-                let sag = fir.sag_of_point(&point, gravity, self.steps + 1);
-                self.free[device] = self.convolve(fir, device, &point, 1) + sag;
-            }
-        }
-    }
-
-    /// ũ of a device's point [m, body].
-    ///
-    /// # Real time
-    pub(crate) fn free(&self, device: usize) -> DVec3 {
-        self.free[device]
+    /// Costs the forces of the last T steps.
+    pub(crate) fn free(&mut self, fir: &Fir, slot: usize, gravity: DVec3) -> DVec3 {
+        let Some(point) = self.contacts[slot] else { return DVec3::ZERO };
+        self.convolve(fir, slot, &point, 1) + fir.sag_of_point(&point, gravity, self.steps + 1)
     }
 
     /// Write the step's forces into the history; what is older than T steps is forgotten.
     ///
     /// # Real time
-    pub(crate) fn advance<'a>(&mut self, fir: &Fir, acting: impl Iterator<Item = Acting<'a>>) {
+    pub(crate) fn advance(&mut self, fir: &Fir, acting: &[ContactPoint]) {
         let (samples, width) = (fir.table.samples, self.contacts.len());
         self.steps += 1;
         self.head = (self.head + samples - 1) % samples;
@@ -323,14 +309,15 @@ impl FirState {
             self.sources[source].newest += 1;
             if self.sources[source].newest == samples {
                 self.sources[source].oldest = None;
-                (0..width).for_each(|device| self.forget(device, source));
+                (0..width).for_each(|slot| self.forget(slot, source));
             }
             self.write(samples, source, DVec3::ZERO);
         }
         let gone = core::mem::take(&mut self.stray_counts[self.head]) as usize;
         self.any_stray -= gone;
-        for Acting { point, force, travel, .. } in acting {
-            self.work += force.dot(travel);
+        for acting in acting {
+            let (point, force) = (&acting.place.point, acting.force_in_body);
+            self.work += force.dot(acting.displacement - acting.placed.displacement);
             if force == DVec3::ZERO {
                 continue;
             }
@@ -342,7 +329,7 @@ impl FirState {
                     source.newest = 0;
                     source.oldest = source.oldest.or(Some(0));
                     let before = self.forces[2 * samples * at + self.head];
-                    // Two devices may hold one point; a new source's place holds nothing yet.
+                    // Two slots may stand for one point; a new source's place holds nothing yet.
                     let shared = if found.is_some() { before } else { DVec3::ZERO };
                     self.write(samples, at, shared + force);
                 }

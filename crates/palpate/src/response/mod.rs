@@ -1,15 +1,22 @@
 //! How a body answers forces, in one of two forms behind one small interface: modal with residual compliance,
 //! or the paper's recorded table.
 
+mod body;
+mod dot;
 mod fir;
 mod modal;
 mod oscillator;
+mod patch_field;
 
-pub(crate) use modal::{Acting, ModalPoints};
+pub(crate) use body::{Acting, Body, Place, Placed, Reading};
+pub(crate) use dot::{dot, dot3};
 pub use oscillator::{HeldOscillator, Oscillation};
 
+use crate::contact::ContactPoint;
 use crate::error::Error;
+use crate::motion::RigidState;
 use crate::recording::{ImpulseResponse, Recording};
+use crate::scene::Model;
 use crate::surface::SurfacePoint;
 use alloc::sync::Arc;
 use fir::{Fir, FirState};
@@ -80,27 +87,28 @@ impl Response {
         }
     }
 
-    /// The state at rest.
-    pub(crate) fn at_rest(&self, devices: usize) -> ResponseState {
+    /// The state at rest, with room for so many contact points.
+    pub(crate) fn at_rest(&self, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), devices)),
-            Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, devices)),
+            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), capacity)),
+            Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
         }
     }
 
-    /// R[0] between the points of two devices that hold the object [m/N, body]: displacement of `a` per force on `b`.
+    /// R[0] between the places of two slots [m/N, body]: displacement of `a` per force on `b`.
     ///
     /// # Real time
     pub(crate) fn compliance(
         &self,
-        recording: &Recording,
-        points: &mut ModalPoints,
-        a: (usize, &SurfacePoint),
-        b: (usize, &SurfacePoint),
+        body: &Body,
+        state: &ResponseState,
+        a: (usize, &Place),
+        b: (usize, &Place),
     ) -> DMat3 {
-        match self {
-            Self::Modal(modes) => modes.compliance(recording, points, a, b),
-            Self::Fir(fir) => fir.compliance(a.1, b.1),
+        match (self, state) {
+            (Self::Modal(modes), ResponseState::Modal(state)) => modes.compliance(body, state, a, b),
+            (Self::Fir(fir), _) => fir.compliance(&a.1.point, &b.1.point),
+            _ => DMat3::ZERO,
         }
     }
 }
@@ -108,47 +116,54 @@ impl Response {
 /// An object's response with its state, for one step.
 pub(crate) struct Responding<'a> {
     pub(crate) response: &'a Response,
-    pub(crate) recording: &'a Recording,
+    pub(crate) body: &'a Body,
     pub(crate) state: &'a mut ResponseState,
     /// Gravity [m/s², body].
     pub(crate) gravity: DVec3,
 }
 
-impl Responding<'_> {
-    /// Let a device hold a point; gives where the point is now [m, body].
+impl<'a> Responding<'a> {
+    /// Of an object of the model, as it stands.
+    pub(crate) fn new(model: &'a Model, at: usize, rigid: &RigidState, state: &'a mut ResponseState) -> Self {
+        let object = &model.objects[at];
+        let gravity = object.gravity_in_body(model.parameters.gravity, &rigid.pose);
+        Self { response: &object.response, body: &object.body, state, gravity }
+    }
+
+    /// Let a slot stand for a place; gives where the place is now.
     ///
     /// # Real time
-    /// Costs modes, or for a table samples × sources of force; only when the grasp is new.
-    pub(crate) fn hold(&mut self, points: &mut ModalPoints, device: usize, point: &SurfacePoint) -> DVec3 {
+    /// Costs modes, or for a table samples × sources of force; only when the place is new.
+    pub(crate) fn place(&mut self, slot: usize, place: &Place) -> Placed {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.hold(self.recording, state, points, device, point, self.gravity)
+                modes.place(self.body, state, slot, place, self.gravity)
             }
-            (Response::Fir(fir), ResponseState::Fir(state)) => state.hold(fir, device, point, self.gravity),
-            _ => DVec3::ZERO,
+            (Response::Fir(fir), ResponseState::Fir(state)) => {
+                state.release(slot);
+                let displacement = state.hold(fir, slot, &place.point, self.gravity);
+                Placed { displacement, ..Placed::default() }
+            }
+            _ => Placed::default(),
         }
     }
 
-    /// Prepare the step: what happens without new force. `any_held` says whether a point is held.
+    /// Prepare the step: what happens without contact force.
     ///
     /// # Real time
-    pub(crate) fn predict(&mut self, points: &mut ModalPoints, any_held: bool) {
-        match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.predict(self.recording, state, points, self.gravity, any_held);
-            }
-            (Response::Fir(fir), ResponseState::Fir(state)) => state.predict(fir, self.gravity),
-            _ => {}
+    pub(crate) fn predict(&mut self) {
+        if let (Response::Modal(modes), ResponseState::Modal(state)) = (self.response, &mut *self.state) {
+            modes.predict(&self.body.recording, state, self.gravity);
         }
     }
 
-    /// ũ of a device's point: where it is at the end of the step without new force [m, body].
+    /// ũ of a slot's place: where it is at the end of the step without contact force [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&self, points: &ModalPoints, device: usize) -> DVec3 {
-        match (self.response, &*self.state) {
-            (Response::Modal(modes), _) => modes.free(points, device),
-            (_, ResponseState::Fir(state)) => state.free(device),
+    pub(crate) fn free(&mut self, slot: usize, placed: &Placed) -> DVec3 {
+        match (self.response, &mut *self.state) {
+            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + placed.sag,
+            (Response::Fir(fir), ResponseState::Fir(state)) => state.free(fir, slot, self.gravity),
             _ => DVec3::ZERO,
         }
     }
@@ -156,13 +171,9 @@ impl Responding<'_> {
     /// Hold forces over the step; gives the energy [J] that is known to be lost in it.
     ///
     /// # Real time
-    pub(crate) fn advance<'a>(
-        &mut self,
-        points: &mut ModalPoints,
-        acting: impl Iterator<Item = Acting<'a>> + Clone,
-    ) -> f64 {
+    pub(crate) fn advance(&mut self, acting: &mut [ContactPoint]) -> f64 {
         match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => modes.advance(state, points, acting),
+            (Response::Modal(modes), ResponseState::Modal(state)) => modes.advance(self.body, state, acting),
             (Response::Fir(fir), ResponseState::Fir(state)) => {
                 state.advance(fir, acting);
                 0.0
@@ -173,12 +184,44 @@ impl Responding<'_> {
 }
 
 impl ResponseState {
-    /// Let a device hold nothing.
+    /// Let a slot stand for nothing.
     ///
     /// # Real time
-    pub(crate) fn release(&mut self, device: usize) {
+    pub(crate) fn release(&mut self, slot: usize) {
         if let Self::Fir(state) = self {
-            state.release(device);
+            state.release(slot);
+        }
+    }
+
+    /// q of the modes at the start of the step; none where a table is used.
+    pub(crate) fn coordinates(&self) -> &[f64] {
+        match self {
+            Self::Modal(state) => &state.q,
+            Self::Fir(_) => &[],
+        }
+    }
+
+    /// q at the end of the step without contact force.
+    pub(crate) fn free_coordinates(&self) -> &[f64] {
+        match self {
+            Self::Modal(state) => &state.free,
+            Self::Fir(_) => &[],
+        }
+    }
+
+    /// Forces [N, body] of the last step with their places.
+    pub(crate) fn acting(&self) -> &[Acting] {
+        match self {
+            Self::Modal(state) => &state.acting,
+            Self::Fir(_) => &[],
+        }
+    }
+
+    /// Energy [J] of the residual compliance.
+    pub(crate) fn residual_energy(&self) -> f64 {
+        match self {
+            Self::Modal(state) => state.residual_energy,
+            Self::Fir(_) => 0.0,
         }
     }
 
@@ -209,13 +252,13 @@ impl ResponseState {
     pub(crate) fn surface_displacement(
         &self,
         response: &Response,
-        recording: &Recording,
+        body: &Body,
         gravity: DVec3,
         out: &mut [DVec3],
     ) {
         match (response, self) {
             (Response::Modal(modes), Self::Modal(state)) => {
-                modes.surface_displacement(recording, state, gravity, out);
+                modes.surface_displacement(body, state, gravity, out);
             }
             (Response::Fir(fir), Self::Fir(state)) => state.surface_displacement(fir, gravity, out),
             _ => {}

@@ -3,15 +3,20 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
+use super::dot::{dot, dot3};
 use super::oscillator::{HeldOscillator, Oscillation};
+use super::{Acting, Body, Place, Placed};
+use crate::contact::ContactPoint;
 use crate::recording::{ModalBasis, Recording};
-use crate::surface::SurfacePoint;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
 /// States below this size [√J] are set to zero: denormal numbers cost 40 times as much.
 const FLUSH_BELOW: f64 = 1e-150;
+
+/// Modes that are multiplied at a time.
+const LANES: usize = 64;
 
 /// All modes of one object at one step size.
 #[derive(Debug, Clone)]
@@ -23,72 +28,40 @@ pub(crate) struct SampledModes {
 #[derive(Debug, Clone)]
 pub(crate) struct ModalState {
     pub(crate) modes: Vec<Oscillation>,
-    /// Points that forces [N, body] acted on in the last step, for the residual compliance.
-    acting: Vec<(SurfacePoint, DVec3)>,
-    /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
-    residual_energy: f64,
-}
-
-/// What the devices' points see of the modes of the objects that they hold; buffers of the whole scene.
-#[derive(Debug, Clone)]
-pub(crate) struct ModalPoints {
-    /// Three rows J·Φ per device, `stride` numbers apart.
-    rows: Vec<f64>,
-    stride: usize,
-    /// J·S·Jᵀ between devices that hold the same object, devices × devices [m/N].
-    residual: Vec<DMat3>,
-    /// The residual compliance's part of each point's displacement [m, body].
-    displacement: Vec<DVec3>,
-    /// The part of it that the body's weight causes; it lasts as long as the grasp, since only bodies that stay
-    /// where they are have one.
-    sag: Vec<DVec3>,
-    free_modes: Vec<f64>,
+    /// q now and at the end of the step without new force.
+    pub(super) q: Vec<f64>,
+    pub(super) free: Vec<f64>,
+    /// Modal forces of the step [N/√kg].
     forces: Vec<f64>,
-}
-
-/// A force [N, body] on a device's point, and how far the point went over the step [m, body].
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Acting<'a> {
-    pub(crate) device: usize,
-    pub(crate) point: &'a SurfacePoint,
-    pub(crate) force: DVec3,
-    pub(crate) travel: DVec3,
+    /// Three rows J·Φ per contact point, by its slot.
+    rows: Vec<f64>,
+    /// Forces [N, body] of the last step with their places, for the residual compliance.
+    pub(super) acting: Vec<Acting>,
+    /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
+    pub(super) residual_energy: f64,
 }
 
 impl ModalState {
-    pub(crate) fn new(modes: usize, devices: usize) -> Self {
+    pub(crate) fn new(modes: usize, capacity: usize) -> Self {
         Self {
             modes: vec![Oscillation::default(); modes],
-            acting: Vec::with_capacity(devices),
+            q: vec![0.0; modes],
+            free: vec![0.0; modes],
+            forces: vec![0.0; modes],
+            rows: vec![0.0; 3 * modes * capacity],
+            acting: Vec::with_capacity(capacity),
             residual_energy: 0.0,
         }
     }
 
-    /// Displacement of a surface point by the residual compliance under the forces of the last step [m, body].
-    fn residual_displacement(&self, recording: &Recording, corners: [(usize, f64); 3]) -> DVec3 {
-        let blocks = |(point, force): &(SurfacePoint, DVec3)| {
-            residual_between(recording, corners, recording.surface.corners(point)) * *force
-        };
-        self.acting.iter().map(blocks).sum()
-    }
-}
-
-impl ModalPoints {
-    pub(crate) fn new(devices: usize, most_modes: usize) -> Self {
-        Self {
-            rows: vec![0.0; devices * 3 * most_modes],
-            stride: 3 * most_modes,
-            residual: vec![DMat3::ZERO; devices * devices],
-            displacement: vec![DVec3::ZERO; devices],
-            sag: vec![DVec3::ZERO; devices],
-            free_modes: vec![0.0; most_modes],
-            forces: vec![0.0; most_modes],
-        }
+    /// Displacement of a place by the residual compliance under the forces of the last step [m, body].
+    fn residual_displacement(&self, body: &Body, place: &Place) -> DVec3 {
+        self.acting.iter().map(|other| body.residual(place, &other.place) * other.force).sum()
     }
 
-    /// J·Φ of a device's point: three rows of m numbers.
-    fn rows(&self, device: usize, modes: usize) -> &[f64] {
-        &self.rows[device * self.stride..][..3 * modes]
+    fn rows(&self, slot: usize) -> &[f64] {
+        let m = self.modes.len();
+        &self.rows[3 * m * slot..3 * m * (slot + 1)]
     }
 }
 
@@ -103,149 +76,131 @@ impl SampledModes {
         self.oscillators.len()
     }
 
-    /// Let a device hold a point; gives where the point is now [m, body].
+    /// Let a slot stand for a place; gives where the place is now and the part of it that the residual compliance and
+    /// the body's weight cause [m, body].
     ///
     /// # Real time
-    pub(crate) fn hold(
+    pub(crate) fn place(
         &self,
-        recording: &Recording,
-        state: &ModalState,
-        points: &mut ModalPoints,
-        device: usize,
-        point: &SurfacePoint,
+        body: &Body,
+        state: &mut ModalState,
+        slot: usize,
+        place: &Place,
         gravity: DVec3,
-    ) -> DVec3 {
+    ) -> Placed {
         let m = self.len();
-        let corners = recording.surface.corners(point);
+        let (corners, shapes) = (body.recording.surface.corners(&place.point), body.rows(place.reading));
         // J·Φ: the weighted rows of the triangle's corners.
-        let rows = &mut points.rows[device * points.stride..][..3 * m];
+        let rows = &mut state.rows[3 * m * slot..3 * m * (slot + 1)];
         rows.fill(0.0);
-        for (node, weight) in corners {
-            for axis in 0..3 {
-                let shape = recording.modes.row(node, axis);
-                for (row, phi) in rows[axis * m..(axis + 1) * m].iter_mut().zip(shape) {
-                    *row += weight * phi;
-                }
+        for (node, weight) in corners.into_iter().filter(|(_, w)| *w != 0.0) {
+            for (row, phi) in rows.iter_mut().zip(&shapes[3 * m * node..3 * m * (node + 1)]) {
+                *row += weight * phi;
             }
         }
-        let sag = recording.gravity.as_ref().map_or(DVec3::ZERO, |response| {
+        let sag = body.recording.gravity.as_ref().map_or(DVec3::ZERO, |response| {
             corners.iter().map(|&(node, w)| response.residual_displacement(node, gravity) * w).sum()
         });
-        points.sag[device] = sag;
-        points.displacement[device] = sag + state.residual_displacement(recording, corners);
-        project_rows(points.rows(device, m), state.modes.iter().map(|mode| mode.q))
-            + points.displacement[device]
+        let residual = sag + state.residual_displacement(body, place);
+        Placed { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }
 
-    /// J_a·(Φ·B·Φᵀ + S)·J_bᵀ [m/N] between the points of two devices, and keep its second part.
+    /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the places of two slots.
     ///
     /// # Real time
     pub(crate) fn compliance(
         &self,
-        recording: &Recording,
-        points: &mut ModalPoints,
-        a: (usize, &SurfacePoint),
-        b: (usize, &SurfacePoint),
+        body: &Body,
+        state: &ModalState,
+        a: (usize, &Place),
+        b: (usize, &Place),
     ) -> DMat3 {
-        let corners = |point| recording.surface.corners(point);
-        let s = residual_between(recording, corners(a.1), corners(b.1));
-        points.residual[a.0 * points.sag.len() + b.0] = s;
         let m = self.len();
-        let (rows_a, rows_b) = (points.rows(a.0, m), points.rows(b.0, m));
+        let (rows_a, rows_b) = (state.rows(a.0), state.rows(b.0));
+        let row = |rows: &'_ [f64], axis: usize| -> usize { axis * (rows.len() / 3) };
         let mut sum = [[0.0; 3]; 3];
-        for (i, oscillator) in self.oscillators.iter().enumerate() {
-            for (column, b) in sum.iter_mut().enumerate() {
-                let weighted = oscillator.b * rows_b[column * m + i];
-                for (row, value) in b.iter_mut().enumerate() {
-                    *value += rows_a[row * m + i] * weighted;
+        let mut weighted = [0.0; LANES];
+        for start in (0..m).step_by(LANES) {
+            let lanes = LANES.min(m - start);
+            for (column, sums) in sum.iter_mut().enumerate() {
+                let from = &rows_b[row(rows_b, column) + start..][..lanes];
+                for ((w, b), oscillator) in weighted.iter_mut().zip(from).zip(&self.oscillators[start..]) {
+                    *w = oscillator.b * b;
+                }
+                for (axis, value) in sums.iter_mut().enumerate() {
+                    *value += dot(&rows_a[row(rows_a, axis) + start..][..lanes], &weighted[..lanes]);
                 }
             }
         }
-        DMat3::from_cols_array_2d(&sum) + s
+        DMat3::from_cols_array_2d(&sum) + body.residual(a.1, b.1)
     }
 
-    /// Modal coordinates at the end of the step if no device's force acts.
+    /// Modal coordinates at the end of the step if no contact force acts.
     ///
     /// # Real time
-    pub(crate) fn predict(
-        &self,
-        recording: &Recording,
-        state: &ModalState,
-        points: &mut ModalPoints,
-        gravity: DVec3,
-        any_held: bool,
-    ) {
+    pub(crate) fn predict(&self, recording: &Recording, state: &mut ModalState, gravity: DVec3) {
         let m = self.len();
-        let forces = &mut points.forces[..m];
-        forces.fill(0.0);
+        state.forces.fill(0.0);
         if let Some(response) = &recording.gravity {
             for (axis, a) in gravity.to_array().into_iter().enumerate() {
-                for (force, load) in forces.iter_mut().zip(&response.modal_forces[axis * m..]) {
+                for (force, load) in state.forces.iter_mut().zip(&response.modal_forces[axis * m..]) {
                     *force += a * load;
                 }
             }
         }
-        if any_held {
-            let free = &mut points.free_modes[..m];
-            for (((oscillator, &mode), &p), q) in
-                self.oscillators.iter().zip(&state.modes).zip(&*forces).zip(free)
-            {
-                *q = oscillator.advance(mode, p).q;
-            }
+        let pairs = self.oscillators.iter().zip(&state.modes).zip(&state.forces);
+        for (((oscillator, &mode), &p), free) in pairs.zip(&mut state.free) {
+            *free = oscillator.advance(mode, p).q;
         }
     }
 
-    /// Displacement of a device's point at the end of the step if no device's force acts [m, body].
+    /// Displacement of a slot's place at the end of the step if no contact force acts, the residual compliance's
+    /// part apart [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&self, points: &ModalPoints, device: usize) -> DVec3 {
-        let m = self.len();
-        project_rows(points.rows(device, m), points.free_modes[..m].iter().copied()) + points.sag[device]
+    pub(crate) fn free(&self, state: &ModalState, slot: usize) -> DVec3 {
+        dot3(state.rows(slot), &state.free)
     }
 
     /// Hold forces over the step that was predicted; gives the energy [J] that is lost in it.
     ///
     /// # Real time
-    pub(crate) fn advance<'a>(
-        &self,
-        state: &mut ModalState,
-        points: &mut ModalPoints,
-        acting: impl Iterator<Item = Acting<'a>> + Clone,
-    ) -> f64 {
+    pub(crate) fn advance(&self, body: &Body, state: &mut ModalState, acting: &mut [ContactPoint]) -> f64 {
         let m = self.len();
         // p = Φᵀ·Jᵀ·g.
-        for Acting { device, force, .. } in acting.clone() {
-            let rows = &points.rows[device * points.stride..][..3 * m];
-            for (axis, g) in force.to_array().into_iter().enumerate() {
-                for (p, row) in points.forces[..m].iter_mut().zip(&rows[axis * m..(axis + 1) * m]) {
-                    *p += g * row;
-                }
+        for point in acting.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
+            let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
+            let g = point.force_in_body;
+            let (x, rest) = rows.split_at(m);
+            let (y, z) = rest.split_at(m);
+            for (((p, x), y), z) in state.forces.iter_mut().zip(x).zip(y).zip(z) {
+                *p += g.x * x + g.y * y + g.z * z;
             }
         }
         let mut dissipated = 0.0;
-        for ((oscillator, mode), &p) in self.oscillators.iter().zip(&mut state.modes).zip(&points.forces) {
+        let pairs = self.oscillators.iter().zip(&mut state.modes).zip(&state.forces);
+        for (((oscillator, mode), &p), q) in pairs.zip(&mut state.q) {
             dissipated += oscillator.dissipation(*mode, p);
             let next = oscillator.advance(*mode, p);
             let quiet = libm::fabs(next.q) + libm::fabs(next.v) < FLUSH_BELOW;
             *mode = if quiet { Oscillation::default() } else { next };
+            *q = mode.q;
         }
 
         // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
         let (mut work, mut energy) = (0.0, 0.0);
-        let devices = points.sag.len();
         state.acting.clear();
-        for Acting { device, force, point, .. } in acting.clone() {
-            let pushed: DVec3 = acting
-                .clone()
-                .map(|other| points.residual[device * devices + other.device] * other.force)
-                .sum();
-            let displacement = pushed + points.sag[device];
-            work += force.dot(displacement - points.displacement[device]);
-            energy += 0.5 * force.dot(pushed);
-            points.displacement[device] = displacement;
-            state.acting.push((*point, force));
+        for point in acting.iter_mut() {
+            let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
+            let residual = point.displacement - dot3(rows, &state.q);
+            work += point.force_in_body.dot(residual - point.placed.residual);
+            energy += 0.5 * point.force_in_body.dot(residual - point.placed.sag);
+            point.placed.residual = residual;
+            if point.force_in_body != DVec3::ZERO {
+                state.acting.push(body.acting(point.place, point.force_in_body));
+            }
         }
-        dissipated += work - (energy - state.residual_energy);
+        let dissipated = dissipated + work - (energy - state.residual_energy);
         state.residual_energy = energy;
         dissipated
     }
@@ -266,11 +221,12 @@ impl SampledModes {
     /// Displacement of every surface node [m, body], u = Φ·q + S·f.
     pub(crate) fn surface_displacement(
         &self,
-        recording: &Recording,
+        body: &Body,
         state: &ModalState,
         gravity: DVec3,
         out: &mut [DVec3],
     ) {
+        let recording = &body.recording;
         for (node, u) in out.iter_mut().enumerate() {
             let part = |axis: usize| -> f64 {
                 recording.modes.row(node, axis).iter().zip(&state.modes).map(|(phi, mode)| phi * mode.q).sum()
@@ -279,34 +235,9 @@ impl SampledModes {
             if let Some(response) = &recording.gravity {
                 *u += response.residual_displacement(node, gravity);
             }
-            for (point, force) in &state.acting {
-                for (corner, weight) in recording.surface.corners(point) {
-                    *u += recording.residual.block(node, corner) * *force * weight;
-                }
+            for Acting { place, force, .. } in &state.acting {
+                *u += body.residual_of_node(node, place) * *force;
             }
         }
     }
-}
-
-/// Rows·q for three rows, one per axis.
-///
-/// # Real time
-fn project_rows(rows: &[f64], q: impl Iterator<Item = f64> + Clone) -> DVec3 {
-    let modes = rows.len() / 3;
-    let axis =
-        |a: usize| rows[a * modes..(a + 1) * modes].iter().zip(q.clone()).map(|(r, q)| r * q).sum::<f64>();
-    DVec3::new(axis(0), axis(1), axis(2))
-}
-
-/// J_a·S·J_bᵀ [m/N].
-fn residual_between(recording: &Recording, a: [(usize, f64); 3], b: [(usize, f64); 3]) -> DMat3 {
-    let mut sum = DMat3::ZERO;
-    for (i, wi) in a {
-        for (j, wj) in b {
-            if wi != 0.0 && wj != 0.0 {
-                sum += recording.residual.block(i, j) * (wi * wj);
-            }
-        }
-    }
-    sum
 }

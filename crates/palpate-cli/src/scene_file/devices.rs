@@ -1,0 +1,209 @@
+//! `[[device]]`: hands that hold a point, and tips that touch.
+
+use super::SceneDevice;
+use super::entries::{AttachEntry, CouplingEntry, DeviceEntry};
+use super::place::{Quantity, Source};
+use crate::Failure;
+use crate::path::{Columns, MotionPath};
+use glam::DVec3;
+use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
+
+/// How far from the surface a point to hold may be, as a share of the object's diagonal.
+const OFF_SURFACE: f64 = 0.05;
+
+/// A hand that starts farther than this share of the diagonal from its point gets a remark.
+const FAR_START: f64 = 0.01;
+
+/// A patch of fewer mean edges than this shows the mesh in the feel.
+const SMOOTH_PATCH: f64 = 1.5;
+
+/// Stiffness [N/m] and damping [N·s/m] are below this.
+const STIFFEST: f64 = 1e18;
+
+/// What a device is, and whether its keys go together; what it holds and where it goes is read later.
+pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParameters, Failure> {
+    let coupling = device.coupling.as_ref().map(|entry| read_coupling(source, entry)).transpose()?;
+    match (device.mode.get_ref().as_str(), &device.attach) {
+        ("held", Some(_)) => {
+            refuse_touch_keys(source, device)?;
+            Ok(DeviceParameters { coupling, ..DeviceParameters::default() })
+        }
+        ("held", None) => source.fail(
+            device.mode.span(),
+            "mode = \"held\" needs attach = { object = \"…\", point = [x, y, z] }, the point that the device holds",
+        ),
+        ("touch", None) => touch_parameters(source, device, coupling),
+        ("touch", Some(attach)) => source.fail(
+            attach.span(),
+            "attach is of a device that holds a point; with mode = \"touch\" leave it out",
+        ),
+        (other, _) => {
+            source.fail(device.mode.span(), format!("mode is {other:?}, expected \"held\" or \"touch\""))
+        }
+    }
+}
+
+/// A device with what it holds and its path.
+pub(super) fn read_device(
+    source: &Source,
+    device: &DeviceEntry,
+    parameters: DeviceParameters,
+    objects: &[ModelObject],
+    object_names: &[String],
+    remarks: &mut Vec<String>,
+) -> Result<SceneDevice, Failure> {
+    let mode = match &device.attach {
+        Some(attach) => {
+            DeviceMode::Held(read_grasp(source, device, attach.get_ref(), objects, object_names)?)
+        }
+        None => DeviceMode::Touch,
+    };
+    let file = &device.path.file;
+    let path = match MotionPath::read(&source.relative(file.get_ref()), Columns::Position) {
+        Ok(path) => path,
+        Err(failure) => return source.fail(file.span(), failure),
+    };
+    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path };
+    remarks.extend(far_start(&device, objects));
+    remarks.extend(small_patches(&device, objects, object_names));
+    Ok(device)
+}
+
+fn read_coupling(source: &Source, entry: &CouplingEntry) -> Result<Coupling, Failure> {
+    let stiffness = Quantity { key: "stiffness", unit: " N/m", below: STIFFEST };
+    let damping = Quantity { key: "damping", unit: " N·s/m", below: STIFFEST };
+    Ok(Coupling {
+        stiffness: source.positive(&entry.stiffness, stiffness)?,
+        damping: entry.damping.as_ref().map_or(Ok(0.0), |number| source.not_negative(number, damping))?,
+    })
+}
+
+fn touch_parameters(
+    source: &Source,
+    device: &DeviceEntry,
+    coupling: Option<Coupling>,
+) -> Result<DeviceParameters, Failure> {
+    let length = |key, number| source.not_negative(number, Quantity::length(key));
+    let tip_radius = device.tip_radius.as_ref().map_or(Ok(0.0), |number| length("tip_radius", number))?;
+    let patch_radius =
+        device.patch_radius.as_ref().map_or(Ok(tip_radius), |number| length("patch_radius", number))?;
+    let friction = source.friction(device.friction.as_ref())?;
+    Ok(DeviceParameters { tip_radius, patch_radius, friction, coupling })
+}
+
+/// A held point has no tip, and does not slip.
+fn refuse_touch_keys(source: &Source, device: &DeviceEntry) -> Result<(), Failure> {
+    let keys = [
+        ("tip_radius", &device.tip_radius),
+        ("patch_radius", &device.patch_radius),
+        ("friction", &device.friction),
+    ];
+    for (key, number) in keys {
+        if let Some(number) = number {
+            return source.fail(
+                number.span(),
+                format!("{key} is of a device that touches; with mode = \"held\" leave it out"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The material point that a device holds.
+fn read_grasp(
+    source: &Source,
+    device: &DeviceEntry,
+    attach: &AttachEntry,
+    objects: &[ModelObject],
+    object_names: &[String],
+) -> Result<Grasp, Failure> {
+    let name = device.name.get_ref();
+    let wanted = attach.object.get_ref();
+    let Some(object) = object_names.iter().position(|name| name == wanted) else {
+        let known = object_names.join(", ");
+        return source
+            .fail(attach.object.span(), format!("there is no object {wanted:?}; the scene has {known}"));
+    };
+    let ModelObject { recording, response, .. } = &objects[object];
+    let point_span = attach.point.span();
+    let point = DVec3::from_array(attach.point.get_ref().0);
+    let allowed = OFF_SURFACE * recording.surface.diagonal();
+    let grasp = match recording.surface.nearest(point) {
+        Some((point, distance)) if distance <= allowed => Grasp { object, point },
+        Some((_, distance)) => {
+            return source.fail(
+                point_span,
+                format!(
+                    "the point {point} is {distance:.4} m from the surface of {wanted:?}, at most {allowed:.4} m are \
+                     allowed; it is given in the body frame, whose origin is the centre of mass"
+                ),
+            );
+        }
+        None => return source.fail(point_span, format!("the object {wanted:?} has no surface")),
+    };
+    match response {
+        ResponseForm::Modal if !recording.is_movable(&grasp.point) => {
+            return source.fail(
+                point_span,
+                format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
+            );
+        }
+        ResponseForm::Modal => {}
+        ResponseForm::Fir(table) => {
+            if let Err(error) = table.prepare(&recording.surface, &grasp.point) {
+                return source.fail(point_span, format!("device {name:?} on {wanted:?}: {error}"));
+            }
+        }
+    }
+    Ok(grasp)
+}
+
+/// No two devices may hold the same point: where they differ no force could satisfy both.
+pub(super) fn check_grasps(
+    source: &Source,
+    entries: &[DeviceEntry],
+    devices: &[SceneDevice],
+) -> Result<(), Failure> {
+    for (at, (device, entry)) in devices.iter().zip(entries).enumerate() {
+        let holds = |other: &&SceneDevice| other.mode == device.mode && device.mode != DeviceMode::Touch;
+        if let (Some(other), Some(attach)) = (devices[..at].iter().find(holds), &entry.attach) {
+            return source.fail(
+                attach.get_ref().point.span(),
+                format!("device {:?} holds the same point as {:?}", device.name, other.name),
+            );
+        }
+    }
+    Ok(())
+}
+
+fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<String> {
+    let DeviceMode::Held(grasp) = device.mode else { return None };
+    let ModelObject { recording, start, .. } = &objects[grasp.object];
+    let held = start.pose.world_from_body(recording.surface.rest_position(&grasp.point));
+    let distance = (device.path.at(0.0).position - held).length();
+    let pulled = match device.parameters.coupling {
+        None => "the point is pulled there in the first step",
+        Some(_) => "the coupling pulls it there from the first step on",
+    };
+    (distance > FAR_START * recording.surface.diagonal()).then(|| {
+        format!("device {:?} starts {distance:.4} m from the point that it holds: {pulled}", device.name)
+    })
+}
+
+fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]) -> Vec<String> {
+    let radius = device.parameters.patch_radius;
+    let touched =
+        objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Modal));
+    touched
+        .filter_map(|(object, name)| {
+            let smooth = SMOOTH_PATCH * object.recording.surface.mean_edge();
+            (radius > 0.0 && radius < smooth).then(|| {
+                format!(
+                    "device {:?} touches with a patch of {radius:.2e} m, less than {SMOOTH_PATCH} mean edges of {name:?}: \
+                     the feel will show the mesh; with patch_radius = {smooth:.2e} it does not",
+                    device.name
+                )
+            })
+        })
+        .collect()
+}

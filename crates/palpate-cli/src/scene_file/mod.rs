@@ -1,0 +1,234 @@
+//! Scene files: TOML in, model, devices and obstacles out. Every error names the file and the line.
+
+mod devices;
+mod entries;
+mod objects;
+mod obstacles;
+mod place;
+
+use crate::Failure;
+use crate::path::MotionPath;
+use entries::SceneFile;
+use glam::DVec3;
+use palpate::{
+    DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, MotionRule, Pose, RigidCompliance,
+};
+use place::Source;
+use std::collections::HashSet;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// A scene that is ready to run.
+pub struct Scene {
+    /// Objects and rules.
+    pub model: Model,
+    /// Names of the objects, in the model's order.
+    pub object_names: Vec<String>,
+    /// What each device does, in the model's order.
+    pub devices: Vec<SceneDevice>,
+    /// Where each plane and obstacle is, in the model's order.
+    pub obstacles: Vec<SceneObstacle>,
+    /// Things the user should know.
+    pub remarks: Vec<String>,
+    /// The files that the scene was read from.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// A device that follows a path.
+pub struct SceneDevice {
+    /// Its name.
+    pub name: String,
+    /// What it holds, or that it touches.
+    pub mode: DeviceMode,
+    /// What it is.
+    pub parameters: DeviceParameters,
+    /// Where it is over time.
+    pub path: MotionPath,
+}
+
+/// A plane or an obstacle.
+pub struct SceneObstacle {
+    /// Its name.
+    pub name: String,
+    /// Where it is over time, if it moves.
+    pub path: Option<MotionPath>,
+    /// Where it is without a path, and how it is turned when the path does not say.
+    pub start: Pose,
+}
+
+/// Lengths [m], velocities and accelerations beyond this are no scene's.
+pub const LARGEST: f64 = 1e6;
+
+/// An object's contact points answer one another: 9·n² numbers, here a gigabyte.
+const MOST_CONTACT_POINTS: i64 = 4096;
+
+impl SceneObstacle {
+    /// Where it is at a time [s].
+    pub fn at(&self, t: f64) -> Pose {
+        match &self.path {
+            None => self.start,
+            Some(path) if path.turns() => path.at(t),
+            Some(path) => Pose { position: path.at(t).position, ..self.start },
+        }
+    }
+}
+
+impl Scene {
+    /// Whether anything but held points can act on its objects.
+    pub fn has_touch(&self) -> bool {
+        let touching = self.devices.iter().any(|device| device.mode == DeviceMode::Touch);
+        touching || !self.obstacles.is_empty() || self.object_names.len() > 1
+    }
+}
+
+/// Read a scene file, its recordings, meshes and paths.
+pub fn read(path: &Path) -> Result<Scene, Failure> {
+    let bytes = std::fs::read(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        return Err(Failure(format!(
+            "{}: it is not a text file; a scene is TOML (docs/scene.md)",
+            path.display()
+        )));
+    };
+    let source = Source { path, text: &text };
+    let file: SceneFile = toml::from_str(&text).map_err(|e| {
+        // Types in the user's words.
+        let what = e
+            .to_string()
+            .replace("expected f64", "expected a number")
+            .replace("expected i64", "expected a whole number");
+        Failure(format!("{}: {}", path.display(), what.trim_end()))
+    })?;
+    if file.object.is_empty() {
+        return source.fail(0..0, "the scene has no [[object]]");
+    }
+    check_names(&source, &file)?;
+
+    let mut remarks = Vec::new();
+    let objects: Result<Vec<_>, _> =
+        file.object.iter().map(|entry| objects::read_object(&source, entry)).collect();
+    let objects = objects?;
+    let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
+    let mut parameters = read_rules(&source, &file)?;
+    for entry in &file.device {
+        parameters.devices.push(devices::read_parameters(&source, entry)?);
+    }
+    let mut obstacles = Vec::new();
+    for (number, entry) in file.plane.iter().enumerate() {
+        let (obstacle, placed) = obstacles::read_plane(&source, entry.get_ref(), number)?;
+        parameters.obstacles.push(obstacle);
+        obstacles.push(placed);
+    }
+    for (number, entry) in file.obstacle.iter().enumerate() {
+        let (obstacle, placed) = obstacles::read_obstacle(&source, entry, number, &mut remarks)?;
+        parameters.obstacles.push(obstacle);
+        obstacles.push(placed);
+    }
+    let model = build(&source, &file, parameters, objects.clone())?;
+    let mut devices = Vec::new();
+    for (entry, parameters) in file.device.iter().zip(&model.parameters().devices) {
+        let read = devices::read_device(&source, entry, *parameters, &objects, &object_names, &mut remarks);
+        devices.push(read?);
+    }
+    devices::check_grasps(&source, &file.device, &devices)?;
+    remarks.extend(objects::doubtful_recordings(&objects, &object_names));
+    let nothing_meets: Vec<String> = objects::tables_that_meet_nothing(&objects, &object_names).collect();
+    let inputs = inputs(&source, &file);
+    let mut scene = Scene { model, object_names, devices, obstacles, remarks, inputs };
+    if scene.has_touch() {
+        scene.remarks.extend(nothing_meets);
+    }
+    Ok(scene)
+}
+
+/// Names stand in CSV files: each once, and without separators.
+fn check_names(source: &Source, file: &SceneFile) -> Result<(), Failure> {
+    let own = |name: &toml::Spanned<String>| (name.get_ref().clone(), name.span());
+    // One without a name is told of at its first line.
+    let or = |name: &Option<toml::Spanned<String>>, kind: &str, number: usize, entry: Range<usize>| {
+        let place = name.as_ref().map_or(entry, toml::Spanned::span);
+        (obstacles::name_or(name.as_ref(), kind, number), place)
+    };
+    let objects = file.object.iter().map(|entry| own(&entry.name));
+    let devices = file.device.iter().map(|entry| own(&entry.name));
+    let planes = file.plane.iter().enumerate();
+    let planes = planes.map(|(number, entry)| or(&entry.get_ref().name, "plane", number, entry.span()));
+    let others = file.obstacle.iter().enumerate();
+    let others = others.map(|(number, entry)| or(&entry.get_ref().name, "obstacle", number, entry.span()));
+    let mut seen = HashSet::new();
+    for (name, place) in objects.chain(devices).chain(planes).chain(others) {
+        let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(plain) {
+            return source.fail(place, format!("name is {name:?}, expected letters, digits, - and _"));
+        }
+        if name == "energy" || name == "t" || !seen.insert(name.clone()) {
+            return source.fail(place, format!("the name {name:?} is taken already"));
+        }
+    }
+    Ok(())
+}
+
+/// What holds for the whole scene, without its devices and obstacles.
+fn read_rules(source: &Source, file: &SceneFile) -> Result<ModelParameters, Failure> {
+    let usual = ModelParameters::default();
+    let motion = match file.motion.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
+        None | Some(("exact", _)) => MotionRule::ExactHeld,
+        Some(("paper", _)) => MotionRule::Paper,
+        Some((other, span)) => {
+            return source.fail(span, format!("motion is {other:?}, expected \"exact\" or \"paper\""));
+        }
+    };
+    let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
+        RigidCompliance::Included
+    } else {
+        RigidCompliance::Dropped
+    };
+    let most_contact_points = match &file.most_contact_points {
+        None => usual.most_contact_points,
+        Some(most) if (1..=MOST_CONTACT_POINTS).contains(most.get_ref()) => *most.get_ref() as usize,
+        Some(most) => {
+            let given = most.get_ref();
+            return source.fail(
+                most.span(),
+                format!("most_contact_points is {given}, expected 1 to {MOST_CONTACT_POINTS}"),
+            );
+        }
+    };
+    let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
+    let gravity = DVec3::from_array(file.gravity.0);
+    Ok(ModelParameters { step_s, gravity, motion, rigid_compliance, most_contact_points, ..usual })
+}
+
+/// Build the model; what it refuses is told of where it stands.
+fn build(
+    source: &Source,
+    file: &SceneFile,
+    parameters: ModelParameters,
+    objects: Vec<ModelObject>,
+) -> Result<Model, Failure> {
+    Model::new(parameters, objects).or_else(|error| {
+        let text = error.to_string();
+        for (at, object) in file.object.iter().enumerate() {
+            // The runtime counts objects, the scene names them.
+            if let Some(what) = text.strip_prefix(&format!("object {at}: ")) {
+                return source
+                    .fail(object.name.span(), format!("object {:?}: {what}", object.name.get_ref()));
+            }
+        }
+        // Devices, obstacles and gravity have been checked where they stand: what is left to be wrong is the step.
+        source.fail(file.step.as_ref().map_or(0..0, toml::Spanned::span), text)
+    })
+}
+
+/// The files that a scene is read from.
+fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
+    let recordings = file.object.iter().map(|object| &object.recording);
+    let paths = file.device.iter().map(|device| &device.path.file);
+    let obstacles = file.obstacle.iter().map(toml::Spanned::get_ref);
+    let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
+    let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
+    let files = recordings.chain(paths).chain(meshes).chain(moves);
+    let mut inputs = vec![source.path.to_path_buf()];
+    inputs.extend(files.map(|file| source.relative(file.get_ref())));
+    inputs
+}

@@ -1,0 +1,132 @@
+//! `[[plane]]` and `[[obstacle]]`: what objects meet.
+
+use super::SceneObstacle;
+use super::entries::{MeshEntry, Numbers, ObstacleEntry, PlaneEntry};
+use super::place::{Quantity, Source};
+use crate::path::{Columns, MotionPath, unit};
+use crate::{Failure, source as mesh_source};
+use glam::{DQuat, DVec3};
+use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
+use std::sync::Arc;
+use toml::Spanned;
+
+/// A plane, and the name that the scene gives it or it gets from its place among the planes.
+pub(super) fn read_plane(
+    source: &Source,
+    plane: &PlaneEntry,
+    number: usize,
+) -> Result<(Obstacle, SceneObstacle), Failure> {
+    let given = plane.normal.get_ref().0;
+    let Some(normal) = DVec3::from_array(given).try_normalize() else {
+        return source
+            .fail(plane.normal.span(), format!("normal is {given:?}, expected a vector that is not zero"));
+    };
+    let pose = Pose { position: DVec3::from_array(plane.point.0), orientation: DQuat::IDENTITY };
+    let friction = source.friction(plane.friction.as_ref())?;
+    let name = name_or(plane.name.as_ref(), "plane", number);
+    Ok((
+        Obstacle { shape: Shape::Plane { normal }, pose, friction },
+        SceneObstacle { name, path: None, start: pose },
+    ))
+}
+
+/// An obstacle, with its name as a plane's.
+pub(super) fn read_obstacle(
+    source: &Source,
+    entry: &Spanned<ObstacleEntry>,
+    number: usize,
+    remarks: &mut Vec<String>,
+) -> Result<(Obstacle, SceneObstacle), Failure> {
+    let obstacle = entry.get_ref();
+    let name = name_or(obstacle.name.as_ref(), "obstacle", number);
+    let shape = read_shape(source, entry, &name, remarks)?;
+    let friction = source.friction(obstacle.friction.as_ref())?;
+    if let (Some(position), Some(_)) = (&obstacle.position, &obstacle.path) {
+        return source.fail(position.span(), "the position is in the path: leave one of the two out");
+    }
+    let mut start = Pose::IDENTITY;
+    if let Some(position) = &obstacle.position {
+        start.position = DVec3::from_array(position.get_ref().0);
+    }
+    if let Some(orientation) = &obstacle.orientation {
+        let [w, x, y, z] = orientation.get_ref().0;
+        start.orientation = unit(w, x, y, z).or_else(|what| source.fail(orientation.span(), what))?;
+    }
+    let mut path = None;
+    if let Some(entry) = &obstacle.path {
+        let file = &entry.file;
+        let read = MotionPath::read(&source.relative(file.get_ref()), Columns::Pose);
+        let read = read.or_else(|failure| source.fail(file.span(), failure))?;
+        if let (Some(orientation), true) = (&obstacle.orientation, read.turns()) {
+            return source
+                .fail(orientation.span(), "the orientation is in the path: leave one of the two out");
+        }
+        path = Some(read);
+    }
+    let placed = SceneObstacle { name, path, start };
+    Ok((Obstacle { shape, pose: placed.at(0.0), friction }, placed))
+}
+
+/// Names without a name are counted: plane, plane2, plane3.
+pub(super) fn name_or(given: Option<&Spanned<String>>, kind: &str, number: usize) -> String {
+    match (given, number) {
+        (Some(name), _) => name.get_ref().clone(),
+        (None, 0) => kind.to_string(),
+        (None, number) => format!("{kind}{}", number + 1),
+    }
+}
+
+fn read_shape(
+    source: &Source,
+    entry: &Spanned<ObstacleEntry>,
+    name: &str,
+    remarks: &mut Vec<String>,
+) -> Result<Shape, Failure> {
+    let obstacle = entry.get_ref();
+    let length = |key, number| source.positive(number, Quantity::length(key));
+    match (&obstacle.sphere, &obstacle.cuboid, &obstacle.capsule, &obstacle.mesh) {
+        (Some(sphere), None, None, None) => Ok(Shape::Sphere { radius: length("radius", &sphere.radius)? }),
+        (None, Some(cuboid), None, None) => {
+            let Numbers(given) = *cuboid.half_extents.get_ref();
+            if given.iter().any(|half| *half <= 0.0) {
+                return source.fail(
+                    cuboid.half_extents.span(),
+                    format!("half_extents are {given:?} m, expected three numbers above 0"),
+                );
+            }
+            Ok(Shape::Box { half_extents: DVec3::from_array(given) })
+        }
+        (None, None, Some(capsule), None) => Ok(Shape::Capsule {
+            radius: length("radius", &capsule.radius)?,
+            half_length: length("half_length", &capsule.half_length)?,
+        }),
+        (None, None, None, Some(mesh)) => Ok(Shape::Mesh(Arc::new(read_mesh(source, mesh, name, remarks)?))),
+        _ => source.fail(
+            entry.span(),
+            format!("the obstacle {name:?} needs one shape: sphere, box, capsule or mesh"),
+        ),
+    }
+}
+
+fn read_mesh(
+    source: &Source,
+    entry: &MeshEntry,
+    name: &str,
+    remarks: &mut Vec<String>,
+) -> Result<ObstacleMesh, Failure> {
+    let place = entry.file.span();
+    let path = source.relative(entry.file.get_ref());
+    let scale = Quantity { key: "scale", unit: "", below: super::LARGEST };
+    let scale = entry.scale.as_ref().map_or(Ok(1.0), |number| source.positive(number, scale))?;
+    let mut mesh = mesh_source::surface(&path).or_else(|failure| source.fail(place.clone(), failure))?;
+    mesh.positions.iter_mut().for_each(|position| *position *= scale);
+    if mesh.volume() < 0.0 {
+        remarks.push(format!(
+            "the triangles of obstacle {name:?} face inwards ({}): they are turned over",
+            path.display()
+        ));
+        mesh.turn_over();
+    }
+    ObstacleMesh::new(mesh.positions, mesh.triangles)
+        .or_else(|error| source.fail(place, format!("{}: {error}", path.display())))
+}

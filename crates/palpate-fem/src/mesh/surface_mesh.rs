@@ -1,0 +1,100 @@
+//! A mesh of triangles: the surface of something that does not deform.
+
+use super::check::{COINCIDENT, coincident_pairs};
+use super::{Mesh, MeshError, boundary, check};
+use glam::DVec3;
+
+/// Triangles and the places of their corners.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceMesh {
+    /// Node positions [m], in the file's frame.
+    pub positions: Vec<DVec3>,
+    /// Three nodes per triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl SurfaceMesh {
+    /// The boundary of a tetrahedral mesh.
+    ///
+    /// # Errors
+    /// When the mesh is not one sound body, see [`check`].
+    pub fn around(mesh: Mesh) -> Result<Self, MeshError> {
+        let mesh = check(mesh)?;
+        let mut surface = Self { triangles: boundary(&mesh.tets), positions: mesh.nodes };
+        surface.drop_unused();
+        Ok(surface)
+    }
+
+    /// Let triangles use one node where several lie on the same point, and leave out triangles without three corners.
+    pub fn weld(&mut self) {
+        let finite = || self.positions.iter().copied().filter(|p| p.is_finite());
+        let low = finite().reduce(DVec3::min).unwrap_or_default();
+        let high = finite().reduce(DVec3::max).unwrap_or_default();
+        let used = vec![true; self.positions.len()];
+        let mut first: Vec<u32> = (0..self.positions.len() as u32).collect();
+        for (a, b) in coincident_pairs(&self.positions, &used, COINCIDENT * (high - low).length()) {
+            first[b as usize] = a;
+        }
+        for triangle in &mut self.triangles {
+            *triangle = triangle.map(|node| first[node as usize]);
+        }
+        self.triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+        self.drop_unused();
+    }
+
+    /// Volume inside [m³] of a closed surface; negative when its triangles face inwards.
+    pub fn volume(&self) -> f64 {
+        let of = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|node| self.positions[node as usize]);
+            a.dot(b.cross(c)) / 6.0
+        };
+        self.triangles.iter().map(of).sum()
+    }
+
+    /// Let all triangles face the other way.
+    pub fn turn_over(&mut self) {
+        self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    }
+
+    fn drop_unused(&mut self) {
+        let mut number = vec![u32::MAX; self.positions.len()];
+        let mut kept = Vec::new();
+        for node in self.triangles.iter_mut().flatten() {
+            let known = &mut number[*node as usize];
+            if *known == u32::MAX {
+                *known = kept.len() as u32;
+                kept.push(self.positions[*node as usize]);
+            }
+            *node = *known;
+        }
+        self.positions = kept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::mesh::box_mesh;
+
+    #[test]
+    fn the_surface_of_a_box_is_closed_and_has_its_volume() {
+        let mut surface = SurfaceMesh::around(box_mesh([1.0, 2.0, 3.0], [2, 2, 2]).unwrap()).unwrap();
+        // 3³ nodes of which one lies within; two triangles a face of a cell.
+        assert_eq!((surface.positions.len(), surface.triangles.len()), (26, 48));
+        assert!((surface.volume() - 6.0).abs() < 1e-12);
+        let before = surface.clone();
+        surface.weld();
+        assert_eq!(surface.triangles.len(), before.triangles.len());
+        surface.turn_over();
+        assert!((surface.volume() + 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn welding_leaves_out_triangles_that_have_become_edges() {
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Z * 1e-9];
+        let mut surface = SurfaceMesh { positions, triangles: vec![[0, 1, 2], [0, 1, 3]] };
+        surface.weld();
+        assert_eq!((surface.positions.len(), surface.triangles), (3, vec![[0, 1, 2]]));
+    }
+}

@@ -1,0 +1,269 @@
+//! Objects against planes and rigid obstacles, many nodes at a time.
+//!
+//! A surface node that comes near becomes a contact with the tangent plane of the obstacle at its nearest point,
+//! which moves with the obstacle. Round obstacles also meet the middle of a triangle, and the corners of others the
+//! surface between the nodes.
+
+use super::meeting::{Approach, meeting};
+use super::search::Sight;
+use super::wanted::{Finding, Key, Wanted, WantedList, WantedOther};
+use super::{Against, Contact, Law, Other};
+use crate::obstacle::{Obstacle, Shape};
+use crate::response::{Body, Place, Reading};
+use crate::spatial::Pose;
+use crate::state::ObjectState;
+use crate::surface::{SurfacePoint, at_weights};
+use glam::DVec3;
+
+/// Nodes within this share of the mean edge are taken in though they don't come nearer: what the others' forces
+/// move is small beside it.
+const MARGIN: f64 = 2e-3;
+
+/// What a force moves on a node that is not pushed itself, as a share of what it moves where it acts: below it, from
+/// one node to the next.
+const PUSHED: f64 = 0.3;
+
+/// Steps of conservative advancement.
+const ADVANCES: usize = 30;
+
+/// A weight below this is none: the point is on the edge, or nearly.
+const ON_EDGE: f64 = 0.02;
+
+/// An object and an obstacle over a step.
+struct Encounter<'a> {
+    at: usize,
+    number: usize,
+    body: &'a Body,
+    own: &'a ObjectState,
+    obstacle: &'a Obstacle,
+    /// The obstacle at the start and at the end.
+    before: Pose,
+    after: Pose,
+    /// How far the body and the obstacle move relative to each other at most, deformation apart [m].
+    way: f64,
+    /// Distance [m] within which nodes are taken in, and more of it where the way could lead through the obstacle.
+    margin: f64,
+    beside: f64,
+}
+
+/// Find the contacts of an object with an obstacle that goes from one pose to another.
+///
+/// # Real time
+/// Costs the nodes that are near, and the logarithm of all.
+pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pose, after: Pose) {
+    let (object, obstacle) = (&scene.model.objects[at], &scene.model.parameters.obstacles[number]);
+    let (body, own) = (&object.body, &scene.objects[at]);
+    let (start, free) = (own.rigid.pose, own.free.end.pose);
+    let moves = |a: &Pose, b: &Pose, arm: f64| {
+        (b.position - a.position).length() + a.orientation.angle_between(b.orientation) * arm
+    };
+    let apart = (before.position - start.position).length();
+    let way = moves(&before, &after, apart + object.radius) + moves(&start, &free, object.radius);
+    let encounter = Encounter {
+        at,
+        number,
+        body,
+        own,
+        obstacle,
+        before,
+        after,
+        way,
+        // Forces on the nodes around move a node too, though less than those.
+        margin: MARGIN * body.edge + PUSHED * own.pushed,
+        beside: if way > 0.5 * obstacle.shape.size() { way } else { 0.0 },
+    };
+    let cache = &mut scene.caches[at];
+    let step = Ok(scene.step);
+    let sight = &mut Sight::new(body, Reading::Point, &own.response, &own.points, cache, step);
+    sight.widen(own.response.free_coordinates());
+    let all = object.radius + sight.reach() + way + encounter.margin;
+    if apart - all > obstacle.shape.radius() {
+        return;
+    }
+    encounter.nodes(sight, known_contacts(scene.contacts, at, number), scene.wanted);
+    encounter.corners(scene, at);
+}
+
+impl Encounter<'_> {
+    /// Distance [m] of a body point from the obstacle at the start; infinite where it is more than `most`.
+    fn distance(&self, p: DVec3, most: f64) -> f64 {
+        let local = self.before.body_from_world(self.own.rigid.pose.world_from_body(p));
+        self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// The same at the end of the step without contact force.
+    fn distance_after(&self, p: DVec3, most: f64) -> f64 {
+        let local = self.after.body_from_world(self.own.free.end.pose.world_from_body(p));
+        self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// The nodes, and for round obstacles the middles of triangles.
+    fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList) {
+        let next = self.own.response.free_coordinates();
+        let dent = sight.most_dent();
+        sight.begin_visit();
+        sight.walk(
+            |sight, node, centre, radius| {
+                let reach = radius + self.margin + self.beside;
+                match node {
+                    // At rest: nothing is known but how far the deformation can go.
+                    None => self.distance(centre, reach + self.way) < reach + self.way,
+                    Some(node) => {
+                        self.distance(centre, reach) < reach
+                            || self.distance_after(sight.free_node(node, next), reach) < reach
+                    }
+                }
+            },
+            |sight, triangle| {
+                for node in self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize) {
+                    if !sight.first_visit(node) {
+                        continue;
+                    }
+                    let free = sight.free_node(node, next);
+                    let place = match known.binary_search_by(|c| c.key.feature.cmp(&(node as u64))) {
+                        Ok(contact) => {
+                            let point = self.own.points.of(known[contact].slot);
+                            point.rest + point.placed.displacement
+                        }
+                        Err(_) => {
+                            let reach = self.margin + dent + self.beside;
+                            let smooth = sight.smooth(node);
+                            if self.distance(smooth, reach) >= reach
+                                && self.distance_after(free, reach) >= reach
+                            {
+                                continue;
+                            }
+                            sight.node(node)
+                        }
+                    };
+                    self.meet(wanted, place, free, self.body.node_point(node), node);
+                }
+                self.middle(sight, triangle, dent, wanted);
+            },
+        );
+    }
+
+    /// The middle of a triangle, where a round obstacle comes nearer to it than to its nodes.
+    fn middle(&self, sight: &mut Sight, triangle: u32, dent: f64, wanted: &mut WantedList) {
+        let corners = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        let places = corners.map(|node| sight.smooth(node));
+        let local = |p: DVec3| self.before.body_from_world(self.own.rigid.pose.world_from_body(p));
+        let Some(weights) = self.obstacle.shape.deepest(places.map(local)) else { return };
+        // Inside the triangle, or on an edge, which counts for one of its two triangles.
+        let thin = |k: &usize| weights[*k] < ON_EDGE;
+        let edge = (0..3).find(thin).map(|k| (corners[(k + 1) % 3], corners[(k + 2) % 3]));
+        if (0..3).filter(thin).count() > 1 || edge.is_some_and(|(a, b)| a > b) {
+            return;
+        }
+        let far = f64::INFINITY;
+        let deep = self.distance(at_weights(places, weights), far);
+        let nearer = |p: &DVec3| self.distance(*p, far) < deep + 1e-3 * self.body.edge;
+        if deep > self.margin + dent + self.beside || places.iter().any(nearer) {
+            return;
+        }
+        let next = self.own.response.free_coordinates();
+        let (exact, ends) =
+            (corners.map(|node| sight.node(node)), corners.map(|node| sight.free_node(node, next)));
+        let feature = self.body.recording.surface.positions.len() + triangle as usize;
+        let point = SurfacePoint { triangle, weights };
+        self.meet(wanted, at_weights(exact, weights), at_weights(ends, weights), point, feature);
+    }
+
+    /// Want a contact if a place that goes from one body point to another comes near the obstacle.
+    fn meet(&self, wanted: &mut WantedList, from: DVec3, to: DVec3, point: SurfacePoint, feature: usize) {
+        let shape = &self.obstacle.shape;
+        let start = self.before.body_from_world(self.own.rigid.pose.world_from_body(from));
+        let end = self.after.body_from_world(self.own.free.end.pose.world_from_body(to));
+        let distance = |p: DVec3| shape.signed_distance(p, f64::INFINITY);
+        let (Some((first, _)), Some((last, _))) = (distance(start), distance(end)) else { return };
+        let way = (end - start).length();
+        // In the obstacle's frame, where it touches first if it is fast, else where it is.
+        let mut place = start;
+        if way > 0.5 * shape.size() && first > 0.0 {
+            let mut t = 0.0;
+            for _ in 0..ADVANCES {
+                place = start.lerp(end, t);
+                let Some((gap, _)) = distance(place) else { return };
+                if gap < 0.5 * self.margin {
+                    break;
+                }
+                t += (gap / way).max(1e-3);
+                if t >= 1.0 {
+                    return;
+                }
+            }
+        } else if first.min(last) > self.margin + libm::fabs(last - first) {
+            return;
+        }
+        let Some((gap, outward)) = distance(place) else { return };
+        let nearest = place - outward * gap;
+        let normal = -(self.before.orientation * outward);
+        self.want(wanted, feature, point, normal, nearest);
+    }
+
+    /// Want a contact of a surface point with a point of the obstacle, in its frame.
+    fn want(
+        &self,
+        wanted: &mut WantedList,
+        feature: usize,
+        point: SurfacePoint,
+        normal: DVec3,
+        other: DVec3,
+    ) {
+        wanted.push(Wanted {
+            key: Key { other: Against::Obstacle(self.number), object: self.at, feature: feature as u64 },
+            place: Place { point, reading: Reading::Point },
+            other: WantedOther::Obstacle {
+                number: self.number,
+                start: self.before.world_from_body(other),
+                end: self.after.world_from_body(other),
+            },
+            law: Law::Touch { friction: self.obstacle.friction },
+            normal,
+            distance: 0.0,
+        });
+    }
+
+    /// The obstacle's corners against the surface.
+    fn corners(&self, scene: &mut Finding, at: usize) {
+        let (start, free) = (self.own.rigid.pose, self.own.free.end.pose);
+        let cache = &mut scene.caches[at];
+        let step = Ok(scene.step);
+        let sight =
+            &mut Sight::new(self.body, Reading::Point, &self.own.response, &self.own.points, cache, step);
+        let (middle, half_extents) = self.body.extent();
+        let around = Shape::Box { half_extents };
+        let grown = sight.reach() + self.margin + self.way;
+        let surface = &self.body.recording.surface;
+        let first = surface.positions.len() + surface.triangles.len();
+        let Finding { contacts, search, wanted, .. } = scene;
+        self.obstacle.shape.corners(
+            |centre, radius| {
+                let place = start.body_from_world(self.before.world_from_body(centre)) - middle;
+                let reach = radius + grown;
+                around.signed_distance(place, reach).is_some_and(|(distance, _)| distance < reach)
+            },
+            |corner, place| {
+                let feature = first + corner;
+                let key =
+                    Key { other: Against::Obstacle(self.number), object: self.at, feature: feature as u64 };
+                let known = contacts.binary_search_by(|c| c.key.cmp(&key)).is_ok();
+                let point = start.body_from_world(self.before.world_from_body(place));
+                let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
+                let approach = Approach { point, way, known, edge: self.body.edge };
+                if let Some((point, normal)) = meeting(search, sight, self.own, &approach) {
+                    self.want(wanted, feature, point, start.orientation * normal, place);
+                }
+            },
+        );
+    }
+}
+
+/// The contacts of an object with an obstacle: they stand together, in the order of their features.
+fn known_contacts(contacts: &[Contact], object: usize, number: usize) -> &[Contact] {
+    let pair = (Against::Obstacle(number), object);
+    let first = contacts.partition_point(|c| (c.key.other, c.key.object) < pair);
+    let count = contacts[first..].partition_point(|c| (c.key.other, c.key.object) == pair);
+    debug_assert!(contacts[first..first + count].iter().all(|c| matches!(c.other, Other::Obstacle { .. })));
+    &contacts[first..first + count]
+}

@@ -1,0 +1,118 @@
+//! Elastic objects against one another: the surface nodes of each against the surface of the other.
+
+use super::meeting::{Approach, MARGIN, meeting};
+use super::search::Sight;
+use super::wanted::{Finding, Key, Wanted, WantedOther};
+use super::{Against, Law, Other};
+use crate::obstacle::Shape;
+use crate::response::{Place, Reading};
+
+impl Finding<'_> {
+    /// Find the contacts of all pairs of objects.
+    ///
+    /// # Real time
+    /// Costs the pairs, and the nodes that are near another object.
+    pub(crate) fn pairs(&mut self) {
+        let count = self.objects.len();
+        for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
+            if self.model.objects[a].is_searched() && self.model.objects[b].is_searched() {
+                self.nodes_against(a, b);
+                self.nodes_against(b, a);
+            }
+        }
+    }
+
+    /// The nodes of one object against the surface of another.
+    fn nodes_against(&mut self, nodes_of: usize, surface_of: usize) {
+        let (own, other) = (&self.objects[nodes_of], &self.objects[surface_of]);
+        let (object, base) = (&self.model.objects[nodes_of], &self.model.objects[surface_of]);
+        let (pose, base_pose) = (own.rigid.pose, other.rigid.pose);
+        // How far the two go relative to each other in the step, at most.
+        let way = |at: usize, radius: f64| {
+            let own = &self.objects[at];
+            let (start, free) = (own.rigid.pose, own.free.end.pose);
+            (free.position - start.position).length()
+                + start.orientation.angle_between(free.orientation) * radius
+        };
+        let edge = object.body.edge.min(base.body.edge);
+        let moves = way(nodes_of, object.radius) + way(surface_of, base.radius);
+
+        // The nodes near the box around the other, which is moved out as far as the other can deform.
+        let cache = &mut self.caches[surface_of];
+        let sight =
+            Sight::new(&base.body, Reading::Point, &other.response, &other.points, cache, Ok(self.step));
+        let grown = sight.reach() + moves + MARGIN * edge;
+        let (middle, half_extents) = base.body.extent();
+        let around = Shape::Box { half_extents };
+        let cache = &mut self.caches[nodes_of];
+        let sight =
+            &mut Sight::new(&object.body, Reading::Point, &own.response, &own.points, cache, Ok(self.step));
+        if (pose.position - base_pose.position).length() > object.radius + sight.reach() + base.radius + grown
+        {
+            return;
+        }
+        sight.begin_visit();
+        let near = &mut *self.near;
+        near.clear();
+        sight.walk(
+            |_, _, centre, radius| {
+                let local = base_pose.body_from_world(pose.world_from_body(centre)) - middle;
+                let reach = radius + grown;
+                around.signed_distance(local, reach).is_some_and(|(distance, _)| distance < reach)
+            },
+            |sight, triangle| {
+                for node in object.body.recording.surface.triangles[triangle as usize] {
+                    if sight.first_visit(node as usize) && near.len() < near.capacity() {
+                        near.push(node);
+                    }
+                }
+            },
+        );
+        for at in 0..self.near.len() {
+            let node = self.near[at] as usize;
+            self.meet(nodes_of, surface_of, node, moves, edge);
+        }
+    }
+
+    /// Want a contact if a node comes near the surface of another object.
+    fn meet(&mut self, nodes_of: usize, surface_of: usize, node: usize, moves: f64, edge: f64) {
+        let (own, other) = (&self.objects[nodes_of], &self.objects[surface_of]);
+        let (object, base) = (&self.model.objects[nodes_of], &self.model.objects[surface_of]);
+        let key = Key { other: Against::Object(nodes_of), object: surface_of, feature: node as u64 };
+        let known = self.contacts.binary_search_by(|c| c.key.cmp(&key)).ok().map(|at| &self.contacts[at]);
+        let node_slot = known.and_then(|contact| match contact.other {
+            Other::Object { slot, .. } => Some(slot),
+            _ => None,
+        });
+        let cache = &mut self.caches[nodes_of];
+        let mut sight =
+            Sight::new(&object.body, Reading::Point, &own.response, &own.points, cache, Ok(self.step));
+        let place = match node_slot {
+            Some(slot) => {
+                let point = own.points.of(slot);
+                point.rest + point.placed.displacement
+            }
+            None => sight.node(node),
+        };
+        let free = sight.free_node(node, own.response.free_coordinates());
+        let deforms = (free - sight.smooth(node)).length();
+        let p = other.rigid.pose.body_from_world(own.rigid.pose.world_from_body(place));
+
+        let cache = &mut self.caches[surface_of];
+        let mut sight =
+            Sight::new(&base.body, Reading::Point, &other.response, &other.points, cache, Ok(self.step));
+        let approach = Approach { point: p, way: moves + deforms, known: known.is_some(), edge };
+        let Some((point, normal)) = meeting(self.search, &mut sight, other, &approach) else { return };
+        self.wanted.push(Wanted {
+            key,
+            place: Place { point, reading: Reading::Point },
+            other: WantedOther::Object {
+                number: nodes_of,
+                place: Place { point: object.body.node_point(node), reading: Reading::Point },
+            },
+            law: Law::Touch { friction: libm::sqrt(object.friction * base.friction) },
+            normal: other.rigid.pose.orientation * normal,
+            distance: 0.0,
+        });
+    }
+}

@@ -1,0 +1,379 @@
+//! Finding what is near on the moving, deformed surface of an object, without passing over the surface.
+
+use crate::contact::ContactPoints;
+use crate::response::{Acting, Body, Place, Reading, ResponseState, dot3};
+use crate::surface::{Visit, at_weights, nearest_on_triangle};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Surface points that a search keeps at most; where a mesh is finer the nearest count.
+const MOST_FOUND: usize = 192;
+
+/// Triangles that a vicinity can hold, and what it is found with to spare, as a share of the mean edge.
+const MOST_AROUND: usize = 32;
+const SPARE: f64 = 0.15;
+
+/// Minima whose directions differ by less than this cosine are one: a facetted surface is one face.
+const ONE_FACE: f64 = 0.85;
+
+/// A triangle near a point, body frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Found {
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f64; 3],
+    /// Its nearest point [m], and how far that is [m].
+    pub(crate) position: DVec3,
+    pub(crate) distance: f64,
+    /// Outward normal of the deformed triangle.
+    pub(crate) normal: DVec3,
+}
+
+/// Where the nodes of an object are, found once per moment; buffers of the object.
+#[derive(Debug, Clone)]
+pub(crate) struct NodeCache {
+    positions: Vec<DVec3>,
+    stamps: Vec<u64>,
+    now: u64,
+    /// The same with dents: all of them, or some.
+    whole: Vec<DVec3>,
+    whole_stamps: Vec<u64>,
+    whole_now: u64,
+    some_dents: bool,
+    moment: Option<(u64, Reading)>,
+    /// Which nodes a walk has come to.
+    visits: Vec<u32>,
+    visit: u32,
+}
+
+impl NodeCache {
+    pub(crate) fn new(nodes: usize) -> Self {
+        Self {
+            positions: vec![DVec3::ZERO; nodes],
+            stamps: vec![0; nodes],
+            now: 0,
+            whole: vec![DVec3::ZERO; nodes],
+            whole_stamps: vec![0; nodes],
+            whole_now: 0,
+            some_dents: false,
+            moment: None,
+            visits: vec![0; nodes],
+            visit: 0,
+        }
+    }
+
+    /// Begin a moment, with or without all dents. What is known of the same one stays.
+    fn begin(&mut self, moment: Option<(u64, Reading)>) {
+        let same = moment.is_some() && self.moment == moment;
+        if !same {
+            self.now += 1;
+            self.moment = moment;
+        }
+        if !same || self.some_dents {
+            self.whole_now += 1;
+            self.some_dents = false;
+        }
+    }
+}
+
+/// A surface at a moment, as a reading sees it; body frame.
+pub(crate) struct Sight<'a> {
+    pub(crate) body: &'a Body,
+    reading: Reading,
+    /// Modal coordinates.
+    q: &'a [f64],
+    /// Forces of the last step with their places.
+    acting: &'a [Acting],
+    /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does.
+    own: [Option<Place>; 4],
+    flat: f64,
+    cache: &'a mut NodeCache,
+    visit: Visit,
+}
+
+impl<'a> Sight<'a> {
+    /// The surface at the start of step number `step`, or at another moment with modal coordinates `q`.
+    pub(crate) fn new(
+        body: &'a Body,
+        reading: Reading,
+        state: &'a ResponseState,
+        points: &ContactPoints,
+        cache: &'a mut NodeCache,
+        moment: Result<u64, &'a [f64]>,
+    ) -> Self {
+        let (q, key) = match moment {
+            Ok(step) => (state.coordinates(), Some((step, reading))),
+            Err(q) => (q, None),
+        };
+        cache.begin(key);
+        // No place goes farther by the residual compliance than where the forces act, or hardly.
+        let same = points.points.iter().filter(|p| p.place.reading == reading);
+        let beside = same.map(|p| p.placed.residual.length()).fold(0.0, f64::max);
+        let visit = Visit {
+            modal: libm::sqrt(body.norm_squared(q)),
+            residual: libm::sqrt(2.0 * state.residual_energy()),
+            most_residual: 2.0 * beside,
+        };
+        Self { body, reading, q, acting: state.acting(), own: [None; 4], flat: 0.0, cache, visit }
+    }
+
+    /// Leave out the own dents of places within a distance [m]: a tip that presses is not beside itself.
+    pub(crate) fn without_dents(&mut self, own: [Option<Place>; 4], flat: f64) {
+        if own.iter().any(Option::is_some) {
+            (self.own, self.flat) = (own, flat);
+            self.cache.whole_now += 1;
+            self.cache.some_dents = true;
+        }
+    }
+
+    /// How far any node can be from its place at rest [m].
+    pub(crate) fn reach(&self) -> f64 {
+        self.body.bounds(self.reading).reach(&self.visit)
+    }
+
+    fn rest(&self, node: usize) -> DVec3 {
+        self.body.recording.surface.positions[node]
+    }
+
+    /// The most [m] that a dent moves any node.
+    pub(crate) fn most_dent(&self) -> f64 {
+        self.visit.most_residual
+    }
+
+    /// Forget which nodes were come to.
+    pub(crate) fn begin_visit(&mut self) {
+        self.cache.visit = self.cache.visit.wrapping_add(1);
+    }
+
+    /// Whether a node is come to for the first time.
+    pub(crate) fn first_visit(&mut self, node: usize) -> bool {
+        core::mem::replace(&mut self.cache.visits[node], self.cache.visit) != self.cache.visit
+    }
+
+    /// Let spheres hold also what other modal coordinates do.
+    pub(crate) fn widen(&mut self, q: &[f64]) {
+        self.visit.modal = self.visit.modal.max(libm::sqrt(self.body.norm_squared(q)));
+    }
+
+    /// A node's place with other modal coordinates, without dents.
+    pub(crate) fn free_node(&self, node: usize, q: &[f64]) -> DVec3 {
+        let m = q.len();
+        self.rest(node) + dot3(&self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)], q)
+    }
+
+    /// How far the deformation goes from here to other modal coordinates at the corners of a triangle, at most [m].
+    pub(crate) fn deformation(&mut self, found: &Found, q: &[f64]) -> f64 {
+        let corners = self.body.recording.surface.triangles[found.triangle as usize];
+        let mut most = 0.0_f64;
+        for node in corners {
+            most = most.max((self.free_node(node as usize, q) - self.smooth(node as usize)).length());
+        }
+        most
+    }
+
+    /// A node's place by the modes.
+    pub(crate) fn smooth(&mut self, node: usize) -> DVec3 {
+        if self.cache.stamps[node] != self.cache.now {
+            self.cache.stamps[node] = self.cache.now;
+            let m = self.q.len();
+            let rows = &self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)];
+            self.cache.positions[node] = self.rest(node) + dot3(rows, self.q);
+        }
+        self.cache.positions[node]
+    }
+
+    /// A node's place.
+    pub(crate) fn node(&mut self, node: usize) -> DVec3 {
+        if self.cache.whole_stamps[node] == self.cache.whole_now {
+            return self.cache.whole[node];
+        }
+        let mut place = self.smooth(node);
+        for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
+            let own = self.own.iter().flatten().any(|own| *own == other.place)
+                && (self.rest(node) - other.rest).length() < self.flat;
+            place += if own { other.own_dent } else { self.body.dent(node, other) };
+        }
+        (self.cache.whole[node], self.cache.whole_stamps[node]) = (place, self.cache.whole_now);
+        place
+    }
+
+    /// Where the corners of a triangle are.
+    pub(crate) fn corners(&mut self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        [self.node(a), self.node(b), self.node(c)]
+    }
+
+    /// The nearest point of a triangle.
+    pub(crate) fn nearest_on(&mut self, triangle: u32, p: DVec3) -> Found {
+        let corners = self.corners(triangle);
+        let weights = nearest_on_triangle(corners, p);
+        let position = at_weights(corners, weights);
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        Found { triangle, weights, position, distance: (p - position).length(), normal }
+    }
+
+    /// Visit all triangles in spheres that `near` takes: (node, centre, radius) in the body frame, see
+    /// [`crate::surface::SurfaceTree::walk`].
+    pub(crate) fn walk(
+        &mut self,
+        near: impl Fn(&mut Self, Option<usize>, DVec3, f64) -> bool,
+        found: impl FnMut(&mut Self, u32),
+    ) {
+        let body = self.body;
+        let visit = self.visit;
+        body.tree.walk((body.bounds(self.reading), &visit), self, Self::rest, Self::smooth, near, found);
+    }
+}
+
+/// The triangles around a point, as they were found a while ago: they are all that can be near while the point and the
+/// surface have not gone farther than what they were found with to spare.
+#[derive(Debug, Clone)]
+pub(crate) struct Vicinity {
+    triangles: Vec<u32>,
+    /// Where the point was [m, body], the modal coordinates, the largest dent [m].
+    point: DVec3,
+    q: Vec<f64>,
+    dent: f64,
+    /// Within which they are all there [m]; 0 when nothing is known.
+    reach: f64,
+}
+
+impl Vicinity {
+    pub(crate) fn new(modes: usize) -> Self {
+        Self {
+            triangles: Vec::with_capacity(MOST_AROUND),
+            point: DVec3::ZERO,
+            q: vec![0.0; modes],
+            dent: 0.0,
+            reach: 0.0,
+        }
+    }
+
+    /// Within which distance [m] of a point no triangle is missing.
+    fn covers(&self, sight: &Sight, p: DVec3) -> f64 {
+        if self.reach == 0.0 {
+            return 0.0;
+        }
+        let omegas = &sight.body.recording.modes.angular_frequencies;
+        let change = omegas.iter().zip(sight.q.iter().zip(&self.q)).map(|(omega, (a, b))| omega * (a - b));
+        let moved =
+            sight.body.reach(change.map(|x| x * x).sum()) + 2.0 * libm::fabs(sight.most_dent() - self.dent);
+        self.reach - moved - (p - self.point).length()
+    }
+}
+
+/// Buffers of a search.
+#[derive(Debug, Clone)]
+pub(crate) struct Search {
+    pub(crate) found: Vec<Found>,
+}
+
+impl Search {
+    pub(crate) fn new() -> Self {
+        Self { found: Vec::with_capacity(MOST_FOUND) }
+    }
+
+    /// Find the triangles within a reach [m] of a body point.
+    ///
+    /// # Real time
+    /// Costs the triangles within reach, and the logarithm of all.
+    pub(crate) fn near(&mut self, sight: &mut Sight, p: DVec3, reach: f64) {
+        let found = &mut self.found;
+        found.clear();
+        sight.walk(
+            |_, _, centre, radius| (p - centre).length() - radius < reach,
+            |sight, triangle| {
+                let one = sight.nearest_on(triangle, p);
+                if one.distance >= reach {
+                    return;
+                }
+                if found.len() < MOST_FOUND {
+                    found.push(one);
+                    return;
+                }
+                let farthest = found.iter_mut().max_by(|a, b| a.distance.total_cmp(&b.distance));
+                if let Some(farthest) = farthest.filter(|farthest| one.distance < farthest.distance) {
+                    *farthest = one;
+                }
+            },
+        );
+        self.sort();
+    }
+
+    /// As [`Self::near`], by the vicinity where that is enough.
+    ///
+    /// # Real time
+    pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {
+        if vicinity.covers(sight, p) < reach {
+            let wide = reach + SPARE * sight.body.edge;
+            self.near(sight, p, wide);
+            vicinity.reach = 0.0;
+            if self.found.len() <= MOST_AROUND {
+                vicinity.triangles.clear();
+                vicinity.triangles.extend(self.found.iter().map(|found| found.triangle));
+                vicinity.q[..sight.q.len()].copy_from_slice(sight.q);
+                (vicinity.point, vicinity.dent, vicinity.reach) = (p, sight.most_dent(), wide);
+            }
+            return;
+        }
+        self.found.clear();
+        self.found.extend(vicinity.triangles.iter().map(|&triangle| sight.nearest_on(triangle, p)));
+        self.sort();
+    }
+
+    fn sort(&mut self) {
+        self.found
+            .sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle)));
+    }
+
+    /// The triangle that is nearest to a body point, if it is within a reach [m].
+    ///
+    /// # Real time
+    pub(crate) fn nearest(sight: &mut Sight, p: DVec3, reach: f64) -> Option<Found> {
+        let best: core::cell::Cell<Option<Found>> = core::cell::Cell::new(None);
+        let least = || best.get().map_or(reach, |found| found.distance.min(reach));
+        sight.walk(
+            |_, _, centre, radius| (p - centre).length() - radius < least(),
+            |sight, triangle| {
+                let one = sight.nearest_on(triangle, p);
+                if one.distance < least() {
+                    best.set(Some(one));
+                }
+            },
+        );
+        best.get().filter(|found| found.distance < reach)
+    }
+
+    /// Whether a point is inside, by the directions of the nearest triangles that were found.
+    pub(crate) fn is_inside(&self, p: DVec3) -> bool {
+        let Some(nearest) = self.found.first() else { return false };
+        let same = self.found.iter().filter(|f| (f.position - nearest.position).length_squared() < 1e-18);
+        same.map(|f| f.normal).sum::<DVec3>().dot(p - nearest.position) < 0.0
+    }
+
+    /// Keep what was found within a reach [m] where the surface is nearest to the point in its surroundings, once per
+    /// face: at most `most`, the nearest first.
+    pub(crate) fn keep_minima(&mut self, body: &Body, reach: f64, most: usize) {
+        self.found.retain(|found| found.distance < reach);
+        let triangles = &body.recording.surface.triangles;
+        let mut kept = 0;
+        for at in 0..self.found.len() {
+            let one = self.found[at];
+            // The corner, edge or face that holds the point.
+            let corners = triangles[one.triangle as usize];
+            let feature = || corners.iter().zip(one.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| node);
+            let holds =
+                |other: &Found| feature().all(|node| triangles[other.triangle as usize].contains(node));
+            // Sorted: a triangle at the feature that is nearer stands before, and so does one that shares the point.
+            if kept == most || self.found[..at].iter().any(holds) {
+                continue;
+            }
+            let known = self.found[..kept].iter().any(|other| one.normal.dot(other.normal) > ONE_FACE);
+            if !known {
+                self.found.swap(kept, at);
+                kept += 1;
+            }
+        }
+        self.found.truncate(kept);
+    }
+}

@@ -1,0 +1,362 @@
+//! Planes and rigid obstacles: shapes with a signed distance.
+
+use crate::error::Error;
+use crate::spatial::Pose;
+use crate::surface::{Bounds, Surface, SurfaceTree, Visit, at_weights, nearest_on_triangle};
+use alloc::format;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// A rigid thing that objects meet: fixed, or moved by the step's input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its shape, in its own frame.
+    pub shape: Shape,
+    /// Where it is at the start.
+    pub pose: Pose,
+    /// Coulomb's coefficient against every object [1], not negative.
+    pub friction: f64,
+}
+
+/// The shape of an obstacle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Everything on the side of the origin that the unit normal points away from.
+    Plane {
+        /// Out of the solid side.
+        normal: DVec3,
+    },
+    /// A ball about the origin.
+    Sphere {
+        /// [m]
+        radius: f64,
+    },
+    /// A box about the origin.
+    Box {
+        /// Half the lengths of its sides [m].
+        half_extents: DVec3,
+    },
+    /// All points within a radius of a piece of the y axis.
+    Capsule {
+        /// [m]
+        radius: f64,
+        /// Half the length of that piece [m].
+        half_length: f64,
+    },
+    /// A closed triangle mesh.
+    Mesh(Arc<ObstacleMesh>),
+}
+
+/// A closed triangle mesh that does not deform.
+#[derive(Debug, Clone)]
+pub struct ObstacleMesh {
+    surface: Surface,
+    tree: SurfaceTree,
+    bounds: Bounds,
+    /// Angle-weighted normals of the nodes.
+    normals: Vec<DVec3>,
+    /// The triangle that each node belongs to.
+    owners: Vec<u32>,
+    /// Of the smallest sphere about the origin that holds it [m].
+    radius: f64,
+}
+
+impl PartialEq for ObstacleMesh {
+    fn eq(&self, other: &Self) -> bool {
+        self.surface == other.surface
+    }
+}
+
+impl ObstacleMesh {
+    /// From nodes [m] and triangles, counter-clockwise seen from outside.
+    ///
+    /// # Errors
+    /// When a triangle names a node that does not exist or has no area, or the mesh is not closed.
+    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
+        let fail = |what| Err(Error::Model(what));
+        if triangles.is_empty() {
+            return fail("an obstacle's mesh has no triangles".into());
+        }
+        if let Some(p) = positions.iter().position(|p| !p.is_finite()) {
+            return fail(format!("node {p} of an obstacle's mesh is not finite"));
+        }
+        let mut edges = Vec::with_capacity(3 * triangles.len());
+        let mut normals = vec![DVec3::ZERO; positions.len()];
+        for (t, corners) in triangles.iter().enumerate() {
+            if corners.iter().any(|&n| n as usize >= positions.len()) {
+                return fail(format!("triangle {t} of an obstacle's mesh names a node that does not exist"));
+            }
+            let places = corners.map(|n| positions[n as usize]);
+            let normal = (places[1] - places[0]).cross(places[2] - places[0]).normalize_or_zero();
+            if normal == DVec3::ZERO {
+                return fail(format!("triangle {t} of an obstacle's mesh has no area"));
+            }
+            for k in 0..3 {
+                let (a, b, c) = (places[k], places[(k + 1) % 3], places[(k + 2) % 3]);
+                normals[corners[k] as usize] += normal * (b - a).angle_between(c - a);
+                edges.push((corners[k], corners[(k + 1) % 3]));
+            }
+        }
+        edges.sort_unstable();
+        let open = edges.iter().find(|&&(a, b)| edges.binary_search(&(b, a)).is_err());
+        if let Some((a, b)) = open {
+            return fail(format!(
+                "an obstacle's mesh is open at the edge between nodes {a} and {b}: it needs an inside and an outside"
+            ));
+        }
+        let source_nodes = (0..positions.len() as u32).collect();
+        let surface = Surface { positions, triangles, source_nodes };
+        let tree = SurfaceTree::new(&surface);
+        let bounds = tree.bounds(&surface, |_, _| 0.0, |_| 0.0);
+        let radius = surface.radius();
+        let mut owners = vec![0; surface.positions.len()];
+        for (t, corners) in surface.triangles.iter().enumerate() {
+            corners.iter().for_each(|&node| owners[node as usize] = t as u32);
+        }
+        Ok(Self { surface, tree, bounds, normals, owners, radius })
+    }
+
+    fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
+        let still = Visit { modal: 0.0, residual: 0.0, most_residual: 0.0 };
+        let place = |n: usize| self.surface.positions[n];
+        self.tree.walk(
+            (&self.bounds, &still),
+            &mut (),
+            |_, n| place(n),
+            |_, n| place(n),
+            |_, _, centre, radius| near(centre, radius),
+            |_, t| {
+                for node in self.surface.triangles[t as usize].map(|n| n as usize) {
+                    // A node belongs to one of its triangles.
+                    if self.owners[node] == t && near(place(node), 0.0) {
+                        found(node, place(node));
+                    }
+                }
+            },
+        );
+    }
+
+    fn signed_distance(&self, p: DVec3, most: f64) -> Option<(f64, DVec3)> {
+        if p.length() - most > self.radius {
+            return None;
+        }
+        // However far: which side it is on counts. (least distance, nearest point, normal that tells the side).
+        let best = core::cell::Cell::new((f64::INFINITY, DVec3::ZERO, DVec3::ZERO));
+        let still = Visit { modal: 0.0, residual: 0.0, most_residual: 0.0 };
+        let place = |n: usize| self.surface.positions[n];
+        self.tree.walk(
+            (&self.bounds, &still),
+            &mut (),
+            |_, n| place(n),
+            |_, n| place(n),
+            |_, _, centre, radius| (p - centre).length() - radius < best.get().0 + 1e-12,
+            |_, t| {
+                let corners = self.surface.triangles[t as usize];
+                let places = corners.map(|n| place(n as usize));
+                let weights = nearest_on_triangle(places, p);
+                let nearest = at_weights(places, weights);
+                let distance = (p - nearest).length();
+                let (least, at, side) = best.get();
+                let normal = match weights.iter().position(|w| *w > 1.0 - 1e-12) {
+                    Some(corner) => self.normals[corners[corner] as usize],
+                    None => (places[1] - places[0]).cross(places[2] - places[0]).normalize_or_zero(),
+                };
+                // Both triangles of an edge count for the side.
+                let same = (nearest - at).length() <= 1e-9 * (1.0 + distance) && side != DVec3::ZERO;
+                if same {
+                    best.set((least.min(distance), at, side + normal));
+                } else if distance < least {
+                    best.set((distance, nearest, normal));
+                }
+            },
+        );
+        let (distance, nearest, side) = best.get();
+        let away = p - nearest;
+        let outside = away.dot(side) >= 0.0;
+        let gradient = if distance > 1e-9 { away / distance } else { side.normalize_or_zero() };
+        Some(if outside { (distance, gradient) } else { (-distance, -gradient) })
+    }
+}
+
+impl Shape {
+    /// Signed distance [m] of a point in the shape's frame, negative inside, and its direction of steepest growth.
+    /// None for a mesh when the point is outside and farther than `most`, or may be.
+    ///
+    /// # Real time
+    pub(crate) fn signed_distance(&self, p: DVec3, most: f64) -> Option<(f64, DVec3)> {
+        let from_core = |core: DVec3, radius: f64| {
+            let away = p - core;
+            let distance = away.length();
+            (distance - radius, if distance > 0.0 { away / distance } else { DVec3::Y })
+        };
+        Some(match self {
+            Self::Plane { normal } => (p.dot(*normal), *normal),
+            Self::Sphere { radius } => from_core(DVec3::ZERO, *radius),
+            Self::Capsule { radius, half_length } => {
+                from_core(DVec3::Y * p.y.clamp(-half_length, *half_length), *radius)
+            }
+            Self::Box { half_extents } => {
+                let beyond = p.abs() - *half_extents;
+                let sign =
+                    DVec3::new(libm::copysign(1.0, p.x), libm::copysign(1.0, p.y), libm::copysign(1.0, p.z));
+                let outside = beyond.max(DVec3::ZERO);
+                let distance = outside.length();
+                if distance > 0.0 {
+                    (distance, outside / distance * sign)
+                } else {
+                    let axis = if beyond.x >= beyond.y && beyond.x >= beyond.z {
+                        DVec3::X
+                    } else if beyond.y >= beyond.z {
+                        DVec3::Y
+                    } else {
+                        DVec3::Z
+                    };
+                    (beyond.dot(axis), axis * sign)
+                }
+            }
+            Self::Mesh(mesh) => return mesh.signed_distance(p, most),
+        })
+    }
+
+    /// Weights of the point of a triangle that goes deepest into a round shape; those with corners meet the middle of
+    /// a triangle with these.
+    ///
+    /// # Real time
+    pub(crate) fn deepest(&self, corners: [DVec3; 3]) -> Option<[f64; 3]> {
+        // The nearest point of the middle: a point, or a piece of a line.
+        let core = |p: DVec3| match self {
+            Self::Sphere { .. } => Some(DVec3::ZERO),
+            Self::Capsule { half_length, .. } => Some(DVec3::Y * p.y.clamp(-half_length, *half_length)),
+            Self::Plane { .. } | Self::Box { .. } | Self::Mesh(_) => None,
+        };
+        let mut weights = [1.0 / 3.0; 3];
+        for _ in 0..12 {
+            weights = nearest_on_triangle(corners, core(at_weights(corners, weights))?);
+            if matches!(self, Self::Sphere { .. }) {
+                break;
+            }
+        }
+        Some(weights)
+    }
+
+    /// Visit the corners of the shape that spheres (centre, radius) hold, where `near` takes these; all in the shape's
+    /// frame.
+    ///
+    /// # Real time
+    pub(crate) fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
+        match self {
+            Self::Plane { .. } | Self::Sphere { .. } | Self::Capsule { .. } => {}
+            Self::Box { half_extents } => {
+                for k in 0..8 {
+                    let side = |axis: usize| if k >> axis & 1 == 0 { -1.0 } else { 1.0 };
+                    let corner = *half_extents * DVec3::new(side(0), side(1), side(2));
+                    if near(corner, 0.0) {
+                        found(k, corner);
+                    }
+                }
+            }
+            Self::Mesh(mesh) => mesh.corners(near, found),
+        }
+    }
+
+    /// Size [m] of the shape: what moves farther in a step could miss it.
+    pub(crate) fn size(&self) -> f64 {
+        match self {
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => *radius,
+            Self::Box { half_extents } => half_extents.min_element(),
+            Self::Mesh(mesh) => 0.1 * mesh.radius,
+        }
+    }
+
+    /// Radius [m] of a sphere about the origin that holds it.
+    pub(crate) fn radius(&self) -> f64 {
+        match self {
+            Self::Plane { .. } => f64::INFINITY,
+            Self::Sphere { radius } => *radius,
+            Self::Capsule { radius, half_length } => radius + half_length,
+            Self::Box { half_extents } => half_extents.length(),
+            Self::Mesh(mesh) => mesh.radius,
+        }
+    }
+}
+
+impl Obstacle {
+    /// Refuse numbers out of range.
+    pub(crate) fn check(&self, at: usize) -> Result<(), Error> {
+        let fail = |what| Err(Error::Model(format!("obstacle {at}: {what}")));
+        let positive = |x: f64| x > 0.0 && x < 1e18;
+        let unit = |length: f64| libm::fabs(length - 1.0) < 1e-9;
+        if !(0.0..1e6).contains(&self.friction) {
+            return fail(format!("friction is {}, expected a number not below 0", self.friction));
+        }
+        let norm = self.pose.orientation.length();
+        if !self.pose.position.is_finite() || !(0.99..=1.01).contains(&norm) {
+            return fail("position must be finite and orientation a unit quaternion".into());
+        }
+        match &self.shape {
+            Shape::Plane { normal } if !unit(normal.length()) => {
+                fail(format!("normal has length {}, expected 1", normal.length()))
+            }
+            Shape::Sphere { radius } if !positive(*radius) => {
+                fail(format!("radius is {radius} m, expected a positive number"))
+            }
+            Shape::Box { half_extents } if !half_extents.to_array().into_iter().all(positive) => {
+                fail(format!("half extents are {half_extents} m, expected positive numbers"))
+            }
+            Shape::Capsule { radius, half_length } if !(positive(*radius) && positive(*half_length)) => {
+                fail(format!("radius {radius} m and half length {half_length} m must be positive"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube_mesh(half: f64) -> Shape {
+        let corner = |k: u32| {
+            DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - DVec3::ONE
+        };
+        let positions = (0..8).map(|k| corner(k) * half).collect();
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Shape::Mesh(Arc::new(ObstacleMesh::new(positions, triangles).expect("closed")))
+    }
+
+    #[test]
+    fn a_box_and_its_mesh_have_the_same_distance() {
+        let (solid, mesh) = (Shape::Box { half_extents: DVec3::splat(0.5) }, cube_mesh(0.5));
+        for k in 0..500 {
+            let wave = |p: f64| libm::sin(p * f64::from(k) + p);
+            let p = DVec3::new(wave(1.3), wave(2.7), wave(0.9));
+            let (a, toward) = solid.signed_distance(p, 9.0).expect("a box");
+            let (b, other) = mesh.signed_distance(p, 9.0).expect("near");
+            assert!((a - b).abs() < 1e-12, "{p}: {a} {b}");
+            assert!(a < 0.0 || (toward - other).length() < 1e-9, "{p}: {toward} {other}");
+        }
+    }
+
+    #[test]
+    fn distance_grows_as_its_direction_says() {
+        let shapes = [
+            Shape::Plane { normal: DVec3::new(0.6, 0.8, 0.0) },
+            Shape::Sphere { radius: 0.3 },
+            Shape::Capsule { radius: 0.2, half_length: 0.4 },
+            Shape::Box { half_extents: DVec3::new(0.2, 0.5, 0.3) },
+        ];
+        for shape in shapes {
+            for k in 0..100 {
+                let wave = |p: f64| libm::sin(p * f64::from(k) + p);
+                let p = DVec3::new(wave(1.1), wave(2.3), wave(0.7));
+                let (a, direction) = shape.signed_distance(p, 9.0).expect("solid");
+                let (b, _) = shape.signed_distance(p + direction * 1e-6, 9.0).expect("solid");
+                assert!((b - a - 1e-6).abs() < 1e-11, "{shape:?} at {p}");
+            }
+        }
+    }
+}

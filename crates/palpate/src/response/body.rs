@@ -1,0 +1,217 @@
+//! A body as contacts see it: its recording, how displacement is read on it, and the tree over its surface.
+
+use super::patch_field::{PatchField, modal_distance, residual_size};
+use crate::recording::Recording;
+use crate::surface::{Bounds, SurfacePoint, SurfaceTree, Visit, triangles_around};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// How displacement is read, and force spread, at a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Reading {
+    /// At the point itself, by the weights of its triangle.
+    #[default]
+    Point,
+    /// Over the patch of this number among the body's.
+    Patch(u32),
+}
+
+/// Where a force can act on a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    pub(crate) point: SurfacePoint,
+    pub(crate) reading: Reading,
+}
+
+/// What is known of a place at the start of a step [m, body].
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Placed {
+    /// Elastic displacement.
+    pub(crate) displacement: DVec3,
+    /// The part of it that the residual compliance and the weight cause.
+    pub(crate) residual: DVec3,
+    /// The part that the weight causes beside the modes; lasts, since only bodies that stay where they are have one.
+    pub(crate) sag: DVec3,
+}
+
+/// A force that acted over the last step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Acting {
+    pub(crate) place: Place,
+    /// [N, body]
+    pub(crate) force: DVec3,
+    /// Where at rest [m, body].
+    pub(crate) rest: DVec3,
+    /// For patches Aᵀ·f [√J] of the patch field's equation.
+    pull: DVec3,
+    /// What the residual compliance moves the place itself [m, body].
+    pub(crate) own_dent: DVec3,
+}
+
+/// One object's body; immutable.
+#[derive(Debug, Clone)]
+pub(crate) struct Body {
+    pub(crate) recording: Arc<Recording>,
+    pub(crate) patches: Vec<PatchField>,
+    pub(crate) tree: SurfaceTree,
+    bounds: Bounds,
+    /// Mean edge of the triangles at rest [m].
+    pub(crate) edge: f64,
+    /// The triangles around every surface node, one after the other.
+    around: Vec<u32>,
+    first_around: Vec<u32>,
+    middle: DVec3,
+    half_extents: DVec3,
+}
+
+impl Body {
+    /// With patches of the given radii [m].
+    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64]) -> Self {
+        let tree = SurfaceTree::new(&recording.surface);
+        let shapes = &recording.modes.mode_shapes;
+        let bounds = tree.bounds(
+            &recording.surface,
+            |i, c| modal_distance(&recording, shapes, i, c),
+            |i| residual_size(&recording, i),
+        );
+        let patches = radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
+        let edge = recording.surface.mean_edge();
+        let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
+        for triangles in triangles_around(&recording.surface) {
+            around.extend(triangles);
+            first_around.push(around.len() as u32);
+        }
+        let places = || recording.surface.positions.iter().copied();
+        let low = places().reduce(DVec3::min).unwrap_or_default();
+        let high = places().reduce(DVec3::max).unwrap_or_default();
+        let (middle, half_extents) = ((low + high) * 0.5, (high - low) * 0.5);
+        Self { recording, patches, tree, bounds, edge, around, first_around, middle, half_extents }
+    }
+
+    /// Middle and half extents of the box around the body at rest [m, body].
+    pub(crate) fn extent(&self) -> (DVec3, DVec3) {
+        (self.middle, self.half_extents)
+    }
+
+    /// The triangles around a surface node.
+    pub(crate) fn around(&self, node: usize) -> &[u32] {
+        &self.around[self.first_around[node] as usize..self.first_around[node + 1] as usize]
+    }
+
+    /// The triangle on the other side of an edge; none at a border.
+    pub(crate) fn across(&self, triangle: u32, a: u32, b: u32) -> Option<u32> {
+        let has = |t: u32| t != triangle && self.recording.surface.triangles[t as usize].contains(&b);
+        self.around(a as usize).iter().copied().find(|&t| has(t))
+    }
+
+    /// A node as a surface point, always the same.
+    pub(crate) fn node_point(&self, node: usize) -> SurfacePoint {
+        let triangle = self.around(node)[0];
+        let corners = self.recording.surface.triangles[triangle as usize];
+        let weights = corners.map(|corner| if corner as usize == node { 1.0 } else { 0.0 });
+        SurfacePoint { triangle, weights }
+    }
+
+    /// Σω²·q² [J]: twice the elastic energy of modal coordinates.
+    pub(crate) fn norm_squared(&self, q: &[f64]) -> f64 {
+        let omegas = &self.recording.modes.angular_frequencies;
+        omegas.iter().zip(q).map(|(omega, q)| (omega * q) * (omega * q)).sum()
+    }
+
+    /// How far modal coordinates with such a norm squared [J] can move any surface node [m].
+    pub(crate) fn reach(&self, norm_squared: f64) -> f64 {
+        self.bounds.reach(&Visit { modal: libm::sqrt(norm_squared), residual: 0.0, most_residual: 0.0 })
+    }
+
+    /// The reading for a patch of a radius [m]; the point itself for 0.
+    pub(crate) fn reading(&self, radius: f64) -> Reading {
+        let patch = self.patches.iter().position(|patch| patch.radius == radius);
+        patch.map_or(Reading::Point, |at| Reading::Patch(at as u32))
+    }
+
+    fn patch(&self, reading: Reading) -> Option<&PatchField> {
+        match reading {
+            Reading::Point => None,
+            Reading::Patch(at) => self.patches.get(at as usize),
+        }
+    }
+
+    /// Mode shapes as a reading sees them: (3·node + axis)·m + mode.
+    pub(crate) fn rows(&self, reading: Reading) -> &[f64] {
+        self.patch(reading).map_or(&self.recording.modes.mode_shapes, |patch| &patch.rows)
+    }
+
+    /// How far the surface can go, as a reading sees it.
+    pub(crate) fn bounds(&self, reading: Reading) -> &Bounds {
+        self.patch(reading).map_or(&self.bounds, |patch| &patch.bounds)
+    }
+
+    /// Residual compliance between two places [m/N]; none between different readings, whose places answer each other
+    /// by the modes alone.
+    ///
+    /// # Real time
+    pub(crate) fn residual(&self, a: &Place, b: &Place) -> DMat3 {
+        let recording = &*self.recording;
+        match (a.reading == b.reading, self.patch(a.reading)) {
+            (false, _) => DMat3::ZERO,
+            (true, Some(patch)) => patch.residual(recording, &a.point, &b.point),
+            (true, None) => {
+                let corners = |place: &Place| recording.surface.corners(&place.point);
+                let used = |corner: &(usize, f64)| corner.1 != 0.0;
+                let mut sum = DMat3::ZERO;
+                for (i, wi) in corners(a).into_iter().filter(used) {
+                    for (j, wj) in corners(b).into_iter().filter(used) {
+                        sum += recording.residual.block(i, j) * (wi * wj);
+                    }
+                }
+                sum
+            }
+        }
+    }
+
+    /// What a force leaves of itself for the step after.
+    ///
+    /// # Real time
+    pub(crate) fn acting(&self, place: Place, force: DVec3) -> Acting {
+        let rest = self.recording.surface.rest_position(&place.point);
+        let (pull, own_dent) = match self.patch(place.reading) {
+            Some(patch) => {
+                let root = patch.root_at(&self.recording, &place.point);
+                let pull = root.transpose() * force;
+                (pull, root * pull)
+            }
+            None => (DVec3::ZERO, self.residual(&place, &place) * force),
+        };
+        Acting { place, force, rest, pull, own_dent }
+    }
+
+    /// What the residual compliance moves a surface node [m, body], read as the force's place is.
+    ///
+    /// # Real time
+    pub(crate) fn dent(&self, node: usize, acting: &Acting) -> DVec3 {
+        match self.patch(acting.place.reading) {
+            Some(patch) => patch.dent(&self.recording, node, acting.rest, acting.pull),
+            None => self.residual_of_node(node, &acting.place) * acting.force,
+        }
+    }
+
+    /// Residual compliance from a place to the surface node itself [m/N]. Costs a patch's nodes: for pictures.
+    pub(crate) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
+        let mut sum = DMat3::ZERO;
+        for (corner, weight) in self.recording.surface.corners(&place.point) {
+            if weight == 0.0 {
+                continue;
+            }
+            match self.patch(place.reading) {
+                None => sum += self.recording.residual.block(node, corner) * weight,
+                Some(patch) => {
+                    for (other, w) in patch.weights.of(corner) {
+                        sum += self.recording.residual.block(node, other) * (w * weight);
+                    }
+                }
+            }
+        }
+        sum
+    }
+}

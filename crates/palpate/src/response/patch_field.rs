@@ -1,0 +1,179 @@
+//! What contact patches of one radius see of a body: mode shapes averaged over the patch about every surface node,
+//! and the residual compliance between patches.
+//!
+//! ```text
+//! G_c = Σᵢ wᵢ·Φᵢ        D_c = Σᵢⱼ wᵢ·Sᵢⱼ·wⱼ = A_c·A_cᵀ        K(x, y) = A(x)·ψ(|x − y|/L)·A(y)ᵀ
+//! ```
+//!
+//! w are the weights of the patch about node c; between nodes G and A are interpolated. D is exact at the nodes.
+//! K carries it to other places with Wendland's function ψ, whose range L is fitted to S: so K is positive
+//! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
+
+use crate::recording::{NearField, Recording};
+use crate::surface::{Bounds, PatchWeights, SurfacePoint, SurfaceTree};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// Patches of one radius on one body; immutable.
+#[derive(Debug, Clone)]
+pub(crate) struct PatchField {
+    /// a [m].
+    pub(crate) radius: f64,
+    pub(crate) weights: PatchWeights,
+    /// G [1/√kg], laid out as the mode shapes: (3·node + axis)·m + mode.
+    pub(crate) rows: Vec<f64>,
+    /// A [√(m/N)], lower triangular, per node.
+    roots: Vec<DMat3>,
+    /// L [m].
+    range: f64,
+    pub(crate) bounds: Bounds,
+}
+
+/// Pairs of nodes that the range is fitted to.
+const FIT_CENTRES: usize = 24;
+
+impl PatchField {
+    pub(crate) fn new(recording: &Recording, tree: &SurfaceTree, radius: f64) -> Self {
+        let (surface, modes) = (&recording.surface, &recording.modes);
+        let (n, m) = (surface.positions.len(), modes.len());
+        let weights = PatchWeights::new(surface, radius);
+        let mut rows = vec![0.0; 3 * n * m];
+        for c in 0..n {
+            for (node, w) in weights.of(c) {
+                let from = &modes.mode_shapes[3 * node * m..3 * (node + 1) * m];
+                for (row, phi) in rows[3 * c * m..3 * (c + 1) * m].iter_mut().zip(from) {
+                    *row += w * phi;
+                }
+            }
+        }
+        let between = |c: usize, d: usize| {
+            let mut sum = DMat3::ZERO;
+            for (i, wi) in weights.of(c) {
+                for (j, wj) in weights.of(d) {
+                    sum += recording.residual.block(i, j) * (wi * wj);
+                }
+            }
+            sum
+        };
+        let own: Vec<DMat3> = (0..n).map(|c| between(c, c)).collect();
+        let roots = own.iter().map(root).collect();
+        let range = fit_range(recording, radius, &own, between);
+        let mut field = Self { radius, weights, rows, roots, range, bounds: Bounds::default() };
+        field.bounds = tree.bounds(
+            surface,
+            |i, c| modal_distance(recording, &field.rows, i, c),
+            |i| libm::sqrt(trace(&(field.roots[i] * field.roots[i].transpose()))),
+        );
+        field
+    }
+
+    /// A at a surface point.
+    ///
+    /// # Real time
+    pub(crate) fn root_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
+        let corners = recording.surface.corners(point);
+        corners.iter().map(|&(node, w)| self.roots[node] * w).fold(DMat3::ZERO, |a, b| a + b)
+    }
+
+    /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position.
+    ///
+    /// # Real time
+    pub(crate) fn dent(&self, recording: &Recording, node: usize, rest: DVec3, pull: DVec3) -> DVec3 {
+        let distance = (recording.surface.positions[node] - rest).length();
+        if distance < self.range {
+            self.roots[node] * pull * NearField::taper(distance / self.range)
+        } else {
+            DVec3::ZERO
+        }
+    }
+
+    /// K [m/N] between two places.
+    ///
+    /// # Real time
+    pub(crate) fn residual(&self, recording: &Recording, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
+        let distance = (recording.surface.rest_position(a) - recording.surface.rest_position(b)).length();
+        if distance >= self.range {
+            return DMat3::ZERO;
+        }
+        let (a, b) = (self.root_at(recording, a), self.root_at(recording, b));
+        a * b.transpose() * NearField::taper(distance / self.range)
+    }
+}
+
+/// √(Σ|rowᵢ − row_c|²/ω²) over modes and axes, or of row i alone.
+pub(crate) fn modal_distance(recording: &Recording, rows: &[f64], i: usize, c: Option<usize>) -> f64 {
+    let m = recording.modes.len();
+    let mut sum = 0.0;
+    for axis in 0..3 {
+        let row = |node: usize| &rows[(3 * node + axis) * m..][..m];
+        for (mode, omega) in recording.modes.angular_frequencies.iter().enumerate() {
+            let apart = row(i)[mode] - c.map_or(0.0, |c| row(c)[mode]);
+            sum += (apart / omega) * (apart / omega);
+        }
+    }
+    libm::sqrt(sum)
+}
+
+/// √tr(Sᵢᵢ) of a node.
+pub(crate) fn residual_size(recording: &Recording, node: usize) -> f64 {
+    libm::sqrt(trace(&recording.residual.block(node, node)))
+}
+
+fn trace(matrix: &DMat3) -> f64 {
+    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
+}
+
+/// Lower Cholesky factor of a positive semi-definite matrix; directions without compliance get none.
+fn root(matrix: &DMat3) -> DMat3 {
+    let mut lower = [[0.0; 3]; 3];
+    let entry = |i: usize, j: usize| matrix.col(j)[i];
+    let small = 1e-12 * trace(matrix);
+    for i in 0..3 {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            let rest = 0.5 * (entry(i, j) + entry(j, i)) - dot;
+            lower[i][j] = match (i == j, lower[j][j]) {
+                (true, _) => libm::sqrt(rest.max(0.0)),
+                (false, pivot) if pivot * pivot > small => rest / pivot,
+                _ => 0.0,
+            };
+        }
+    }
+    DMat3::from_cols_array_2d(&lower).transpose()
+}
+
+/// The range with which ψ comes nearest to how S falls off between patches.
+fn fit_range(
+    recording: &Recording,
+    radius: f64,
+    own: &[DMat3],
+    between: impl Fn(usize, usize) -> DMat3,
+) -> f64 {
+    let surface = &recording.surface;
+    let edge = surface.mean_edge();
+    let widest = 6.0 * (radius + edge);
+    let n = surface.positions.len();
+    let mut samples = Vec::new();
+    for c in (0..n).step_by((n / FIT_CENTRES).max(1)) {
+        // A few nodes at growing distances.
+        let mut wanted = 0.5 * edge;
+        for d in 0..n {
+            let distance = (surface.positions[d] - surface.positions[c]).length();
+            if d != c && distance < widest && distance > wanted {
+                let scale = libm::sqrt(trace(&own[c]) * trace(&own[d]));
+                if scale > 0.0 {
+                    samples.push((distance, trace(&between(c, d)) / scale));
+                }
+                wanted = if distance > 0.9 * widest { 0.5 * edge } else { distance };
+            }
+        }
+    }
+    let error = |range: f64| -> f64 {
+        let miss = |&(distance, share): &(f64, f64)| NearField::taper(distance / range) - share;
+        samples.iter().map(|sample| miss(sample) * miss(sample)).sum()
+    };
+    let candidates = (1..=48).map(|k| f64::from(k) / 48.0 * 2.0 * widest);
+    let least = (radius + edge).max(f64::MIN_POSITIVE);
+    candidates.map(|range| range.max(least)).min_by(|a, b| error(*a).total_cmp(&error(*b))).unwrap_or(least)
+}

@@ -1,0 +1,213 @@
+//! A tree of spheres over the surface that follows the deformation without being refitted.
+//!
+//! Every tree node has a surface node c as its centre. With the mode shapes φ, ω [rad/s] and the elastic
+//! energy E of the modes, Cauchy and Schwarz bound what any surface node i below does:
+//!
+//! ```text
+//! |uᵢ − u_c| ≤ √(Σ|φᵢ − φ_c|²/ω²) · √(2E)         |uᵢ| ≤ √(Σ|φᵢ|²/ω²) · √(2E)
+//! ```
+//!
+//! and likewise |uᵢ| ≤ √tr(Sᵢᵢ)·√(fᵀ·S·f) for the residual compliance S. So a sphere about the *moved* centre
+//! needs one number per energy, found once. This takes the place of the bounds on |q| of James & Pai's bounded
+//! deformation tree (2004, ACM Trans. Graph. 23, 393).
+
+use super::Surface;
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Triangles in a leaf: so many that their nodes are worth one test.
+const LEAF: usize = 4;
+
+/// A tree over the triangles; immutable.
+#[derive(Debug, Clone)]
+pub(crate) struct SurfaceTree {
+    nodes: Vec<TreeNode>,
+    triangles: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct TreeNode {
+    /// The surface node at the centre.
+    centre: u32,
+    /// Largest distance [m] at rest of a surface node below from the centre.
+    radius: f64,
+    /// Triangles below, in [`SurfaceTree::triangles`].
+    first: u32,
+    count: u32,
+    /// The second child; the first comes right after its parent. 0 for a leaf.
+    second: u32,
+}
+
+/// How far the surface nodes below a tree node can go: per √(2·energy of the modes) and per √(2·energy of the
+/// residual compliance) [m/√J].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Spread {
+    /// From where they are at rest.
+    modal: f64,
+    residual: f64,
+    /// From the way that the centre goes.
+    modal_apart: f64,
+}
+
+/// Spreads of all tree nodes, for one way to read the displacement.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Bounds {
+    spreads: Vec<Spread>,
+}
+
+/// How far a deformation can move surface nodes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Visit {
+    /// √(2·energy) [√J] of modes and residual compliance.
+    pub(crate) modal: f64,
+    pub(crate) residual: f64,
+    /// The most [m] that the residual compliance moves any node, where that is known.
+    pub(crate) most_residual: f64,
+}
+
+impl Visit {
+    fn reach(&self, spread: &Spread) -> f64 {
+        spread.modal * self.modal + (spread.residual * self.residual).min(self.most_residual)
+    }
+
+    fn apart(&self, spread: &Spread) -> f64 {
+        // The centre is known by its modes; the residual compliance moves it too.
+        spread.modal_apart * self.modal + (spread.residual * self.residual).min(self.most_residual)
+    }
+}
+
+impl SurfaceTree {
+    pub(crate) fn new(surface: &Surface) -> Self {
+        let mut tree = Self { nodes: Vec::new(), triangles: (0..surface.triangles.len() as u32).collect() };
+        let centres: Vec<DVec3> = (0..surface.triangles.len())
+            .map(|t| surface.triangles[t].iter().map(|&n| surface.positions[n as usize]).sum::<DVec3>() / 3.0)
+            .collect();
+        let count = tree.triangles.len();
+        if count > 0 {
+            tree.build(surface, &centres, 0, count);
+        }
+        tree
+    }
+
+    fn build(&mut self, surface: &Surface, centres: &[DVec3], first: usize, count: usize) {
+        let below = &mut self.triangles[first..first + count];
+        let corners = |t: &u32| surface.triangles[*t as usize].map(|n| surface.positions[n as usize]);
+        let points = || below.iter().flat_map(corners);
+        let low = points().reduce(DVec3::min).unwrap_or_default();
+        let high = points().reduce(DVec3::max).unwrap_or_default();
+        let middle = (low + high) * 0.5;
+        let nodes = below.iter().flat_map(|t| surface.triangles[*t as usize]);
+        let off = |node: &u32| (surface.positions[*node as usize] - middle).length_squared();
+        let centre = nodes.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default();
+        let at = surface.positions[centre as usize];
+        let radius = points().map(|p| (p - at).length()).fold(0.0, f64::max);
+        let place = self.nodes.len();
+        self.nodes.push(TreeNode { centre, radius, first: first as u32, count: count as u32, second: 0 });
+        if count > LEAF {
+            // Halves along the longest side.
+            let extent = high - low;
+            let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or_default();
+            let half = count / 2;
+            let key = |t: &u32| centres[*t as usize][axis];
+            below.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+            self.build(surface, centres, first, half);
+            self.nodes[place].second = self.nodes.len() as u32;
+            self.build(surface, centres, first + half, count - half);
+        }
+    }
+
+    /// Spreads for a way to read the displacement: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²), or √(Σ|φᵢ|²/ω²) without
+    /// c, and `residual(i)` √tr(Sᵢᵢ).
+    pub(crate) fn bounds(
+        &self,
+        surface: &Surface,
+        modal: impl Fn(usize, Option<usize>) -> f64,
+        residual: impl Fn(usize) -> f64,
+    ) -> Bounds {
+        let mut spreads = vec![Spread::default(); self.nodes.len()];
+        // Children come after their parents.
+        for at in (0..self.nodes.len()).rev() {
+            let node = self.nodes[at];
+            let c = node.centre as usize;
+            let mut spread = Spread::default();
+            if node.count as usize <= 16 * LEAF {
+                for triangle in self.triangles_of(&node) {
+                    for i in surface.triangles[triangle as usize] {
+                        let i = i as usize;
+                        spread.modal = spread.modal.max(modal(i, None));
+                        spread.residual = spread.residual.max(residual(i));
+                        if i != c {
+                            spread.modal_apart = spread.modal_apart.max(modal(i, Some(c)));
+                        }
+                    }
+                }
+            } else {
+                // Higher up, by way of the children's centres.
+                for child in [at + 1, node.second as usize] {
+                    let (below, middle) = (spreads[child], self.nodes[child].centre as usize);
+                    let far = if middle == c { 0.0 } else { modal(middle, Some(c)) };
+                    spread.modal = spread.modal.max(below.modal);
+                    spread.residual = spread.residual.max(below.residual);
+                    spread.modal_apart = spread.modal_apart.max(far + below.modal_apart);
+                }
+            }
+            spreads[at] = spread;
+        }
+        Bounds { spreads }
+    }
+
+    fn triangles_of(&self, node: &TreeNode) -> impl Iterator<Item = u32> + '_ {
+        self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
+    }
+
+    /// Walk through the tree: a sphere (node, centre, radius) is entered where `near` says so, first about the rest
+    /// position of a node, which is not named, then about where it is, and the triangles of the
+    /// leaves that are reached are given to `found`. `rest` tells where a surface node is at rest, `moved` where it
+    /// is now; all in one frame.
+    ///
+    /// # Real time
+    pub(crate) fn walk<C>(
+        &self,
+        (bounds, visit): (&Bounds, &Visit),
+        context: &mut C,
+        rest: impl Fn(&C, usize) -> DVec3,
+        moved: impl Fn(&mut C, usize) -> DVec3,
+        near: impl Fn(&mut C, Option<usize>, DVec3, f64) -> bool,
+        mut found: impl FnMut(&mut C, u32),
+    ) {
+        // Deeper than any tree of 2³² triangles.
+        let mut stack = [0_u32; 64];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let at = stack[depth] as usize;
+            let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
+            let c = node.centre as usize;
+            // The sphere that holds whatever the energies allow, then the one about the moved centre.
+            let at_rest = rest(context, c);
+            if !near(context, None, at_rest, node.radius + visit.reach(spread)) {
+                continue;
+            }
+            let centre = moved(context, c);
+            if !near(context, Some(c), centre, node.radius + visit.apart(spread)) {
+                continue;
+            }
+            if node.second == 0 {
+                self.triangles_of(node).for_each(|triangle| found(context, triangle));
+            } else {
+                stack[depth] = node.second;
+                stack[depth + 1] = at as u32 + 1;
+                depth += 2;
+            }
+        }
+    }
+}
+
+impl Bounds {
+    /// How far any surface node can be from rest [m].
+    pub(crate) fn reach(&self, visit: &Visit) -> f64 {
+        let root = self.spreads.first().copied().unwrap_or_default();
+        visit.reach(&root)
+    }
+}
