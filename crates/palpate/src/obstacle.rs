@@ -220,6 +220,11 @@ impl Shape {
         })
     }
 
+    /// Whether the middle of a triangle can come nearer to it than the corners, see [`Self::deepest`].
+    pub(crate) fn is_round(&self) -> bool {
+        matches!(self, Self::Sphere { .. } | Self::Capsule { .. })
+    }
+
     /// Weights of the point of a triangle that goes deepest into a round shape; those with corners meet the middle of
     /// a triangle with these.
     ///

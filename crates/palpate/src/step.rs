@@ -64,7 +64,9 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
 fn predict(model: &Model, state: &mut State) {
     for (at, own) in state.objects.iter_mut().enumerate() {
         let object = &model.objects[at];
-        Responding::new(model, at, &own.rigid, &mut own.response).predict();
+        let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
+        responding.predict();
+        own.points.predict(&mut responding);
         own.free = object.advance_rigid(&model.parameters, &own.rigid, DVec3::ZERO, DVec3::ZERO);
         let (now, free) = (own.response.coordinates(), own.response.free_coordinates());
         let omegas = &object.body.recording.modes.angular_frequencies;
@@ -151,7 +153,7 @@ fn prepare_contacts(model: &Model, state: &mut State) {
     for (at, own) in objects.iter_mut().enumerate() {
         let orientation = own.rigid.pose.orientation;
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
-        own.points.predict(&mut responding);
+        own.points.predict_fresh(&mut responding);
         if steps.is_multiple_of(RENEWED) || own.points.points.len() <= FEW {
             own.points.renew();
         }

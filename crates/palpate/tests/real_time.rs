@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
-    ModelParameters, ObjectStart, Pose, Recording, ResponseForm, Sampling, State, SurfacePoint, Twist, step,
+    ColumnsInMemory, Coupling, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model,
+    ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, ResponseForm, Sampling, Shape,
+    State, SurfacePoint, Twist, step,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -112,6 +113,43 @@ fn a_step_makes_no_allocation() {
         step(&model, &mut state, &input);
     }
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 200 steps");
+
+    // Tips, a floor, a ball that moves, two objects on one another.
+    let finger = DeviceParameters {
+        tip_radius: 0.004,
+        patch_radius: 0.02,
+        friction: 0.5,
+        coupling: Some(Coupling { stiffness: 200.0, damping: 0.1 }),
+    };
+    let plane = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
+    let ball = Obstacle { shape: Shape::Sphere { radius: 0.03 }, ..plane.clone() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters { patch_radius: 0.0, ..finger }, finger],
+        obstacles: vec![plane, ball],
+        gravity: DVec3::Y * -9.81,
+        ..ModelParameters::default()
+    };
+    let lying = |y: f64| ObjectStart {
+        pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY },
+        twist: Twist { linear: DVec3::X * 0.1, angular: DVec3::Z * 2.0 },
+    };
+    let objects = [0.08, 0.2].map(|y| ModelObject::new(free.clone(), lying(y)));
+    let model = Model::new(parameters, objects.to_vec()).expect("a good model");
+    let mut state = State::new(&model);
+    let mut input =
+        Input { devices: vec![DeviceInput::touching(DVec3::ZERO); 2], obstacles: vec![Pose::IDENTITY; 2] };
+    let (before, mut most) = (ALLOCATIONS.get(), 0);
+    for number in 0..600_u32 {
+        let t = f64::from(number) * 1e-3;
+        let object = state.output().objects[1].pose.position;
+        let reach = 0.14 - 0.06 * t;
+        input.devices[0].position = object + DVec3::new(reach, 0.01 * (20.0 * t).sin(), 0.0);
+        input.devices[1].position = object - DVec3::X * reach * if number % 97 == 0 { -1.0 } else { 1.0 };
+        input.obstacles[1].position = DVec3::new(0.0, 0.05, 0.2 - 0.3 * t);
+        most = most.max(step(&model, &mut state, &input).contacts.len());
+    }
+    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 600 steps of touching");
+    assert!(most > 5, "{most} contacts at once");
 
     // The counter counts.
     let probe = Box::new(0_u64);

@@ -75,7 +75,7 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
     let cache = &mut scene.caches[at];
     let step = Ok(scene.step);
     let sight = &mut Sight::new(body, Reading::Point, &own.response, &own.points, cache, step);
-    sight.widen(own.response.free_coordinates());
+    sight.widen();
     let all = object.radius + sight.reach() + way + encounter.margin;
     if apart - all > obstacle.shape.radius() {
         return;
@@ -99,7 +99,6 @@ impl Encounter<'_> {
 
     /// The nodes, and for round obstacles the middles of triangles.
     fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList) {
-        let next = self.own.response.free_coordinates();
         let dent = sight.most_dent();
         sight.begin_visit();
         sight.walk(
@@ -110,7 +109,7 @@ impl Encounter<'_> {
                     None => self.distance(centre, reach + self.way) < reach + self.way,
                     Some(node) => {
                         self.distance(centre, reach) < reach
-                            || self.distance_after(sight.free_node(node, next), reach) < reach
+                            || self.distance_after(sight.free_node(node), reach) < reach
                     }
                 }
             },
@@ -119,7 +118,7 @@ impl Encounter<'_> {
                     if !sight.first_visit(node) {
                         continue;
                     }
-                    let free = sight.free_node(node, next);
+                    let free = sight.free_node(node);
                     let place = match known.binary_search_by(|c| c.key.feature.cmp(&(node as u64))) {
                         Ok(contact) => {
                             let point = self.own.points.of(known[contact].slot);
@@ -145,6 +144,9 @@ impl Encounter<'_> {
 
     /// The middle of a triangle, where a round obstacle comes nearer to it than to its nodes.
     fn middle(&self, sight: &mut Sight, triangle: u32, dent: f64, wanted: &mut WantedList) {
+        if !self.obstacle.shape.is_round() {
+            return;
+        }
         let corners = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
         let places = corners.map(|node| sight.smooth(node));
         let local = |p: DVec3| self.before.body_from_world(self.own.rigid.pose.world_from_body(p));
@@ -161,9 +163,7 @@ impl Encounter<'_> {
         if deep > self.margin + dent + self.beside || places.iter().any(nearer) {
             return;
         }
-        let next = self.own.response.free_coordinates();
-        let (exact, ends) =
-            (corners.map(|node| sight.node(node)), corners.map(|node| sight.free_node(node, next)));
+        let (exact, ends) = (corners.map(|node| sight.node(node)), corners.map(|node| sight.free_node(node)));
         let feature = self.body.recording.surface.positions.len() + triangle as usize;
         let point = SurfacePoint { triangle, weights };
         self.meet(wanted, at_weights(exact, weights), at_weights(ends, weights), point, feature);
@@ -251,7 +251,7 @@ impl Encounter<'_> {
                 let point = start.body_from_world(self.before.world_from_body(place));
                 let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
                 let approach = Approach { point, way, known, edge: self.body.edge };
-                if let Some((point, normal)) = meeting(search, sight, self.own, &approach) {
+                if let Some((point, normal)) = meeting(search, sight, &approach) {
                     self.want(wanted, feature, point, start.orientation * normal, place);
                 }
             },

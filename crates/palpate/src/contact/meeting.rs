@@ -1,7 +1,6 @@
 //! A point against the deformed surface of an object: a node of another one, a corner of an obstacle.
 
 use super::search::{Search, Sight};
-use crate::state::ObjectState;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
 
@@ -30,7 +29,6 @@ pub(crate) struct Approach {
 pub(crate) fn meeting(
     search: &mut Search,
     sight: &mut Sight,
-    own: &ObjectState,
     approach: &Approach,
 ) -> Option<(SurfacePoint, DVec3)> {
     let Approach { point, way, known, edge } = *approach;
@@ -41,7 +39,7 @@ pub(crate) fn meeting(
     let inside = search.is_inside(point);
     let gap = if inside { -nearest.distance } else { nearest.distance };
     // From outside, what can close in the step; from inside, what was in contact or has just come in.
-    let closes = gap < near + 1.5 * (way + sight.deformation(&nearest, own.response.free_coordinates()));
+    let closes = gap < near + 1.5 * (way + sight.deformation(&nearest));
     if !closes || gap < -DEEPEST * edge && !known {
         return None;
     }

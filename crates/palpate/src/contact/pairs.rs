@@ -94,7 +94,7 @@ impl Finding<'_> {
             }
             None => sight.node(node),
         };
-        let free = sight.free_node(node, own.response.free_coordinates());
+        let free = sight.free_node(node);
         let deforms = (free - sight.smooth(node)).length();
         let p = other.rigid.pose.body_from_world(own.rigid.pose.world_from_body(place));
 
@@ -102,7 +102,7 @@ impl Finding<'_> {
         let mut sight =
             Sight::new(&base.body, Reading::Point, &other.response, &other.points, cache, Ok(self.step));
         let approach = Approach { point: p, way: moves + deforms, known: known.is_some(), edge };
-        let Some((point, normal)) = meeting(self.search, &mut sight, other, &approach) else { return };
+        let Some((point, normal)) = meeting(self.search, &mut sight, &approach) else { return };
         self.wanted.push(Wanted {
             key,
             place: Place { point, reading: Reading::Point },

@@ -14,6 +14,10 @@ pub(crate) struct ContactPoint {
     pub(crate) place: Place,
     /// Its rows in the response; stays the same while the point lasts.
     pub(crate) slot: usize,
+    /// The surface node that it is, if it is one.
+    pub(crate) node: Option<usize>,
+    /// Whether it came to its place in this step.
+    pub(crate) fresh: bool,
     /// Rest position [m, body].
     pub(crate) rest: DVec3,
     /// Where it is at the start of the step.
@@ -94,6 +98,8 @@ impl ContactPoints {
         self.points.push(ContactPoint {
             place,
             slot,
+            node: None,
+            fresh: true,
             rest: DVec3::ZERO,
             placed: Placed::default(),
             free: DVec3::ZERO,
@@ -117,7 +123,9 @@ impl ContactPoints {
         let placed = responding.place(slot, &place);
         let rest = responding.body.recording.surface.rest_position(&place.point);
         let point = &mut self.points[at];
-        (point.place, point.rest, point.placed) = (place, rest, placed);
+        (point.place, point.rest, point.placed, point.fresh) = (place, rest, placed, true);
+        let corners = responding.body.recording.surface.corners(&place.point);
+        point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
         for other in 0..self.points.len() {
             let (a, b) = (self.points[at], self.points[other]);
             let block = responding.response.compliance(
@@ -271,6 +279,16 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn predict(&mut self, responding: &mut Responding) {
         for point in &mut self.points {
+            point.free = responding.free(point.slot, &point.placed);
+            point.fresh = false;
+        }
+    }
+
+    /// The same for those that are new since then.
+    ///
+    /// # Real time
+    pub(crate) fn predict_fresh(&mut self, responding: &mut Responding) {
+        for point in self.points.iter_mut().filter(|point| point.fresh) {
             point.free = responding.free(point.slot, &point.placed);
         }
     }

@@ -41,9 +41,9 @@ pub(crate) fn stand(sight: &mut Sight, found: &Found, p: DVec3, tip: f64) -> Sta
     let nearest = Standing { triangle: found.triangle, weights: found.weights, normal: found.normal };
     let away = p - found.position;
     let distance = away.length();
-    let clear = distance > 0.3 * tip && away.dot(found.normal) > 0.0;
-    if clear && on_crease(sight, found) {
-        // Over an edge the tip rolls.
+    // Over an edge the tip rolls, if it is outside of one of its faces.
+    let side = outer_side(sight, found, away);
+    if distance > 0.3 * tip && side.is_some_and(|side| side > 0.0) {
         return Standing { normal: away / distance, ..nearest };
     }
     let mut triangle = found.triangle;
@@ -85,25 +85,27 @@ pub(crate) fn stand(sight: &mut Sight, found: &Found, p: DVec3, tip: f64) -> Sta
     nearest
 }
 
-/// Whether a found point lies on an edge or a corner with a crease.
-fn on_crease(sight: &mut Sight, found: &Found) -> bool {
-    let corners = sight.body.recording.surface.triangles[found.triangle as usize];
-    let zero: usize = found.weights.iter().filter(|w| **w < ON_EDGE).count();
-    let used = |k: usize| found.weights[k] >= ON_EDGE;
-    match zero {
-        0 => false,
-        1 => {
-            let on: [usize; 2] =
-                core::array::from_fn(|n| (0..3).filter(|&k| used(k)).nth(n).unwrap_or_default());
-            let over = sight.body.across(found.triangle, corners[on[0]], corners[on[1]]);
-            over.is_none_or(|over| face_normal(sight, over).dot(found.normal) < CREASE)
-        }
-        _ => {
-            let Some(corner) = (0..3).find(|&k| used(k)) else { return false };
-            let around = sight.body.around(corners[corner] as usize);
-            around.iter().any(|&t| face_normal(sight, t).dot(found.normal) < CREASE)
-        }
+/// For a found point on an edge or a corner with a crease: how far a direction leads out of the face that it leads out
+/// of most. None elsewhere.
+fn outer_side(sight: &mut Sight, found: &Found, away: DVec3) -> Option<f64> {
+    let body = sight.body;
+    let corners = body.recording.surface.triangles[found.triangle as usize];
+    let mut on = corners.iter().zip(found.weights).filter(|(_, w)| *w >= ON_EDGE).map(|(node, _)| *node);
+    let (mut crease, mut most) = (false, away.dot(found.normal));
+    let mut look = |sight: &mut Sight, triangle: u32| {
+        let normal = face_normal(sight, triangle);
+        crease |= normal.dot(found.normal) < CREASE;
+        most = most.max(away.dot(normal));
+    };
+    match (on.next(), on.next(), on.next()) {
+        (Some(a), Some(b), None) => match body.across(found.triangle, a, b) {
+            Some(over) => look(sight, over),
+            None => return Some(most),
+        },
+        (Some(corner), None, None) => body.around(corner as usize).iter().for_each(|&t| look(sight, t)),
+        _ => {}
     }
+    crease.then_some(most)
 }
 
 fn face_normal(sight: &mut Sight, triangle: u32) -> DVec3 {

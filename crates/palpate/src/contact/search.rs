@@ -35,6 +35,9 @@ pub(crate) struct NodeCache {
     positions: Vec<DVec3>,
     stamps: Vec<u64>,
     now: u64,
+    /// At the end of the step without contact force.
+    free: Vec<DVec3>,
+    free_stamps: Vec<u64>,
     /// The same with dents: all of them, or some.
     whole: Vec<DVec3>,
     whole_stamps: Vec<u64>,
@@ -52,6 +55,8 @@ impl NodeCache {
             positions: vec![DVec3::ZERO; nodes],
             stamps: vec![0; nodes],
             now: 0,
+            free: vec![DVec3::ZERO; nodes],
+            free_stamps: vec![0; nodes],
             whole: vec![DVec3::ZERO; nodes],
             whole_stamps: vec![0; nodes],
             whole_now: 0,
@@ -62,8 +67,8 @@ impl NodeCache {
         }
     }
 
-    /// Begin a moment, with or without all dents. What is known of the same one stays.
-    fn begin(&mut self, moment: Option<(u64, Reading)>) {
+    /// Begin a moment, with or without all dents. What is known of the same one stays; says whether it is another.
+    fn begin(&mut self, moment: Option<(u64, Reading)>) -> bool {
         let same = moment.is_some() && self.moment == moment;
         if !same {
             self.now += 1;
@@ -72,6 +77,18 @@ impl NodeCache {
         if !same || self.some_dents {
             self.whole_now += 1;
             self.some_dents = false;
+        }
+        !same
+    }
+
+    /// Take over where contact points are that are nodes.
+    fn take_nodes(&mut self, points: &ContactPoints) {
+        for point in points.points.iter().filter(|point| point.place.reading == Reading::Point) {
+            let Some(node) = point.node else { continue };
+            let by_modes = point.placed.displacement - point.placed.residual;
+            self.positions[node] = point.rest + by_modes;
+            self.free[node] = point.rest + point.free - point.placed.sag;
+            (self.stamps[node], self.free_stamps[node]) = (self.now, self.now);
         }
     }
 }
@@ -82,6 +99,8 @@ pub(crate) struct Sight<'a> {
     reading: Reading,
     /// Modal coordinates.
     q: &'a [f64],
+    /// The same at the end of the step without contact force.
+    free: &'a [f64],
     /// Forces of the last step with their places.
     acting: &'a [Acting],
     /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does.
@@ -105,7 +124,9 @@ impl<'a> Sight<'a> {
             Ok(step) => (state.coordinates(), Some((step, reading))),
             Err(q) => (q, None),
         };
-        cache.begin(key);
+        if cache.begin(key) && reading == Reading::Point && moment.is_ok() {
+            cache.take_nodes(points);
+        }
         // No place goes farther by the residual compliance than where the forces act, or hardly.
         let same = points.points.iter().filter(|p| p.place.reading == reading);
         let beside = same.map(|p| p.placed.residual.length()).fold(0.0, f64::max);
@@ -114,7 +135,8 @@ impl<'a> Sight<'a> {
             residual: libm::sqrt(2.0 * state.residual_energy()),
             most_residual: 2.0 * beside,
         };
-        Self { body, reading, q, acting: state.acting(), own: [None; 4], flat: 0.0, cache, visit }
+        let free = state.free_coordinates();
+        Self { body, reading, q, free, acting: state.acting(), own: [None; 4], flat: 0.0, cache, visit }
     }
 
     /// Leave out the own dents of places within a distance [m]: a tip that presses is not beside itself.
@@ -150,23 +172,31 @@ impl<'a> Sight<'a> {
         core::mem::replace(&mut self.cache.visits[node], self.cache.visit) != self.cache.visit
     }
 
-    /// Let spheres hold also what other modal coordinates do.
-    pub(crate) fn widen(&mut self, q: &[f64]) {
-        self.visit.modal = self.visit.modal.max(libm::sqrt(self.body.norm_squared(q)));
+    /// Let spheres hold also what the step without contact force does.
+    pub(crate) fn widen(&mut self) {
+        self.visit.modal = self.visit.modal.max(libm::sqrt(self.body.norm_squared(self.free)));
     }
 
-    /// A node's place with other modal coordinates, without dents.
-    pub(crate) fn free_node(&self, node: usize, q: &[f64]) -> DVec3 {
+    /// A node's place by the modes at the end of the step without contact force.
+    pub(crate) fn free_node(&mut self, node: usize) -> DVec3 {
+        if self.cache.free_stamps[node] != self.cache.now {
+            self.cache.free_stamps[node] = self.cache.now;
+            self.cache.free[node] = self.rest(node) + self.displacement(node, self.free);
+        }
+        self.cache.free[node]
+    }
+
+    fn displacement(&self, node: usize, q: &[f64]) -> DVec3 {
         let m = q.len();
-        self.rest(node) + dot3(&self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)], q)
+        dot3(&self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)], q)
     }
 
-    /// How far the deformation goes from here to other modal coordinates at the corners of a triangle, at most [m].
-    pub(crate) fn deformation(&mut self, found: &Found, q: &[f64]) -> f64 {
+    /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
+    pub(crate) fn deformation(&mut self, found: &Found) -> f64 {
         let corners = self.body.recording.surface.triangles[found.triangle as usize];
         let mut most = 0.0_f64;
         for node in corners {
-            most = most.max((self.free_node(node as usize, q) - self.smooth(node as usize)).length());
+            most = most.max((self.free_node(node as usize) - self.smooth(node as usize)).length());
         }
         most
     }
@@ -175,9 +205,7 @@ impl<'a> Sight<'a> {
     pub(crate) fn smooth(&mut self, node: usize) -> DVec3 {
         if self.cache.stamps[node] != self.cache.now {
             self.cache.stamps[node] = self.cache.now;
-            let m = self.q.len();
-            let rows = &self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)];
-            self.cache.positions[node] = self.rest(node) + dot3(rows, self.q);
+            self.cache.positions[node] = self.rest(node) + self.displacement(node, self.q);
         }
         self.cache.positions[node]
     }

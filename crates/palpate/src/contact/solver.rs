@@ -39,7 +39,7 @@ const UNSOLVED: f64 = 1e-9;
 /// [`LOOSE`], as shares of the object's size: a face at rest on the floor is close at once, one that hits it gets loose.
 const FEW: usize = 24;
 const VISITS: u32 = 600;
-const CLOSE: f64 = 1e-9;
+const CLOSE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
 
 /// How an object moves rigidly with the forces, in linear terms about the last evaluation.
@@ -143,7 +143,7 @@ impl Solver {
         let many = self.members.len() > FEW;
         for at in bodies {
             let radius = parts.model.objects[at].radius;
-            parts.objects[at].points.least_move = if many { 1e-3 * CLOSE * radius } else { 0.0 };
+            parts.objects[at].points.least_move = if many { 0.03 * CLOSE * radius } else { 0.0 };
             parts.start(at);
             reach =
                 reach.max(parts.objects[at].rigid.pose.position.length() + parts.model.objects[at].radius);

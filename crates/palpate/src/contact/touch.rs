@@ -144,7 +144,7 @@ pub(crate) fn touch(
     // The surface here moves about as its nearest nodes do.
     let mut motion = motion;
     if let Some(nearest) = scene.search.found.first().copied() {
-        let local = 1.5 * sight.deformation(&nearest, own.response.free_coordinates());
+        let local = 1.5 * sight.deformation(&nearest);
         motion = motion.min(travel + local + 0.01 * body.edge);
     }
     // Slow: whatever can be met in the step is near now. Fast: what is touched now, and what comes in the way.

@@ -1,0 +1,351 @@
+//! Touch: what contacts must do, on the released sample recordings (a block of 0.2 × 0.1 × 0.1 m).
+
+use glam::DVec3;
+use palpate::{
+    Against, Coupling, DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Obstacle, Output, Pose, Recording, Shape, State, SurfacePoint, Twist, step,
+};
+use std::sync::Arc;
+
+const H: f64 = 1e-3;
+const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+
+fn block() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+fn fixed() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../data/recordings/v1/fixed.palp");
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+fn at(position: DVec3) -> ObjectStart {
+    ObjectStart { pose: Pose { position, ..Pose::IDENTITY }, twist: Twist::ZERO }
+}
+
+fn scene(parameters: ModelParameters, objects: Vec<ModelObject>) -> (Model, State) {
+    let model = Model::new(parameters, objects).expect("a good model");
+    let state = State::new(&model);
+    (model, state)
+}
+
+fn finger(tip_radius: f64, patch_radius: f64, friction: f64) -> DeviceParameters {
+    DeviceParameters { tip_radius, patch_radius, friction, coupling: None }
+}
+
+fn floor(friction: f64) -> Obstacle {
+    Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction }
+}
+
+fn touching(positions: &[DVec3]) -> Input {
+    Input { devices: positions.iter().map(|&p| DeviceInput::touching(p)).collect(), ..Input::default() }
+}
+
+/// Half of the block's side along an axis, from its surface.
+fn half(recording: &Recording, axis: usize) -> f64 {
+    recording.surface.positions.iter().map(|p| p[axis]).fold(0.0, f64::max)
+}
+
+/// Numbers between −1 and 1 that follow from a seed.
+fn random(seed: &mut u64) -> f64 {
+    *seed ^= *seed << 13;
+    *seed ^= *seed >> 7;
+    *seed ^= *seed << 17;
+    (*seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn random_vector(seed: &mut u64) -> DVec3 {
+    DVec3::new(random(seed), random(seed), random(seed))
+}
+
+/// What a ledger lacks to be closed [J].
+fn open(output: &Output, start: f64) -> f64 {
+    let e = &output.energy;
+    e.stored() - start - (e.input - e.lost()) - e.defect
+}
+
+#[test]
+fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
+    let body = block();
+    // The node of a side face that is nearest to its middle: there a tip presses along x.
+    let side = half(&body, 0);
+    let middle = |n: &usize| (body.surface.positions[*n] - DVec3::X * side).length_squared();
+    let node =
+        (0..body.surface.positions.len()).min_by(|a, b| middle(a).total_cmp(&middle(b))).expect("nodes");
+    let place = body.surface.positions[node];
+    let triangle =
+        body.surface.triangles.iter().position(|t| t.contains(&(node as u32))).expect("a triangle");
+    let weights = body.surface.triangles[triangle].map(|n| if n as usize == node { 1.0 } else { 0.0 });
+    let grasp = Grasp { object: 0, point: SurfacePoint { triangle: triangle as u32, weights } };
+    let parameters = ModelParameters { devices: vec![finger(0.0, 0.0, 5.0)], ..ModelParameters::default() };
+    let (model, mut touched) =
+        scene(parameters.clone(), vec![ModelObject::new(body.clone(), at(DVec3::ZERO))]);
+    let (other, mut held) = scene(parameters, vec![ModelObject::new(body.clone(), at(DVec3::ZERO))]);
+    // The tip has a radius of a thousandth of an edge.
+    let tip = 1e-3 * body.surface.mean_edge();
+    let path = |t: f64| -DVec3::X * (0.01 * t - 0.2 * t * t * t) + DVec3::Y * (0.002 * t);
+    let mut compared = 0;
+    for number in 1..=150 {
+        let way = path(f64::from(number - 1) * H);
+        let a = step(&model, &mut touched, &touching(&[place + way + DVec3::X * tip])).clone();
+        let input = Input { devices: vec![DeviceInput::held(place + way, grasp)], ..Input::default() };
+        let b = step(&other, &mut held, &input);
+        let (touch, hold) = (a.devices[0].force_on_hand, b.devices[0].force_on_hand);
+        // Both begin where the node is.
+        if number > 2 {
+            let share = (touch - hold).length() / hold.length();
+            assert!(share < 1e-6, "step {number}: {touch} {hold}");
+            compared += 1;
+        }
+        assert!(a.contacts.iter().all(|c| c.slip_speed < 1e-9), "it sticks");
+    }
+    assert!(compared > 100);
+}
+
+#[test]
+fn the_force_of_a_coupling_is_its_stretch() {
+    let coupling = Coupling { stiffness: 300.0, damping: 0.4 };
+    let device = DeviceParameters { coupling: Some(coupling), ..finger(0.005, 0.0, 0.8) };
+    let body = block();
+    let side = half(&body, 0);
+    let parameters = ModelParameters { devices: vec![device; 2], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let mut before = [DVec3::ZERO; 2];
+    for number in 1..=600 {
+        let t = f64::from(number) * H;
+        let reach = side + 0.005 + 0.001 - 0.02 * t.min(0.2);
+        let hands = [DVec3::X * reach, DVec3::new(-reach, 0.003 * (30.0 * t).sin(), 0.0)];
+        let output = step(&model, &mut state, &touching(&hands));
+        for (device, hand) in hands.into_iter().enumerate() {
+            let stretch = hand - output.devices[device].proxy;
+            let force = -output.devices[device].force_on_hand;
+            let law = stretch * coupling.stiffness + (stretch - before[device]) * (coupling.damping / H);
+            assert!(force == DVec3::ZERO || (force - law).length() < 1e-9 * (1.0 + law.length()), "{number}");
+            before[device] = stretch;
+        }
+        assert!(open(output, 0.0).abs() < 1e-12);
+        assert!(output.energy.stored() <= output.energy.input + 1e-12);
+    }
+    assert!(before[0].length() > 1e-4, "it was pressed");
+}
+
+#[test]
+fn contacts_on_a_floor_carry_the_change_of_momentum() {
+    let body = block();
+    let mass = body.mass();
+    let parameters =
+        ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::default() };
+    let mut start = at(DVec3::Y * (half(&body, 1) + 0.004));
+    start.twist.linear = DVec3::X * 0.3;
+    let low = -half(&body, 1);
+    let face = body.surface.positions.iter().filter(|p| (p.y - low).abs() < 1e-9).count();
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, start)]);
+    let stored = state.output().energy.stored();
+    let mut momentum = start.twist.linear * mass;
+    let mut most = 0;
+    for number in 0..1500 {
+        let output = step(&model, &mut state, &Input::default());
+        let force: DVec3 = output.contacts.iter().map(|c| c.force).sum();
+        momentum += (force + GRAVITY * mass) * H;
+        let error = (output.objects[0].twist.linear * mass - momentum).length();
+        assert!(error < 1e-12, "step {number}: {error}");
+        most = most.max(output.contacts.len());
+        for contact in &output.contacts {
+            assert_eq!(contact.against, Against::Obstacle(0));
+            let normal = contact.force.dot(-contact.normal);
+            let across = (contact.force + contact.normal * normal).length();
+            assert!(normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9), "in the cone");
+            assert!(contact.gap > -1e-6, "no deeper than the solver leaves: {}", contact.gap);
+        }
+        // It never has more than at the start, and the ledger says where the rest went.
+        assert!(output.energy.stored() <= stored + 1e-12 && open(output, stored).abs() < 1e-12);
+    }
+    let output = state.output();
+    assert_eq!(most, face, "the whole face touches");
+    assert!(output.objects[0].twist.linear.length() < 0.05, "friction has stopped it");
+    assert!(
+        output.energy.friction > 0.5 * 0.5 * mass * 0.09,
+        "by taking its energy: {}",
+        output.energy.friction
+    );
+}
+
+#[test]
+fn a_fast_finger_does_not_pass_through() {
+    // Ten times the block's size in a step, straight through it: met on the near side.
+    let body = block();
+    let side = half(&body, 1);
+    let device = DeviceParameters {
+        coupling: Some(Coupling { stiffness: 50.0, damping: 0.0 }),
+        ..finger(0.002, 0.0, 0.0)
+    };
+    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    step(&model, &mut state, &touching(&[DVec3::Y * 10.0 * side]));
+    let output = step(&model, &mut state, &touching(&[-DVec3::Y * 10.0 * side]));
+    assert_eq!(output.contacts.len(), 1);
+    assert!(output.contacts[0].normal.y > 0.99, "{:?}", output.contacts[0]);
+    assert!(output.devices[0].force_on_hand.y > 0.0);
+    assert!(output.devices[0].proxy.y > output.objects[0].pose.position.y, "on the side that it came from");
+}
+
+#[test]
+fn a_finger_that_begins_inside_touches_nothing_until_it_has_come_out() {
+    let body = block();
+    let side = half(&body, 1);
+    let parameters = ModelParameters { devices: vec![finger(0.002, 0.0, 0.5)], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    for y in [0.0, 0.3, 0.6, 0.9] {
+        let output = step(&model, &mut state, &touching(&[DVec3::Y * y * side]));
+        assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO, "inside at {y}");
+    }
+    for y in [1.2, 1.05, 0.98] {
+        step(&model, &mut state, &touching(&[DVec3::Y * y * side]));
+    }
+    assert!(state.output().devices[0].force_on_hand.y > 0.0, "it came back from outside");
+}
+
+#[test]
+fn whatever_fingers_do_no_energy_comes_out_and_everything_stays_finite() {
+    for (seed, coupling) in [(1, None), (2, Some(Coupling { stiffness: 100.0, damping: 0.2 }))] {
+        let mut seed: u64 = 88_172_645 + 7919 * seed;
+        let device = |tip, patch, friction| DeviceParameters { coupling, ..finger(tip, patch, friction) };
+        let devices = vec![device(0.01, 0.03, 0.6), device(0.0, 0.0, 0.0), device(0.003, 0.0, 1.2)];
+        let parameters = ModelParameters { devices, ..ModelParameters::default() };
+        let (model, mut state) = scene(parameters, vec![ModelObject::new(block(), at(DVec3::ZERO))]);
+        let mut hands = [DVec3::ONE; 3];
+        let (mut kinds, mut goals) = ([0; 3], [DVec3::ZERO; 3]);
+        let mut touches = 0;
+        for number in 0..8000 {
+            let centre = state.output().objects[0].pose.position;
+            for device in 0..3 {
+                if random(&mut seed) > 0.98 {
+                    kinds[device] = (3.5 * (1.0 + random(&mut seed))) as i32;
+                    goals[device] = random_vector(&mut seed) * 0.15;
+                }
+                hands[device] = match kinds[device] {
+                    0 => centre + goals[device],
+                    1 => centre + random_vector(&mut seed) * 0.2,
+                    2 => hands[device] + (centre - hands[device]) * 0.03,
+                    3 => centre + goals[device] * if number % 2 == 0 { 1.0 } else { 0.85 },
+                    4 => DVec3::splat(f64::NAN),
+                    5 => hands[device] + random_vector(&mut seed) * 0.003,
+                    _ => centre + goals[device] * 2.0,
+                };
+            }
+            let output = step(&model, &mut state, &touching(&hands));
+            for hand in hands.iter_mut().filter(|hand| !hand.is_finite()) {
+                *hand = centre + DVec3::X;
+            }
+            touches += output.contacts.len();
+            let energy = &output.energy;
+            let size = 1.0 + energy.input.abs();
+            assert!(energy.stored() <= energy.input + 1e-9 * size, "step {number}: {energy:?}");
+            assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
+            let sound = |d: &palpate::DeviceOutput| d.force_on_hand.is_finite() && d.proxy.is_finite();
+            assert!(output.devices.iter().all(sound), "step {number}");
+        }
+        assert!(touches > 1000, "{touches} touches");
+    }
+}
+
+#[test]
+fn objects_push_each_other_with_opposite_forces() {
+    // Two blocks fly at each other without gravity: momentum stays, energy does not grow.
+    let body = block();
+    let mass = body.mass();
+    let gap = 2.0 * half(&body, 0) + 0.002;
+    let mut left = at(DVec3::ZERO);
+    let mut right = at(DVec3::new(gap, 0.01, 0.0));
+    (left.twist.linear, right.twist.linear) = (DVec3::X * 0.2, -DVec3::X * 0.3);
+    let objects = vec![ModelObject::new(body.clone(), left), ModelObject::new(body, right)];
+    let (model, mut state) = scene(ModelParameters::default(), objects);
+    let start = state.output().energy.stored();
+    let mut met = false;
+    for _ in 0..400 {
+        let output = step(&model, &mut state, &Input::default());
+        met |= !output.contacts.is_empty();
+        let momentum: DVec3 = output.objects.iter().map(|o| o.twist.linear * mass).sum();
+        assert!((momentum - DVec3::X * (-0.1 * mass)).length() < 1e-13, "{momentum}");
+        assert!(output.energy.stored() <= start + 1e-12 && open(output, start).abs() < 1e-12);
+        assert!(output.energy.input.abs() < 1e-12, "no work from outside");
+    }
+    let output = state.output();
+    let apart = output.objects[1].twist.linear.x - output.objects[0].twist.linear.x;
+    assert!(met && apart > 0.0, "they fly apart: {apart}");
+}
+
+#[test]
+fn an_obstacle_that_moves_takes_an_object_along_and_its_work_is_counted() {
+    let body = block();
+    let ball = Obstacle {
+        shape: Shape::Sphere { radius: 0.04 },
+        pose: Pose { position: -DVec3::X * (half(&body, 0) + 0.045), ..Pose::IDENTITY },
+        friction: 0.3,
+    };
+    let parameters = ModelParameters { obstacles: vec![ball.clone()], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    for number in 1..=400 {
+        let position = ball.pose.position + DVec3::X * (0.2 * f64::from(number) * H);
+        let input = Input { obstacles: vec![Pose { position, ..ball.pose }], ..Input::default() };
+        let output = step(&model, &mut state, &input);
+        assert!(open(output, 0.0).abs() < 1e-12);
+        assert!(output.energy.stored() <= output.energy.input + 1e-12);
+    }
+    let output = state.output();
+    assert!(output.objects[0].twist.linear.x > 0.15, "{:?}", output.objects[0].twist);
+    assert!(output.energy.input > 0.0);
+}
+
+#[test]
+fn numbers_out_of_range_are_refused_by_name() {
+    let refused = |parameters: ModelParameters| {
+        let objects = vec![ModelObject::new(block(), at(DVec3::ZERO))];
+        Model::new(parameters, objects).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let devices = |device| ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    assert_eq!(
+        refused(devices(finger(-1.0, 0.0, 0.0))),
+        "device 0: tip_radius is -1 m, expected a number not below 0"
+    );
+    assert_eq!(
+        refused(devices(finger(0.0, f64::NAN, 0.0))),
+        "device 0: patch_radius is NaN m, expected a number not below 0"
+    );
+    let weak = Coupling { stiffness: 0.0, damping: 0.0 };
+    assert_eq!(
+        refused(devices(DeviceParameters { coupling: Some(weak), ..finger(0.0, 0.0, 0.0) })),
+        "device 0: coupling stiffness is 0 N/m, expected a positive number"
+    );
+    let obstacles = |shape| ModelParameters {
+        obstacles: vec![Obstacle { shape, pose: Pose::IDENTITY, friction: 0.1 }],
+        ..ModelParameters::default()
+    };
+    assert_eq!(
+        refused(obstacles(Shape::Plane { normal: DVec3::Y * 2.0 })),
+        "obstacle 0: normal has length 2, expected 1"
+    );
+    assert_eq!(
+        refused(obstacles(Shape::Sphere { radius: f64::NAN })),
+        "obstacle 0: radius is NaN m, expected a positive number"
+    );
+}
+
+#[test]
+fn a_body_with_fixed_nodes_is_touched_as_well() {
+    let body = fixed();
+    let top = body.surface.positions.iter().copied().max_by(|a, b| a.y.total_cmp(&b.y)).expect("nodes");
+    let parameters =
+        ModelParameters { devices: vec![finger(0.003, 0.02, 0.5)], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let mut last = 0.0;
+    for number in 1..=300 {
+        let depth = 2e-5 * f64::from(number).min(100.0);
+        let tip = DVec3::new(0.5 * top.x, top.y + 0.003 + 1e-4 - depth, 0.5 * top.z);
+        let output = step(&model, &mut state, &touching(&[tip]));
+        last = output.devices[0].force_on_hand.y;
+        assert!(open(output, 0.0).abs() < 1e-12);
+    }
+    assert!(last > 0.0, "{last}");
+}
