@@ -95,7 +95,8 @@ fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
         // Both begin where the node is.
         if number > 2 {
             let share = (touch - hold).length() / hold.length();
-            assert!(share < 1e-6, "step {number}: {touch} {hold}");
+            // The finger meets the surface a few micrometres beside the node, on cells of centimetres.
+            assert!(share < 1e-5, "step {number}: {touch} {hold}");
             compared += 1;
         }
         assert!(a.contacts.iter().all(|c| c.slip_speed < 1e-9), "it sticks");
