@@ -51,13 +51,34 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     move_obstacles(state, input);
     find_contacts(model, state, input);
     prepare_contacts(model, state);
-    let State { objects, devices, contacts, workspace, output, .. } = &mut *state;
-    let mut parts = Parts { model, objects, devices, contacts };
-    workspace.solver.solve(&mut parts, &mut output.status);
+    solve(model, state);
     advance(model, state);
     state.steps += 1;
     write_output(model, state, input);
     &state.output
+}
+
+/// Stage 3: the forces. What contacts push out must be paid for by what was lost before: if it is not, they stay where
+/// they are, and in the last resort they give no force.
+fn solve(model: &Model, state: &mut State) {
+    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let paid = output.energy.lost().max(0.0);
+    let mut parts = Parts { model, objects, devices, contacts };
+    for attempt in 0..3 {
+        let mut status = output.status;
+        workspace.solver.solve(&mut parts, &mut status);
+        let taken: f64 = parts.contacts.iter().map(Contact::taken).sum();
+        if taken + paid >= 0.0 || attempt == 2 {
+            output.status = status;
+            return;
+        }
+        for contact in parts.contacts.iter_mut().filter(|contact| contact.law != Law::Held) {
+            contact.least_gap = match attempt {
+                0 => contact.gap(contact.start).min(0.0),
+                _ => f64::NEG_INFINITY,
+            };
+        }
+    }
 }
 
 /// Stage 1: every object at the end of the step without contact force.
@@ -186,9 +207,8 @@ fn prepare_contacts(model: &Model, state: &mut State) {
         let gap = contact.gap(contact.start);
         contact.least_gap = 0.0;
         if gap < 0.0 {
-            let force = contact.force.length();
             let push = RECOVERY * -gap;
-            let cost = 2.0 * force * push;
+            let cost = 2.0 * contact.force.length() * push;
             let paid = if cost > budget { 0.0 } else { push };
             budget -= if paid > 0.0 { cost } else { 0.0 };
             contact.least_gap = gap + paid;
@@ -199,8 +219,11 @@ fn prepare_contacts(model: &Model, state: &mut State) {
 /// Stages 4 and 5: hold the forces over the step, and account for the energy.
 fn advance(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
-    for contact in contacts.iter() {
+    for contact in contacts.iter_mut() {
         account(contact, objects);
+        // The guess for this step has left the last one's force there, reversed.
+        contact.trend =
+            if contact.trend == DVec3::ZERO { DVec3::ZERO } else { contact.force + contact.trend };
     }
     let mut unsolved = 0;
     for (at, own) in objects.iter_mut().enumerate() {

@@ -86,7 +86,8 @@ fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
     let tip = 1e-3 * body.surface.mean_edge();
     let path = |t: f64| -DVec3::X * (0.01 * t - 0.2 * t * t * t) + DVec3::Y * (0.002 * t);
     let mut compared = 0;
-    for number in 1..=150 {
+    // As long as it presses.
+    for number in 1..=105 {
         let way = path(f64::from(number - 1) * H);
         let a = step(&model, &mut touched, &touching(&[place + way + DVec3::X * tip])).clone();
         let input = Input { devices: vec![DeviceInput::held(place + way, grasp)], ..Input::default() };
@@ -101,7 +102,7 @@ fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
         }
         assert!(a.contacts.iter().all(|c| c.slip_speed < 1e-9), "it sticks");
     }
-    assert!(compared > 100);
+    assert!(compared > 90);
 }
 
 #[test]

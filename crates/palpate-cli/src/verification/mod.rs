@@ -7,9 +7,11 @@ mod bounce;
 mod compliance;
 mod frequencies;
 mod friction;
+mod hertz;
 mod impulse;
 mod motion;
 mod pinch;
+mod press;
 pub mod scene;
 mod spheres;
 mod waves;
@@ -139,6 +141,16 @@ pub const CASES: &[Case] = &[
         name: "friction",
         about: "a block begins to slide at tan θ = μ, and stops after v²/(2μg)",
         run: friction::friction,
+    },
+    Case {
+        name: "press",
+        about: "a finger of given radius feels the same on three meshes, as on a finer one",
+        run: press::press,
+    },
+    Case {
+        name: "hertz",
+        about: "a rigid ball pressed into an elastic block against Hertz's law",
+        run: hertz::indentation,
     },
 ];
 

@@ -114,6 +114,11 @@ impl Contact {
         moved - self.normal * self.normal.dot(moved)
     }
 
+    /// Work [J] that the contact takes over the step in all; held points take none.
+    pub(crate) fn taken(&self) -> f64 {
+        if self.law == Law::Held { 0.0 } else { self.force.dot(self.end - self.start) }
+    }
+
     /// Work [J] that the contact takes over the step: normal to the surface, and by friction.
     pub(crate) fn losses(&self) -> (f64, f64) {
         let moved = self.end - self.start;

@@ -211,9 +211,6 @@ impl Solver {
         }
         for &member in &self.members {
             let contact = parts.contacts[member as usize];
-            let contact_now = &mut parts.contacts[member as usize];
-            contact_now.trend =
-                if contact.trend == DVec3::ZERO { DVec3::ZERO } else { contact.force + contact.trend };
             parts.contacts[member as usize].end = parts.apart(&contact);
         }
     }

@@ -1,0 +1,88 @@
+//! A rigid ball is pressed into an elastic block, against Hertz's law.
+//!
+//! With E* = E/(1 − ν²), R the radius, δ the depth:
+//!
+//! ```text
+//! F = 4/3·E*·√R·δ^(3/2) · (1 + c₁χ + c₂χ² + c₃χ³ + c₄χ⁴)        χ = √(Rδ)/t
+//! ```
+//!
+//! The bracket is for a layer of thickness t on a rigid ground (Dimitriadis et al. 2002, Biophys. J. 82, 2798, equation
+//! 11 with the α₀, β₀ of a bonded layer); here it adds 3 to 5 %. The sides of the block are 20 contact radii away.
+
+use super::Check;
+use super::scene::{Stuff, Watch, at, scene};
+use crate::Failure;
+use glam::DVec3;
+use palpate::{Input, Obstacle, Pose, Recording, Shape, State, step};
+use palpate_fem::element::Order;
+use palpate_fem::mesh::{Mesh, box_mesh};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+const SIZE: [f64; 3] = [0.2, 0.1, 0.2];
+const RADIUS: f64 = 0.04;
+const GEL: Stuff = Stuff { young: 1e5, poisson: 0.3, density: 1000.0, beta: 5e-3 };
+
+/// Cells grow from the place of contact outwards by this, from first to last (e to the power of it).
+const GRADING: f64 = 4.0;
+
+/// A block whose cells are small in the middle of the upper face.
+fn graded(cells: u32) -> Result<Mesh, Failure> {
+    let mut mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
+    let half = 0.5 * SIZE[0];
+    let grade = |x: f64| half * (GRADING * x / half).sinh() / GRADING.sinh();
+    for node in &mut mesh.nodes {
+        let depth = 0.5 * SIZE[1] - node.y;
+        *node = DVec3::new(grade(node.x), 0.5 * SIZE[1] - grade(depth), grade(node.z));
+    }
+    Ok(mesh)
+}
+
+/// Hertz's force [N], with the correction for the thickness.
+fn hertz(depth: f64) -> f64 {
+    let nu = GEL.poisson;
+    let a = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
+    let b = (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1.0 - nu);
+    let chi = (RADIUS * depth).sqrt() / SIZE[1];
+    let layer = 1.0 - 2.0 * a / PI * chi + 4.0 * a * a / (PI * PI) * chi.powi(2)
+        - 8.0 / PI.powi(3) * (a.powi(3) + 4.0 * PI * PI / 15.0 * b) * chi.powi(3)
+        + 16.0 * a / PI.powi(4) * (a.powi(3) + 3.0 * PI * PI / 5.0 * b) * chi.powi(4);
+    4.0 / 3.0 * GEL.young / (1.0 - nu * nu) * RADIUS.sqrt() * depth.powf(1.5) * layer
+}
+
+/// Force [N] of a ball that has gone in and come to rest.
+fn pressed(body: &Arc<Recording>, depth: f64, watch: &mut Watch) -> Result<(f64, usize), Failure> {
+    let top = body.surface.positions.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
+    let ball = |down: f64| Pose { position: DVec3::Y * (top + RADIUS - down), ..Pose::IDENTITY };
+    let obstacle = Obstacle { shape: Shape::Sphere { radius: RADIUS }, pose: ball(-1e-4), friction: 0.0 };
+    let objects = vec![at(body, DVec3::ZERO, DVec3::ZERO)];
+    let model = scene(1e-3, DVec3::ZERO, vec![obstacle], Vec::new(), objects)?;
+    let mut state = State::new(&model);
+    watch.look(state.output());
+    for number in 1..=800 {
+        let s = (f64::from(number) / 300.0).min(1.0);
+        let down = (depth + 1e-4) * s * s * (3.0 - 2.0 * s) - 1e-4;
+        watch.look(step(&model, &mut state, &Input { obstacles: vec![ball(down)], ..Input::default() }));
+    }
+    let contacts = &state.output().contacts;
+    Ok((-contacts.iter().map(|contact| contact.force.y).sum::<f64>(), contacts.len()))
+}
+
+/// Linear and quadratic elements, at two depths.
+pub fn indentation() -> Result<Vec<Check>, Failure> {
+    let mut checks = Vec::new();
+    for (order, cells) in [(Order::Quadratic, 8), (Order::Quadratic, 12), (Order::Quadratic, 16)] {
+        let body = GEL.standing(graded(cells)?, order, 60, |node| node.y < -0.499 * SIZE[1])?;
+        let mut watch = Watch::default();
+        let mut forces = Vec::new();
+        for depth in [0.3e-3, 0.6e-3, 1.2e-3] {
+            let (force, points) = pressed(&body, depth, &mut watch)?;
+            forces.push(force);
+            let quantity =
+                format!("{order:?}, {cells} cells, depth {:.1} mm, {points} points [N]", depth * 1e3);
+            checks.push(Check::new(quantity, force, hertz(depth), 0.05));
+        }
+        checks.extend(watch.checks(&format!("{order:?}, {cells} cells")));
+    }
+    Ok(checks)
+}

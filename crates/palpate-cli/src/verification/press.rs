@@ -1,0 +1,148 @@
+//! A finger of given radius presses into the upper face of a block that stands on its lower face.
+//!
+//! A finger with patch radius a is the load k(|x − c|/a) over the surface, k(s) = (1 − s²)², and it feels the
+//! displacement averaged with the same weight. So force over displacement is 1/(nᵀ·wᵀ·G·w·n), with G the static
+//! compliance, whatever the mesh. The expected value is solved for on a finer mesh, with its own quadrature.
+
+use super::scene::{PAPER, Stuff, Watch, at, scene};
+use super::{Check, recorded};
+use crate::Failure;
+use faer::Mat;
+use glam::DVec3;
+use palpate::{DeviceInput, DeviceParameters, Input, Recording, State, step};
+use palpate_fem::element::Order;
+use palpate_fem::mesh::box_mesh;
+use palpate_fem::record::{Extent, RecordParameters};
+use palpate_fem::system::System;
+use std::sync::Arc;
+
+const SIZE: [f64; 3] = [0.1, 0.05, 0.1];
+const TIP: f64 = 0.005;
+const DEPTH: f64 = 1e-3;
+
+/// Four edges of the coarsest surface. Static compliance under the kernel converges with the mesh: quadratic elements
+/// with linear weights are 1 % too stiff at four edges, 4 % at three, 11 % at two, 15 to 20 % at one and a half.
+const PATCH: f64 = 0.038;
+
+/// The paper's material, damped so much that a press settles within a second.
+const CALM: Stuff = Stuff { beta: 0.02, ..PAPER };
+
+/// Places on the upper face [m]: its middle, and others within one cell of the coarsest mesh, 25 mm wide.
+const PLACES: [[f64; 2]; 5] =
+    [[0.0, 0.0], [0.003, 0.001], [0.0062, 0.0062], [0.0097, 0.0041], [0.0125, 0.002]];
+
+fn place([x, z]: [f64; 2]) -> DVec3 {
+    DVec3::new(x, 0.5 * SIZE[1], z)
+}
+
+fn standing(cells: u32, order: Order) -> Result<Arc<Recording>, Failure> {
+    let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
+    CALM.standing(mesh, order, 60, |node| node.y < -0.499 * SIZE[1])
+}
+
+/// Weights of the kernel about a point of the upper face, at the nodes of a finer mesh: each triangle's integral by
+/// the middles of 64 parts.
+fn kernel(system: &System, centre: DVec3) -> Vec<(usize, f64)> {
+    const PARTS: u32 = 8;
+    let mut weights = Vec::new();
+    for corners in &system.discretisation.triangles {
+        let places = corners.map(|node| system.discretisation.nodes[node as usize]);
+        if places.iter().any(|p| p.y < 0.499 * SIZE[1]) {
+            continue;
+        }
+        let area = (places[1] - places[0]).cross(places[2] - places[0]).length();
+        for i in 0..PARTS {
+            for j in 0..2 * (PARTS - i) - 1 {
+                // Upright and inverted parts of strip i.
+                let third = f64::from(1 + j % 2) / 3.0;
+                let u = (f64::from(i) + third) / f64::from(PARTS);
+                let v = (f64::from(j / 2) + third) / f64::from(PARTS);
+                let hats = [1.0 - u - v, u, v];
+                let x = places[0] * hats[0] + places[1] * hats[1] + places[2] * hats[2];
+                let s = (x - centre).length() / PATCH;
+                if s < 1.0 {
+                    let share = area * (1.0 - s * s).powi(2);
+                    weights.extend(corners.iter().zip(hats).map(|(&node, hat)| (node as usize, hat * share)));
+                }
+            }
+        }
+    }
+    let total: f64 = weights.iter().map(|(_, w)| w).sum();
+    weights.iter_mut().for_each(|(_, w)| *w /= total);
+    weights
+}
+
+/// Force per displacement [N/m] at each place, solved for on a mesh.
+fn stiffness(cells: u32) -> Result<Vec<f64>, Failure> {
+    let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
+    let fixed = (0..mesh.nodes.len()).filter(|&node| mesh.nodes[node].y < -0.499 * SIZE[1]);
+    let fixed_nodes = fixed.map(|node| node as u32).collect();
+    let parameters =
+        RecordParameters { fixed_nodes, extent: Extent::Body, ..CALM.parameters(Order::Quadratic, 1) };
+    let system = recorded(mesh, &parameters)?.system;
+    let kernels = PLACES.map(|at| kernel(&system, place(at)));
+    let mut loads = Mat::zeros(system.discretisation.dofs(), PLACES.len());
+    for (column, weights) in kernels.iter().enumerate() {
+        weights.iter().for_each(|&(node, w)| loads[(3 * node + 1, column)] += w);
+    }
+    let moved = system.elastic_compliance(loads);
+    let average = |(column, weights): (usize, &Vec<(usize, f64)>)| {
+        1.0 / weights.iter().map(|&(node, w)| w * moved[(3 * node + 1, column)]).sum::<f64>()
+    };
+    Ok(kernels.iter().enumerate().map(average).collect())
+}
+
+/// Force per displacement [N/m] that a finger feels when it has gone in and come to rest.
+fn pressed(body: &Arc<Recording>, at_place: [f64; 2], watch: &mut Watch) -> Result<f64, Failure> {
+    let finger = DeviceParameters { tip_radius: TIP, patch_radius: PATCH, ..DeviceParameters::default() };
+    // The body frame's origin is the centre of mass, here the centre of the block.
+    let objects = vec![at(body, DVec3::ZERO, DVec3::ZERO)];
+    let model = scene(1e-3, DVec3::ZERO, Vec::new(), vec![finger], objects)?;
+    let mut state = State::new(&model);
+    watch.look(state.output());
+    let mut force = 0.0;
+    for number in 1..=1200 {
+        let s = (f64::from(number) / 200.0).min(1.0);
+        // From a tenth of a millimetre above.
+        let down = (DEPTH + 1e-4) * s * s * (3.0 - 2.0 * s) - 1e-4;
+        let hand = place(at_place) + DVec3::Y * (TIP - down);
+        let input = Input { devices: vec![DeviceInput::touching(hand)], ..Input::default() };
+        let output = step(&model, &mut state, &input);
+        watch.look(output);
+        force = output.devices[0].force_on_hand.y;
+    }
+    Ok(force / DEPTH)
+}
+
+/// A twentieth is less than a hand can tell apart, 7 % of a force (Jones 1989, Perception 18, 681).
+const UNFELT: f64 = 0.05;
+
+/// Three meshes against a finer one, at five places within a cell.
+pub fn press() -> Result<Vec<Check>, Failure> {
+    let exact = stiffness(16)?;
+    let coarser = stiffness(12)?;
+    let mut checks =
+        vec![Check::new("expected stiffness, 12 cells against 16 [N/m]", coarser[0], exact[0], 2e-3)];
+    for cells in [6, 8, 10] {
+        let body = standing(cells, Order::Quadratic)?;
+        let mut watch = Watch::default();
+        let mut ratios = Vec::new();
+        for (number, at_place) in PLACES.into_iter().enumerate() {
+            let felt = pressed(&body, at_place, &mut watch)?;
+            ratios.push(felt / exact[number]);
+            if number == 0 {
+                let quantity = format!("force per displacement, {cells} cells [N/m]");
+                checks.push(Check::new(quantity, felt, exact[0], 0.02));
+            }
+        }
+        let worst = ratios.iter().map(|ratio| (ratio - 1.0).abs()).fold(0.0, f64::max);
+        let quantity =
+            format!("the same at {} places within a cell, {cells} cells, worst error", PLACES.len());
+        checks.push(Check::new(quantity, worst, 0.0, UNFELT));
+        let texture =
+            ratios.iter().fold(0.0, |a: f64, r| a.max(*r)) - ratios.iter().fold(9.0, |a: f64, r| a.min(*r));
+        checks.push(Check::new(format!("texture: from place to place, {cells} cells"), texture, 0.0, UNFELT));
+        checks.extend(watch.checks(&format!("{cells} cells")));
+    }
+    Ok(checks)
+}
