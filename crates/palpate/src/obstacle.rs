@@ -119,7 +119,7 @@ impl ObstacleMesh {
     }
 
     fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
-        let still = Visit { modal: 0.0, residual: 0.0, most_residual: 0.0 };
+        let still = Visit::STILL;
         let place = |n: usize| self.surface.positions[n];
         self.tree.walk(
             (&self.bounds, &still),
@@ -144,7 +144,7 @@ impl ObstacleMesh {
         }
         // However far: which side it is on counts. (least distance, nearest point, normal that tells the side).
         let best = core::cell::Cell::new((f64::INFINITY, DVec3::ZERO, DVec3::ZERO));
-        let still = Visit { modal: 0.0, residual: 0.0, most_residual: 0.0 };
+        let still = Visit::STILL;
         let place = |n: usize| self.surface.positions[n];
         self.tree.walk(
             (&self.bounds, &still),

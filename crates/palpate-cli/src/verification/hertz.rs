@@ -7,7 +7,9 @@
 //! ```
 //!
 //! The bracket is for a layer of thickness t on a rigid ground (Dimitriadis et al. 2002, Biophys. J. 82, 2798, equation
-//! 11 with the α₀, β₀ of a bonded layer); here it adds 3 to 5 %. The sides of the block are 20 contact radii away.
+//! 11 with the α₀, β₀ of a bonded layer); here it adds 3 to 7 %. The sides of the block are 14 contact radii away or more.
+//! Hertz leaves out that the surface moves inwards, a share (1 − 2ν)·√(δ/R) of the depth: hence ν near ½ and small δ/R.
+//! Linear elements are 13 % too stiff here, with twice the cells.
 
 use super::Check;
 use super::scene::{Stuff, Watch, at, scene};
@@ -20,8 +22,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 const SIZE: [f64; 3] = [0.2, 0.1, 0.2];
-const RADIUS: f64 = 0.04;
-const GEL: Stuff = Stuff { young: 1e5, poisson: 0.3, density: 1000.0, beta: 5e-3 };
+const RADIUS: f64 = 0.08;
+const GEL: Stuff = Stuff { young: 1e5, poisson: 0.45, density: 1000.0, beta: 5e-3 };
 
 /// Cells grow from the place of contact outwards by this, from first to last (e to the power of it).
 const GRADING: f64 = 4.0;
@@ -68,21 +70,16 @@ fn pressed(body: &Arc<Recording>, depth: f64, watch: &mut Watch) -> Result<(f64,
     Ok((-contacts.iter().map(|contact| contact.force.y).sum::<f64>(), contacts.len()))
 }
 
-/// Linear and quadratic elements, at two depths.
+/// Quadratic elements; the contact radius spans three to six edges.
 pub fn indentation() -> Result<Vec<Check>, Failure> {
-    let mut checks = Vec::new();
-    for (order, cells) in [(Order::Quadratic, 8), (Order::Quadratic, 12), (Order::Quadratic, 16)] {
-        let body = GEL.standing(graded(cells)?, order, 60, |node| node.y < -0.499 * SIZE[1])?;
-        let mut watch = Watch::default();
-        let mut forces = Vec::new();
-        for depth in [0.3e-3, 0.6e-3, 1.2e-3] {
-            let (force, points) = pressed(&body, depth, &mut watch)?;
-            forces.push(force);
-            let quantity =
-                format!("{order:?}, {cells} cells, depth {:.1} mm, {points} points [N]", depth * 1e3);
-            checks.push(Check::new(quantity, force, hertz(depth), 0.05));
-        }
-        checks.extend(watch.checks(&format!("{order:?}, {cells} cells")));
+    const CELLS: u32 = 12;
+    let body = GEL.standing(graded(CELLS)?, Order::Quadratic, 60, |node| node.y < -0.499 * SIZE[1])?;
+    let (mut checks, mut watch) = (Vec::new(), Watch::default());
+    for depth in [0.15e-3, 0.3e-3, 0.6e-3] {
+        let (force, points) = pressed(&body, depth, &mut watch)?;
+        let quantity = format!("force at depth {:.2} mm, {points} points [N]", depth * 1e3);
+        checks.push(Check::new(quantity, force, hertz(depth), 0.05));
     }
+    checks.extend(watch.checks("ball"));
     Ok(checks)
 }

@@ -5,15 +5,19 @@
 
 mod bounce;
 mod compliance;
+mod drop;
 mod frequencies;
 mod friction;
+mod grip;
 mod hertz;
 mod impulse;
+mod lift;
 mod motion;
 mod pinch;
 mod press;
 pub mod scene;
 mod spheres;
+mod stack;
 mod waves;
 
 use crate::Failure;
@@ -151,6 +155,26 @@ pub const CASES: &[Case] = &[
         name: "hertz",
         about: "a rigid ball pressed into an elastic block against Hertz's law",
         run: hertz::indentation,
+    },
+    Case {
+        name: "pinch-lift",
+        about: "two fingers pinch a cube, lift, shake and throw it",
+        run: lift::pinch_lift,
+    },
+    Case {
+        name: "drop-block",
+        about: "a block with ν = 0 dropped flat: force ρcvA for 2L/c, and it leaves as it came",
+        run: drop::drop_block,
+    },
+    Case {
+        name: "stack",
+        about: "two cubes rest on one another for a minute",
+        run: stack::stack,
+    },
+    Case {
+        name: "fingers-hold",
+        about: "a finger that sticks against a hand that holds",
+        run: grip::fingers_hold,
     },
 ];
 

@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// Free fall [m/s²].
 pub const G: f64 = 9.81;
 
-/// Sums over some thousand steps round by half an ulp each, of terms as large as all energy moved so far.
-pub const ROUND_OFF: f64 = 1e-12;
+/// Sums over some thousand steps and some hundred contacts, whose terms cancel to a hundredth of themselves: 1e5 ulps.
+pub const ROUND_OFF: f64 = 1e-11;
 
 /// What a body is made of.
 #[derive(Clone, Copy)]

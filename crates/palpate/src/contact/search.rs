@@ -11,7 +11,7 @@ use glam::DVec3;
 const MOST_FOUND: usize = 192;
 
 /// Triangles that a vicinity can hold, and what it is found with to spare, as a share of the mean edge.
-const MOST_AROUND: usize = 32;
+const MOST_AROUND: usize = 48;
 const SPARE: f64 = 0.15;
 
 /// Minima whose directions differ by less than this cosine are one: a facetted surface is one face.
@@ -134,6 +134,7 @@ impl<'a> Sight<'a> {
             modal: libm::sqrt(body.norm_squared(q)),
             residual: libm::sqrt(2.0 * state.residual_energy()),
             most_residual: 2.0 * beside,
+            slope: body.dent_slope(reading),
         };
         let free = state.free_coordinates();
         Self { body, reading, q, free, acting: state.acting(), own: [None; 4], flat: 0.0, cache, visit }
@@ -217,12 +218,23 @@ impl<'a> Sight<'a> {
         }
         let mut place = self.smooth(node);
         for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
-            let own = self.own.iter().flatten().any(|own| *own == other.place)
-                && (self.rest(node) - other.rest).length() < self.flat;
-            place += if own { other.own_dent } else { self.body.dent(node, other) };
+            let own = self.own.iter().flatten().any(|own| *own == other.place);
+            let flat = if own { self.flat } else { 0.0 };
+            // A dent that a point leaves has no shape between the nodes.
+            let beside =
+                own && self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
+            place += if beside { other.own_dent } else { self.body.dent(node, other, flat) };
         }
         (self.cache.whole[node], self.cache.whole_stamps[node]) = (place, self.cache.whole_now);
         place
+    }
+
+    /// Where a sphere's centre is: with dents where they have a shape, else they count for its radius.
+    fn centre(&mut self, node: usize) -> DVec3 {
+        match self.reading {
+            Reading::Point => self.smooth(node),
+            Reading::Patch(_) => self.node(node),
+        }
     }
 
     /// Where the corners of a triangle are.
@@ -249,7 +261,7 @@ impl<'a> Sight<'a> {
     ) {
         let body = self.body;
         let visit = self.visit;
-        body.tree.walk((body.bounds(self.reading), &visit), self, Self::rest, Self::smooth, near, found);
+        body.tree.walk((body.bounds(self.reading), &visit), self, Self::rest, Self::centre, near, found);
     }
 }
 

@@ -109,6 +109,12 @@ impl ResidualCompliance {
 }
 
 impl NearField {
+    /// The blocks of a node's row, with the other node of each.
+    pub(crate) fn row(&self, node: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
+        let range = self.offsets[node] as usize..self.offsets[node + 1] as usize;
+        range.map(|at| (self.nodes[at] as usize, self.block(at)))
+    }
+
     /// The nodes of each row; only once the offsets are known to ascend within bounds.
     fn rows(&self) -> impl Iterator<Item = &[u32]> {
         self.offsets.windows(2).map(|pair| &self.nodes[pair[0] as usize..pair[1] as usize])

@@ -121,7 +121,7 @@ impl Body {
 
     /// How far modal coordinates with such a norm squared [J] can move any surface node [m].
     pub(crate) fn reach(&self, norm_squared: f64) -> f64 {
-        self.bounds.reach(&Visit { modal: libm::sqrt(norm_squared), residual: 0.0, most_residual: 0.0 })
+        self.bounds.reach(&Visit { modal: libm::sqrt(norm_squared), ..Visit::STILL })
     }
 
     /// The reading for a patch of a radius [m]; the point itself for 0.
@@ -140,6 +140,11 @@ impl Body {
     /// Mode shapes as a reading sees them: (3·node + axis)·m + mode.
     pub(crate) fn rows(&self, reading: Reading) -> &[f64] {
         self.patch(reading).map_or(&self.recording.modes.mode_shapes, |patch| &patch.rows)
+    }
+
+    /// What of a dent can change over a distance, as a share per metre.
+    pub(crate) fn dent_slope(&self, reading: Reading) -> f64 {
+        self.patch(reading).map_or(f64::INFINITY, PatchField::dent_slope)
     }
 
     /// How far the surface can go, as a reading sees it.
@@ -186,12 +191,13 @@ impl Body {
         Acting { place, force, rest, pull, own_dent }
     }
 
-    /// What the residual compliance moves a surface node [m, body], read as the force's place is.
+    /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
+    /// `flat` [m] from the force a patch's dent is as deep as there.
     ///
     /// # Real time
-    pub(crate) fn dent(&self, node: usize, acting: &Acting) -> DVec3 {
+    pub(crate) fn dent(&self, node: usize, acting: &Acting, flat: f64) -> DVec3 {
         match self.patch(acting.place.reading) {
-            Some(patch) => patch.dent(&self.recording, node, acting.rest, acting.pull),
+            Some(patch) => patch.dent(&self.recording, node, acting.rest, acting.pull, flat),
             None => self.residual_of_node(node, &acting.place) * acting.force,
         }
     }

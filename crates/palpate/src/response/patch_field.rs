@@ -9,7 +9,7 @@
 //! K carries it to other places with Wendland's function ψ, whose range L is fitted to S: so K is positive
 //! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
 
-use crate::recording::{NearField, Recording};
+use crate::recording::{NearField, Recording, ResidualCompliance};
 use crate::surface::{Bounds, PatchWeights, SurfacePoint, SurfaceTree};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -56,7 +56,23 @@ impl PatchField {
             }
             sum
         };
-        let own: Vec<DMat3> = (0..n).map(|c| between(c, c)).collect();
+        let mut spread = vec![0.0; n];
+        let own: Vec<DMat3> = (0..n)
+            .map(|c| match &recording.residual {
+                // Row by row: most nodes of a large patch are too far apart to answer each other.
+                ResidualCompliance::NearField(near) => {
+                    weights.of(c).for_each(|(node, w)| spread[node] = w);
+                    let mut sum = DMat3::ZERO;
+                    for (i, wi) in weights.of(c) {
+                        let row = near.row(i).filter(|(j, _)| spread[*j] != 0.0);
+                        sum += row.map(|(j, block)| block * spread[j]).fold(DMat3::ZERO, |a, b| a + b) * wi;
+                    }
+                    weights.of(c).for_each(|(node, _)| spread[node] = 0.0);
+                    sum
+                }
+                _ => between(c, c),
+            })
+            .collect();
         let roots = own.iter().map(root).collect();
         let range = fit_range(recording, radius, &own, between);
         let mut field = Self { radius, weights, rows, roots, range, bounds: Bounds::default() };
@@ -76,16 +92,29 @@ impl PatchField {
         corners.iter().map(|&(node, w)| self.roots[node] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position.
+    /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position, around which it is flat.
     ///
     /// # Real time
-    pub(crate) fn dent(&self, recording: &Recording, node: usize, rest: DVec3, pull: DVec3) -> DVec3 {
-        let distance = (recording.surface.positions[node] - rest).length();
+    pub(crate) fn dent(
+        &self,
+        recording: &Recording,
+        node: usize,
+        rest: DVec3,
+        pull: DVec3,
+        flat: f64,
+    ) -> DVec3 {
+        let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
         if distance < self.range {
             self.roots[node] * pull * NearField::taper(distance / self.range)
         } else {
             DVec3::ZERO
         }
+    }
+
+    /// Steepest slope of ψ [1/m].
+    pub(crate) fn dent_slope(&self) -> f64 {
+        // ψ′ = −20·s·(1 − s)³ is steepest at a quarter.
+        2.11 / self.range
     }
 
     /// K [m/N] between two places.

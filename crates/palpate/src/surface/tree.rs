@@ -64,16 +64,22 @@ pub(crate) struct Visit {
     pub(crate) residual: f64,
     /// The most [m] that the residual compliance moves any node, where that is known.
     pub(crate) most_residual: f64,
+    /// What of it can change over a distance, as a share per metre; infinite where a node tells nothing of the next.
+    pub(crate) slope: f64,
 }
 
 impl Visit {
+    /// Nothing moves.
+    pub(crate) const STILL: Self =
+        Self { modal: 0.0, residual: 0.0, most_residual: 0.0, slope: f64::INFINITY };
+
     fn reach(&self, spread: &Spread) -> f64 {
         spread.modal * self.modal + (spread.residual * self.residual).min(self.most_residual)
     }
 
-    fn apart(&self, spread: &Spread) -> f64 {
-        // The centre is known by its modes; the residual compliance moves it too.
-        spread.modal_apart * self.modal + (spread.residual * self.residual).min(self.most_residual)
+    fn apart(&self, spread: &Spread, radius: f64) -> f64 {
+        let change = self.most_residual * (self.slope * radius).min(1.0);
+        spread.modal_apart * self.modal + (spread.residual * self.residual).min(change)
     }
 }
 
@@ -190,7 +196,7 @@ impl SurfaceTree {
                 continue;
             }
             let centre = moved(context, c);
-            if !near(context, Some(c), centre, node.radius + visit.apart(spread)) {
+            if !near(context, Some(c), centre, node.radius + visit.apart(spread, node.radius)) {
                 continue;
             }
             if node.second == 0 {

@@ -1,5 +1,7 @@
 //! `palpate bench`: step times with percentiles, and how they grow.
 
+mod touch;
+
 use crate::Failure;
 use crate::verbs::demo::cached_cube;
 use crate::verbs::run::percentile_us;
@@ -15,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time a step: against the mesh, the modes, the held points and the objects
+/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor
 ///
 /// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
 /// for another machine. Recording the largest cube takes about a minute the first time.
@@ -35,12 +37,16 @@ pub struct Arguments {
     json: bool,
 }
 
-struct Case {
+/// Steps with held points that move.
+struct HeldCase {
     label: String,
     recording: Arc<Recording>,
     objects: usize,
     points: usize,
 }
+
+/// What is timed: a label, and what gives the times [ns] of so many steps, sorted.
+type Case = (String, Box<dyn Fn(usize) -> Result<Vec<u32>, Failure>>);
 
 /// Run the verb.
 pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
@@ -50,43 +56,47 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
         Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?))
     };
-    let mut cases = Vec::new();
+    let mut cases: Vec<HeldCase> = Vec::new();
     for &cells in &arguments.cells {
         let recording = cube(cells, 200)?;
         let nodes = recording.metadata.mesh.nodes;
         let label = format!("{cells}³ cells, {nodes} nodes, 200 modes, 2 held points");
-        cases.push(Case { label, recording, objects: 1, points: 2 });
+        cases.push(HeldCase { label, recording, objects: 1, points: 2 });
     }
     let usual = cube(12, 200)?;
     for modes in [50, 400] {
         let label = format!("12³ cells, {modes} modes, 2 held points");
-        cases.push(Case { label, recording: cube(12, modes)?, objects: 1, points: 2 });
+        cases.push(HeldCase { label, recording: cube(12, modes)?, objects: 1, points: 2 });
     }
     for points in [1, 4, 8, 16] {
         let label = format!("12³ cells, 200 modes, {points} held points");
-        cases.push(Case { label, recording: usual.clone(), objects: 1, points });
+        cases.push(HeldCase { label, recording: usual.clone(), objects: 1, points });
     }
     for objects in [4, 16] {
         let label = format!("{objects} cubes of 12³ cells, 200 modes, 2 held points each");
-        cases.push(Case { label, recording: usual.clone(), objects, points: 2 });
+        cases.push(HeldCase { label, recording: usual.clone(), objects, points: 2 });
     }
+    let held = cases.into_iter().map(|case| -> Case {
+        let label = case.label.clone();
+        (label, Box::new(move |steps| held_steps(&case, steps)))
+    });
     let mut rows = Vec::new();
     if !arguments.json {
-        print(&format!("{:<58}{:>8}{:>8}{:>8}{:>9}\n", "step time [µs]", "p50", "p99", "p99.9", "max"))?;
+        print(&format!("{:<70}{:>8}{:>8}{:>8}{:>9}\n", "step time [µs]", "p50", "p99", "p99.9", "max"))?;
     }
-    for case in &cases {
-        let times = measure(case, arguments.steps)?;
+    for (label, measure) in held.chain(touch::cases(usual, cube(16, 200)?)) {
+        let times = measure(arguments.steps)?;
         let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));
-        rows.push(json!({ "case": case.label, "p50": p50, "p99": p99, "p999": p999, "max": max }));
+        rows.push(json!({ "case": label, "p50": p50, "p99": p99, "p999": p999, "max": max }));
         if !arguments.json {
-            print(&format!("{:<58}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n", case.label))?;
+            print(&format!("{:<70}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n", label))?;
         }
     }
     if arguments.json { print_json(&json!({ "step_time_us": Value::Array(rows) })) } else { Ok(()) }
 }
 
 /// Sorted times [ns] of steps in which every held point moves.
-fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
+fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
     let surface = &case.recording.surface;
     let held: Vec<Grasp> = (0..case.objects)
         .flat_map(|object| {
@@ -102,12 +112,18 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
             })
         })
         .collect();
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    // Side by side, far enough not to meet.
+    let centre = |object: usize| DVec3::Z * (5.0 * surface.radius() * object as f64);
+    let start = |object| ObjectStart {
+        pose: Pose { position: centre(object), ..Pose::IDENTITY },
+        twist: Twist::ZERO,
+    };
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); held.len()],
         ..ModelParameters::default()
     };
-    let model = Model::new(parameters, vec![ModelObject::new(case.recording.clone(), start); case.objects])?;
+    let objects = (0..case.objects).map(|object| ModelObject::new(case.recording.clone(), start(object)));
+    let model = Model::new(parameters, objects.collect())?;
     let mut state = State::new(&model);
     let rest: Vec<DVec3> = held.iter().map(|grasp| surface.rest_position(&grasp.point)).collect();
     let mut input = Input { devices: Vec::new(), ..Input::default() };
@@ -118,12 +134,17 @@ fn measure(case: &Case, steps: usize) -> Result<Vec<u32>, Failure> {
         input.devices = held
             .iter()
             .zip(&rest)
-            .map(|(grasp, rest)| DeviceInput::held(*rest * 0.98 + sway, *grasp))
+            .map(|(grasp, rest)| DeviceInput::held(centre(grasp.object) + *rest * 0.98 + sway, *grasp))
             .collect();
-        let before = Instant::now();
-        step(&model, &mut state, &input);
-        times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
+        times.push(timed_step(&model, &mut state, &input));
     }
     times.sort_unstable();
     Ok(times)
+}
+
+/// Compute time [ns] of a step.
+fn timed_step(model: &Model, state: &mut State, input: &Input) -> u32 {
+    let before = Instant::now();
+    step(model, state, input);
+    before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32
 }

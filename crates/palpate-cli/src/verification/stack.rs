@@ -1,0 +1,60 @@
+//! Two cubes rest on one another on a floor for a minute.
+
+use super::Check;
+use super::scene::{G, Stuff, Watch, at, floor, scene};
+use crate::Failure;
+use glam::{DQuat, DVec3};
+use palpate::{Against, Input, Output, State, step};
+use palpate_fem::element::Order;
+use palpate_fem::mesh::box_mesh;
+
+const SIDE: f64 = 0.1;
+const STEP: f64 = 2e-3;
+
+/// Soft, and damped so that it is at rest within some seconds.
+const JELLY: Stuff = Stuff { young: 5000.0, poisson: 0.4, density: 110.0, beta: 2e-3 };
+
+/// Sum of the vertical forces [N] on an object from what it lies on.
+fn carried(output: &Output, object: usize, by: Against) -> f64 {
+    let under = |c: &&palpate::ContactOutput| c.object == object && c.against == by;
+    // A pair has one row: the force on the other is the opposite.
+    let over = |c: &&palpate::ContactOutput| Against::Object(c.object) == by && c.against == Against::Object(object);
+    output.contacts.iter().filter(under).map(|c| c.force.y).sum::<f64>()
+        - output.contacts.iter().filter(over).map(|c| c.force.y).sum::<f64>()
+}
+
+/// Place and orientation after 60 s against those after 10 s; the upper cube is off the middle and turned a little.
+pub fn stack() -> Result<Vec<Check>, Failure> {
+    /// The share of the size.
+    const STILL: f64 = 1e-5;
+    let cube = JELLY.body(box_mesh([SIDE; 3], [3; 3])?, Order::Linear, 60)?;
+    let lower = at(&cube, DVec3::Y * (0.5 * SIDE + 1e-4), DVec3::ZERO);
+    let mut upper = at(&cube, DVec3::new(0.013, 1.5 * SIDE + 2e-4, 0.007), DVec3::ZERO);
+    upper.start.pose.orientation = DQuat::from_rotation_y(0.2);
+    let model = scene(STEP, DVec3::Y * -G, vec![floor(0.5)], Vec::new(), vec![lower, upper])?;
+    let mut state = State::new(&model);
+    let (mut watch, mut settled) = (Watch::default(), Vec::new());
+    watch.look(state.output());
+    for number in 1..=(60.0 / STEP).round() as usize {
+        watch.look(step(&model, &mut state, &Input::default()));
+        if number == (10.0 / STEP).round() as usize {
+            settled = state.output().objects.iter().map(|object| object.pose).collect();
+        }
+    }
+    let output = state.output();
+    let mut checks = Vec::new();
+    for (name, before, object) in [("lower", 0, &output.objects[0]), ("upper", 1, &output.objects[1])] {
+        let (before, now) = (settled[before], object.pose);
+        let moved = (now.position - before.position).length() / SIDE;
+        let turned = now.orientation.angle_between(before.orientation);
+        checks.push(Check::new(format!("{name} cube moves from 10 s to 60 s, share of its size"), moved, 0.0, STILL));
+        checks.push(Check::new(format!("{name} cube turns from 10 s to 60 s [rad]"), turned, 0.0, STILL));
+    }
+    let weight = cube.mass() * G;
+    let floor = carried(output, 0, Against::Obstacle(0));
+    checks.push(Check::new("what the floor carries after 60 s [N]", floor, 2.0 * weight, 1e-6));
+    let pair = carried(output, 1, Against::Object(0));
+    checks.push(Check::new("what the lower cube carries after 60 s [N]", pair, weight, 1e-6));
+    checks.extend(watch.checks("stack"));
+    Ok(checks)
+}
