@@ -15,7 +15,7 @@ mod lift;
 mod motion;
 mod pinch;
 mod press;
-pub mod scene;
+mod scene;
 mod spheres;
 mod stack;
 mod waves;
@@ -142,6 +142,11 @@ pub const CASES: &[Case] = &[
         run: bounce::bounce,
     },
     Case {
+        name: "bounce-many-modes",
+        about: "the same fall with 1200 modes, as many as the rebound needs at every step",
+        run: bounce::bounce_many_modes,
+    },
+    Case {
         name: "friction",
         about: "a block begins to slide at tan θ = μ, and stops after v²/(2μg)",
         run: friction::friction,
@@ -166,11 +171,7 @@ pub const CASES: &[Case] = &[
         about: "a block with ν = 0 dropped flat: force ρcvA for 2L/c, and it leaves as it came",
         run: drop::drop_block,
     },
-    Case {
-        name: "stack",
-        about: "two cubes rest on one another for a minute",
-        run: stack::stack,
-    },
+    Case { name: "stack", about: "two cubes rest on one another for a minute", run: stack::stack },
     Case {
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",
