@@ -36,7 +36,7 @@ pub struct Coupling {
 pub struct DeviceParameters {
     /// Radius of the tip that touches [m]; 0 for a point.
     pub tip_radius: f64,
-    /// Radius of the patch that a touch is spread over [m]; 0 for a point. From about one and a half edges of the mesh on,
+    /// Radius of the patch that a touch is spread over [m]; 0 for a point. From about four edges of the mesh on
     /// the feel does not show the mesh.
     pub patch_radius: f64,
     /// Coulomb's coefficient of a touch [1]; 0 for a wet finger on ice.
