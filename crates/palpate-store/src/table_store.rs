@@ -204,24 +204,25 @@ impl TableStore {
         }
     }
 
-    /// Remove what interrupted writers left beside the shards, once the store is finished.
+    /// Remove what interrupted writers left beside the files of the store, once it is finished.
     ///
     /// # Errors
-    /// When the folder can't be read.
+    /// When a folder of it can't be read.
     pub fn tidy(&self) -> Result<(), StoreError> {
         let Some(folder) = self.location.folder() else { return Ok(()) };
         if !self.missing(Part::ALL)?.is_empty() {
             return Ok(());
         }
-        for shard in 0..self.shards() {
-            let place = folder.join(format!("impulse_response/c/{shard}/0"));
+        let mut waiting = vec![folder.to_path_buf()];
+        while let Some(place) = waiting.pop() {
             let failed =
                 |e: std::io::Error| StoreError::Place(format!("cannot read {}: {e}", place.display()));
             for entry in std::fs::read_dir(&place).map_err(failed)? {
-                let path = entry.map_err(failed)?.path();
-                // The writer's files have names like 0#1 until they are whole.
-                if path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("0#")) {
-                    let _ = std::fs::remove_file(path);
+                let entry = entry.map_err(failed)?;
+                if entry.file_type().map_err(failed)?.is_dir() {
+                    waiting.push(entry.path());
+                } else if is_unfinished(&entry.file_name().to_string_lossy()) {
+                    let _ = std::fs::remove_file(entry.path());
                 }
             }
         }
@@ -295,6 +296,12 @@ impl TableStore {
     pub(crate) fn array(&self) -> &Array<ObjectStorage> {
         &self.array
     }
+}
+
+/// Whether a file was being written: the writer's files have names like `zarr.json#1` until they are whole.
+fn is_unfinished(name: &str) -> bool {
+    name.rsplit_once('#')
+        .is_some_and(|(_, count)| !count.is_empty() && count.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// The body as a recording without modes.

@@ -85,6 +85,24 @@ fn a_recording_that_is_killed_ten_times_ends_with_the_same_bytes() {
 }
 
 #[test]
+fn what_a_killed_writer_left_unfinished_is_removed_wherever_it_lies() {
+    let workplace = Workplace::new();
+    workplace.succeed(&TABLE);
+    let whole = contents(&workplace.path("t.zarr"));
+    // A writer's files have such names until they are whole; a run can be killed while it writes any of them.
+    for name in [
+        "zarr.json#1",
+        "observed_positions/zarr.json#2",
+        "touchable_dofs/c/0#1",
+        "impulse_response/c/3/0/0#1",
+    ] {
+        workplace.write(&format!("t.zarr/{name}"), "half a fi");
+    }
+    workplace.succeed(&TABLE);
+    assert!(contents(&workplace.path("t.zarr")) == whole);
+}
+
+#[test]
 fn parts_by_several_machines_make_one_store() {
     let whole = Workplace::new();
     let printed = whole.succeed(&TABLE);
