@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::spatial::Pose;
-use crate::surface::{Bounds, Surface, SurfaceTree, Visit, at_weights, nearest_on_triangle};
+use crate::surface::{Bounds, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle};
 use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -89,7 +89,7 @@ impl ObstacleMesh {
                 return fail(format!("triangle {t} of an obstacle's mesh names a node that does not exist"));
             }
             let places = corners.map(|n| positions[n as usize]);
-            let normal = (places[1] - places[0]).cross(places[2] - places[0]).normalize_or_zero();
+            let normal = area_normal(places).normalize_or_zero();
             if normal == DVec3::ZERO {
                 return fail(format!("triangle {t} of an obstacle's mesh has no area"));
             }
@@ -118,24 +118,28 @@ impl ObstacleMesh {
         Ok(Self { surface, tree, bounds, normals, owners, radius })
     }
 
-    fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
-        let still = Visit::STILL;
+    /// Give the triangles in spheres (centre, radius) that `near` takes, with their corners.
+    fn walk(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(u32, [DVec3; 3])) {
         let place = |n: usize| self.surface.positions[n];
         self.tree.walk(
-            (&self.bounds, &still),
+            (&self.bounds, &Visit::STILL),
             &mut (),
             |_, n| place(n),
             |_, n| place(n),
             |_, _, centre, radius| near(centre, radius),
-            |_, t| {
-                for node in self.surface.triangles[t as usize].map(|n| n as usize) {
-                    // A node belongs to one of its triangles.
-                    if self.owners[node] == t && near(place(node), 0.0) {
-                        found(node, place(node));
-                    }
-                }
-            },
+            |_, t| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
         );
+    }
+
+    fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
+        self.walk(&near, |t, places| {
+            for (node, place) in self.surface.triangles[t as usize].into_iter().zip(places) {
+                // A node belongs to one of its triangles.
+                if self.owners[node as usize] == t && near(place, 0.0) {
+                    found(node as usize, place);
+                }
+            }
+        });
     }
 
     fn signed_distance(&self, p: DVec3, most: f64) -> Option<(f64, DVec3)> {
@@ -144,24 +148,16 @@ impl ObstacleMesh {
         }
         // However far: which side it is on counts. (least distance, nearest point, normal that tells the side).
         let best = core::cell::Cell::new((f64::INFINITY, DVec3::ZERO, DVec3::ZERO));
-        let still = Visit::STILL;
-        let place = |n: usize| self.surface.positions[n];
-        self.tree.walk(
-            (&self.bounds, &still),
-            &mut (),
-            |_, n| place(n),
-            |_, n| place(n),
-            |_, _, centre, radius| (p - centre).length() - radius < best.get().0 + 1e-12,
-            |_, t| {
-                let corners = self.surface.triangles[t as usize];
-                let places = corners.map(|n| place(n as usize));
+        self.walk(
+            |centre, radius| (p - centre).length() - radius < best.get().0 + 1e-12,
+            |t, places| {
                 let weights = nearest_on_triangle(places, p);
                 let nearest = at_weights(places, weights);
                 let distance = (p - nearest).length();
                 let (least, at, side) = best.get();
                 let normal = match weights.iter().position(|w| *w > 1.0 - 1e-12) {
-                    Some(corner) => self.normals[corners[corner] as usize],
-                    None => (places[1] - places[0]).cross(places[2] - places[0]).normalize_or_zero(),
+                    Some(corner) => self.normals[self.surface.triangles[t as usize][corner] as usize],
+                    None => area_normal(places).normalize_or_zero(),
                 };
                 // Both triangles of an edge count for the side.
                 let same = (nearest - at).length() <= 1e-9 * (1.0 + distance) && side != DVec3::ZERO;

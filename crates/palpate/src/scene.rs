@@ -1,11 +1,11 @@
 //! The model: what does not change while a scene runs.
 
-use crate::contact::{Grasp, is_place};
+use crate::contact::{Grasp, MOST_FACES};
 use crate::error::Error;
 use crate::motion::{Inertia, MotionRule, RigidState, RigidStep};
 use crate::obstacle::Obstacle;
 use crate::recording::{Recording, Support};
-use crate::response::{Body, Place, Reading, Response, ResponseForm};
+use crate::response::{Body, Response, ResponseForm};
 use crate::spatial::{Pose, Twist};
 use alloc::format;
 use alloc::sync::Arc;
@@ -176,8 +176,7 @@ impl Model {
     /// Whether a grasp names an object, a triangle and weights that exist.
     pub(crate) fn accepts(&self, grasp: &Grasp) -> bool {
         self.objects.get(grasp.object).is_some_and(|object| {
-            let place = Place { point: grasp.point, reading: Reading::Point };
-            is_place(&object.body, &place) && object.response.accepts(&grasp.point)
+            object.body.recording.surface.holds(&grasp.point) && object.response.accepts(&grasp.point)
         })
     }
 }
@@ -258,7 +257,7 @@ impl SceneObject {
         } else {
             self.body.recording.surface.positions.len().min(parameters.most_contact_points)
         };
-        5 * devices + surface
+        (1 + MOST_FACES) * devices + surface
     }
 
     /// Whether contacts can be looked for on it: a table tells only of points that are known beforehand.

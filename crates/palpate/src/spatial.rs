@@ -29,6 +29,11 @@ impl Pose {
     pub fn body_from_world(&self, point_in_world: DVec3) -> DVec3 {
         self.orientation.inverse() * (point_in_world - self.position)
     }
+
+    /// How far a point at the end of an arm [m] can go on the way to another pose, at most [m].
+    pub(crate) fn way(&self, to: &Self, arm: f64) -> f64 {
+        (to.position - self.position).length() + self.orientation.angle_between(to.orientation) * arm
+    }
 }
 
 /// Velocity of a body frame, in world axes.

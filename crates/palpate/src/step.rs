@@ -58,29 +58,6 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     &state.output
 }
 
-/// Stage 3: the forces. What contacts push out must be paid for by what was lost before: if it is not, they stay where
-/// they are, and in the last resort they give no force.
-fn solve(model: &Model, state: &mut State) {
-    let State { objects, devices, contacts, workspace, output, .. } = state;
-    let paid = output.energy.lost().max(0.0);
-    let mut parts = Parts { model, objects, devices, contacts };
-    for attempt in 0..3 {
-        let mut status = output.status;
-        workspace.solver.solve(&mut parts, &mut status);
-        let taken: f64 = parts.contacts.iter().map(Contact::taken).sum();
-        if taken + paid >= 0.0 || attempt == 2 {
-            output.status = status;
-            return;
-        }
-        for contact in parts.contacts.iter_mut().filter(|contact| contact.law != Law::Held) {
-            contact.least_gap = match attempt {
-                0 => contact.gap(contact.start).min(0.0),
-                _ => f64::NEG_INFINITY,
-            };
-        }
-    }
-}
-
 /// Stage 1: every object at the end of the step without contact force.
 fn predict(model: &Model, state: &mut State) {
     for (at, own) in state.objects.iter_mut().enumerate() {
@@ -89,10 +66,7 @@ fn predict(model: &Model, state: &mut State) {
         responding.predict();
         own.points.predict(&mut responding);
         own.free = object.advance_rigid(&model.parameters, &own.rigid, DVec3::ZERO, DVec3::ZERO);
-        let (now, free) = (own.response.coordinates(), own.response.free_coordinates());
-        let omegas = &object.body.recording.modes.angular_frequencies;
-        let change = omegas.iter().zip(now.iter().zip(free)).map(|(omega, (a, b))| omega * (b - a));
-        own.surface_motion = object.body.reach(change.map(|x| x * x).sum());
+        own.surface_motion = object.body.way(own.response.coordinates(), own.response.free_coordinates());
     }
 }
 
@@ -216,14 +190,35 @@ fn prepare_contacts(model: &Model, state: &mut State) {
     }
 }
 
+/// Stage 3: the forces. What contacts push out must be paid for by what was lost before: if it is not, they stay where
+/// they are, and in the last resort they give no force.
+fn solve(model: &Model, state: &mut State) {
+    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let paid = output.energy.lost().max(0.0);
+    let mut parts = Parts { model, objects, devices, contacts };
+    for attempt in 0..3 {
+        let mut status = output.status;
+        workspace.solver.solve(&mut parts, &mut status);
+        let taken: f64 = parts.contacts.iter().map(Contact::taken).sum();
+        if taken + paid >= 0.0 || attempt == 2 {
+            output.status = status;
+            return;
+        }
+        for contact in parts.contacts.iter_mut().filter(|contact| contact.law != Law::Held) {
+            contact.least_gap = match attempt {
+                0 => contact.gap(contact.start).min(0.0),
+                _ => f64::NEG_INFINITY,
+            };
+        }
+    }
+}
+
 /// Stages 4 and 5: hold the forces over the step, and account for the energy.
 fn advance(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
     for contact in contacts.iter_mut() {
         account(contact, objects);
-        // The guess for this step has left the last one's force there, reversed.
-        contact.trend =
-            if contact.trend == DVec3::ZERO { DVec3::ZERO } else { contact.force + contact.trend };
+        contact.trend = contact.guessed_from.map_or(DVec3::ZERO, |last| contact.force - last);
     }
     let mut unsolved = 0;
     for (at, own) in objects.iter_mut().enumerate() {

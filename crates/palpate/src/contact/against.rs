@@ -4,20 +4,16 @@
 //! which moves with the obstacle. Round obstacles also meet the middle of a triangle, and the corners of others the
 //! surface between the nodes.
 
-use super::meeting::{Approach, meeting};
+use super::meeting::{Approach, MARGIN, meeting};
 use super::search::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedList, WantedOther};
-use super::{Against, Contact, Law, Other};
-use crate::obstacle::{Obstacle, Shape};
+use super::{Against, Contact, Law, known_contacts};
+use crate::obstacle::Obstacle;
 use crate::response::{Body, Place, Reading};
 use crate::spatial::Pose;
 use crate::state::ObjectState;
 use crate::surface::{SurfacePoint, at_weights};
 use glam::DVec3;
-
-/// Nodes within this share of the mean edge are taken in though they don't come nearer: what the others' forces
-/// move is small beside it.
-const MARGIN: f64 = 2e-3;
 
 /// What a force moves on a node that is not pushed itself, as a share of what it moves where it acts: below it, from
 /// one node to the next.
@@ -54,11 +50,8 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
     let (object, obstacle) = (&scene.model.objects[at], &scene.model.parameters.obstacles[number]);
     let (body, own) = (&object.body, &scene.objects[at]);
     let (start, free) = (own.rigid.pose, own.free.end.pose);
-    let moves = |a: &Pose, b: &Pose, arm: f64| {
-        (b.position - a.position).length() + a.orientation.angle_between(b.orientation) * arm
-    };
     let apart = (before.position - start.position).length();
-    let way = moves(&before, &after, apart + object.radius) + moves(&start, &free, object.radius);
+    let way = before.way(&after, apart + object.radius) + start.way(&free, object.radius);
     let encounter = Encounter {
         at,
         number,
@@ -80,7 +73,7 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
     if apart - all > obstacle.shape.radius() {
         return;
     }
-    encounter.nodes(sight, known_contacts(scene.contacts, at, number), scene.wanted);
+    encounter.nodes(sight, known_contacts(scene.contacts, Against::Obstacle(number), at), scene.wanted);
     encounter.corners(scene, at);
 }
 
@@ -231,17 +224,14 @@ impl Encounter<'_> {
         let step = Ok(scene.step);
         let sight =
             &mut Sight::new(self.body, Reading::Point, &self.own.response, &self.own.points, cache, step);
-        let (middle, half_extents) = self.body.extent();
-        let around = Shape::Box { half_extents };
         let grown = sight.reach() + self.margin + self.way;
         let surface = &self.body.recording.surface;
         let first = surface.positions.len() + surface.triangles.len();
         let Finding { contacts, search, wanted, .. } = scene;
         self.obstacle.shape.corners(
             |centre, radius| {
-                let place = start.body_from_world(self.before.world_from_body(centre)) - middle;
-                let reach = radius + grown;
-                around.signed_distance(place, reach).is_some_and(|(distance, _)| distance < reach)
+                let place = start.body_from_world(self.before.world_from_body(centre));
+                self.body.is_near(place, radius + grown)
             },
             |corner, place| {
                 let feature = first + corner;
@@ -257,13 +247,4 @@ impl Encounter<'_> {
             },
         );
     }
-}
-
-/// The contacts of an object with an obstacle: they stand together, in the order of their features.
-fn known_contacts(contacts: &[Contact], object: usize, number: usize) -> &[Contact] {
-    let pair = (Against::Obstacle(number), object);
-    let first = contacts.partition_point(|c| (c.key.other, c.key.object) < pair);
-    let count = contacts[first..].partition_point(|c| (c.key.other, c.key.object) == pair);
-    debug_assert!(contacts[first..first + count].iter().all(|c| matches!(c.other, Other::Obstacle { .. })));
-    &contacts[first..first + count]
 }

@@ -4,7 +4,8 @@ use super::search::{Search, Sight};
 use crate::surface::SurfacePoint;
 use glam::DVec3;
 
-/// Points within this share of the mean edge are taken in though they don't come nearer.
+/// Points within this share of the mean edge are taken in though they don't come nearer: what the others' forces move
+/// is small beside it.
 pub(crate) const MARGIN: f64 = 2e-3;
 
 /// A point deeper inside than this share of the mean edge, and not in contact before, has come there some other way.

@@ -5,6 +5,7 @@ mod cone;
 mod held;
 mod meeting;
 mod pairs;
+mod parts;
 mod points;
 mod projection;
 mod search;
@@ -14,9 +15,10 @@ mod wanted;
 
 pub(crate) use against::against;
 pub(crate) use held::HeldSystem;
-pub(crate) use points::{ContactPoint, ContactPoints, is_place};
-pub(crate) use search::{NodeCache, Search, Vicinity};
-pub(crate) use solver::{Lift, Parts, Solver};
+pub(crate) use parts::{Lift, Parts};
+pub(crate) use points::{ContactPoint, ContactPoints};
+pub(crate) use search::{MOST_FACES, NodeCache, Search, Vicinity};
+pub(crate) use solver::Solver;
 pub(crate) use touch::{DeviceState, touch};
 pub(crate) use wanted::{Finding, HELD, Key, Wanted, WantedList, WantedOther, renew};
 
@@ -82,9 +84,11 @@ pub(crate) struct Contact {
     pub(crate) end: DVec3,
     /// Least gap at the end of the step [m]: 0, or what was left of it at the start.
     pub(crate) least_gap: f64,
-    /// Force on the object, held over the step [N, world], and how it has changed since the step before.
+    /// Force on the object, held over the step [N, world].
     pub(crate) force: DVec3,
+    /// How the force changed in the last step, and the force that it is guessed from with that, if it is.
     pub(crate) trend: DVec3,
+    pub(crate) guessed_from: Option<DVec3>,
     /// The force before a sweep, and along the direction of search (see `solver`).
     pub(crate) before: DVec3,
     pub(crate) along: DVec3,
@@ -125,4 +129,11 @@ impl Contact {
         let normal = self.force.dot(self.normal) * self.normal.dot(moved);
         (normal, self.force.dot(moved) - normal)
     }
+}
+
+/// The contacts of an object with one other side: they stand together, in the order of their features.
+fn known_contacts(contacts: &[Contact], other: Against, object: usize) -> &[Contact] {
+    let first = contacts.partition_point(|c| (c.key.other, c.key.object) < (other, object));
+    let count = contacts[first..].partition_point(|c| (c.key.other, c.key.object) == (other, object));
+    &contacts[first..first + count]
 }

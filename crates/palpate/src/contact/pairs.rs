@@ -4,7 +4,6 @@ use super::meeting::{Approach, MARGIN, meeting};
 use super::search::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedOther};
 use super::{Against, Law, Other};
-use crate::obstacle::Shape;
 use crate::response::{Place, Reading};
 
 impl Finding<'_> {
@@ -28,22 +27,15 @@ impl Finding<'_> {
         let (object, base) = (&self.model.objects[nodes_of], &self.model.objects[surface_of]);
         let (pose, base_pose) = (own.rigid.pose, other.rigid.pose);
         // How far the two go relative to each other in the step, at most.
-        let way = |at: usize, radius: f64| {
-            let own = &self.objects[at];
-            let (start, free) = (own.rigid.pose, own.free.end.pose);
-            (free.position - start.position).length()
-                + start.orientation.angle_between(free.orientation) * radius
-        };
+        let moves =
+            pose.way(&own.free.end.pose, object.radius) + base_pose.way(&other.free.end.pose, base.radius);
         let edge = object.body.edge.min(base.body.edge);
-        let moves = way(nodes_of, object.radius) + way(surface_of, base.radius);
 
         // The nodes near the box around the other, which is moved out as far as the other can deform.
         let cache = &mut self.caches[surface_of];
         let sight =
             Sight::new(&base.body, Reading::Point, &other.response, &other.points, cache, Ok(self.step));
         let grown = sight.reach() + moves + MARGIN * edge;
-        let (middle, half_extents) = base.body.extent();
-        let around = Shape::Box { half_extents };
         let cache = &mut self.caches[nodes_of];
         let sight =
             &mut Sight::new(&object.body, Reading::Point, &own.response, &own.points, cache, Ok(self.step));
@@ -56,9 +48,7 @@ impl Finding<'_> {
         near.clear();
         sight.walk(
             |_, _, centre, radius| {
-                let local = base_pose.body_from_world(pose.world_from_body(centre)) - middle;
-                let reach = radius + grown;
-                around.signed_distance(local, reach).is_some_and(|(distance, _)| distance < reach)
+                base.body.is_near(base_pose.body_from_world(pose.world_from_body(centre)), radius + grown)
             },
             |sight, triangle| {
                 for node in object.body.recording.surface.triangles[triangle as usize] {

@@ -3,7 +3,7 @@
 //! C [m/N] in body axes, R_cc[0] of equation (9), depends on where the points are, not on time: it is computed when
 //! a point is new and kept while it lasts.
 
-use crate::response::{Body, Place, Placed, Responding, dot};
+use crate::response::{Place, Placed, Responding, dot};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -292,12 +292,4 @@ impl ContactPoints {
             point.free = responding.free(point.slot, &point.placed);
         }
     }
-}
-
-/// Whether a body's places can be read so; for checks.
-pub(crate) fn is_place(body: &Body, place: &Place) -> bool {
-    let [a, b, c] = place.point.weights;
-    (place.point.triangle as usize) < body.recording.surface.triangles.len()
-        && libm::fabs(a + b + c - 1.0) < 1e-9
-        && [a, b, c].iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))
 }

@@ -11,7 +11,7 @@
 //! the mean of the triangles around it, on its side of a crease: over a crease the tip rolls about the edge itself.
 
 use super::search::{Found, Sight};
-use crate::surface::at_weights;
+use crate::surface::{area_normal, at_weights};
 use glam::DVec3;
 
 /// Triangles that meet at less than this cosine have a crease between them: 37 degrees.
@@ -109,8 +109,7 @@ fn outer_side(sight: &mut Sight, found: &Found, away: DVec3) -> Option<f64> {
 }
 
 fn face_normal(sight: &mut Sight, triangle: u32) -> DVec3 {
-    let [a, b, c] = sight.corners(triangle);
-    (b - a).cross(c - a).normalize_or_zero()
+    area_normal(sight.corners(triangle)).normalize_or_zero()
 }
 
 /// The smooth normal at each corner of a triangle, on its side of creases.

@@ -2,7 +2,7 @@
 
 use crate::contact::ContactPoints;
 use crate::response::{Acting, Body, Place, Reading, ResponseState, dot3};
-use crate::surface::{Visit, at_weights, nearest_on_triangle};
+use crate::surface::{Visit, area_normal, at_weights, nearest_on_triangle};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -14,8 +14,11 @@ const MOST_FOUND: usize = 192;
 const MOST_AROUND: usize = 48;
 const SPARE: f64 = 0.15;
 
-/// Minima whose directions differ by less than this cosine are one: a facetted surface is one face.
-const ONE_FACE: f64 = 0.85;
+/// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
+pub(super) const ONE_FACE: f64 = 0.85;
+
+/// Faces of one object that a tip can meet at once.
+pub(crate) const MOST_FACES: usize = 4;
 
 /// A triangle near a point, body frame.
 #[derive(Debug, Clone, Copy)]
@@ -104,7 +107,7 @@ pub(crate) struct Sight<'a> {
     /// Forces of the last step with their places.
     acting: &'a [Acting],
     /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does.
-    own: [Option<Place>; 4],
+    own: [Option<Place>; MOST_FACES],
     flat: f64,
     cache: &'a mut NodeCache,
     visit: Visit,
@@ -137,11 +140,21 @@ impl<'a> Sight<'a> {
             slope: body.dent_slope(reading),
         };
         let free = state.free_coordinates();
-        Self { body, reading, q, free, acting: state.acting(), own: [None; 4], flat: 0.0, cache, visit }
+        Self {
+            body,
+            reading,
+            q,
+            free,
+            acting: state.acting(),
+            own: [None; MOST_FACES],
+            flat: 0.0,
+            cache,
+            visit,
+        }
     }
 
     /// Leave out the own dents of places within a distance [m]: a tip that presses is not beside itself.
-    pub(crate) fn without_dents(&mut self, own: [Option<Place>; 4], flat: f64) {
+    pub(crate) fn without_dents(&mut self, own: [Option<Place>; MOST_FACES], flat: f64) {
         if own.iter().any(Option::is_some) {
             (self.own, self.flat) = (own, flat);
             self.cache.whole_now += 1;
@@ -248,7 +261,7 @@ impl<'a> Sight<'a> {
         let corners = self.corners(triangle);
         let weights = nearest_on_triangle(corners, p);
         let position = at_weights(corners, weights);
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let normal = area_normal(corners).normalize_or_zero();
         Found { triangle, weights, position, distance: (p - position).length(), normal }
     }
 
@@ -294,10 +307,8 @@ impl Vicinity {
         if self.reach == 0.0 {
             return 0.0;
         }
-        let omegas = &sight.body.recording.modes.angular_frequencies;
-        let change = omegas.iter().zip(sight.q.iter().zip(&self.q)).map(|(omega, (a, b))| omega * (a - b));
-        let moved =
-            sight.body.reach(change.map(|x| x * x).sum()) + 2.0 * libm::fabs(sight.most_dent() - self.dent);
+        let deformed = sight.body.way(&self.q[..sight.q.len()], sight.q);
+        let moved = deformed + 2.0 * libm::fabs(sight.most_dent() - self.dent);
         self.reach - moved - (p - self.point).length()
     }
 }

@@ -14,19 +14,13 @@
 //! ```
 
 use super::projection::stand;
-use super::search::{Found, Search, Sight};
+use super::search::{Found, MOST_FACES, ONE_FACE, Search, Sight};
 use super::wanted::{Finding, Key, Wanted, WantedOther};
-use super::{Against, Contact, Law};
+use super::{Against, Contact, Law, known_contacts};
 use crate::response::{Place, Reading};
 use crate::scene::DeviceParameters;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
-
-/// Faces of one object that a tip can meet at once.
-const MOST_FACES: usize = 4;
-
-/// Meetings whose normals differ by less than this cosine are one.
-const SAME_FACE: f64 = 0.85;
 
 /// A place is kept while the proxy is off its normal by less than this share of the contact's size.
 const ROLL: f64 = 1e-3;
@@ -114,11 +108,11 @@ pub(crate) fn touch(
     let tip = parameters.tip_radius.max(LEAST_TIP * body.edge);
     let start = own.rigid.pose.body_from_world(device.proxy);
     let free = own.free.end.pose.body_from_world(device.proxy_under_force());
-    let motion = (free - start).length() + own.surface_motion;
+    let travel = (free - start).length();
+    let motion = travel + own.surface_motion;
 
-    let known = |c: &&Contact| c.object == at && c.against() == Against::Device(number);
     let mut dents = [None; MOST_FACES];
-    for (dent, contact) in dents.iter_mut().zip(scene.contacts.iter().filter(known)) {
+    for (dent, contact) in dents.iter_mut().zip(known_contacts(scene.contacts, Against::Device(number), at)) {
         *dent = Some(own.points.of(contact.slot).place);
     }
     let cache = &mut scene.caches[at];
@@ -138,7 +132,6 @@ pub(crate) fn touch(
             return;
         }
     }
-    let travel = (free - start).length();
     let reach = tip + 1.2 * travel + 0.02 * body.edge;
     scene.search.around(&mut sight, vicinity, start, reach);
     // The surface here moves about as its nearest nodes do.
@@ -188,7 +181,7 @@ impl Faces {
         }
         let standing = stand(sight, found, proxy, self.tip);
         // Two nearest points of one smooth surface are one place.
-        let known = |m: &Meeting| m.normal_in_body.dot(standing.normal) > SAME_FACE;
+        let known = |m: &Meeting| m.normal_in_body.dot(standing.normal) > ONE_FACE;
         if self.all().any(known) {
             return;
         }
@@ -265,7 +258,7 @@ fn on_the_way(
         scene.search.near(&mut sight, p, 0.98 * faces.tip.max(slide.length() / count));
         scene.search.keep_minima(body, f64::INFINITY, 2 * MOST_FACES);
         for found in &scene.search.found {
-            let other = faces.all().all(|meeting| meeting.normal_in_body.dot(found.normal) < SAME_FACE);
+            let other = faces.all().all(|meeting| meeting.normal_in_body.dot(found.normal) < ONE_FACE);
             // Met from outside: the way leads against it.
             if other && slide.dot(found.normal) < 0.0 {
                 let beside = found.position + found.normal * faces.tip;
@@ -292,18 +285,14 @@ fn want(
     let parameters = &scene.model.parameters.devices[number];
     let size = faces.tip.max(parameters.patch_radius).max(0.1 * body.edge);
     let mut taken = [false; 2 * MOST_FACES];
+    let known = known_contacts(scene.contacts, Against::Device(number), at);
     for meeting in faces.all() {
         let rest = body.recording.surface.rest_position(&meeting.point);
         let mut place = Place { point: meeting.point, reading };
         // The contact of the last step that is nearest on the surface, if one is near.
-        let known = |c: &&Contact| {
-            c.object == at
-                && c.against() == Against::Device(number)
-                && matches!(c.law, Law::Touch { .. })
-                && !taken[c.key.feature as usize]
-        };
+        let left = |c: &&Contact| c.law != Law::Held && !taken[c.key.feature as usize];
         let off = |c: &Contact| (own.points.of(c.slot).rest - rest).length();
-        let before = scene.contacts.iter().filter(known).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let before = known.iter().filter(left).min_by(|a, b| off(a).total_cmp(&off(b)));
         let before = before.filter(|c| off(c) < size + 2.0 * motion + body.edge);
         let feature = match before {
             Some(contact) => {
@@ -316,14 +305,8 @@ fn want(
                 contact.key.feature
             }
             None => {
-                let used = |feature: u64| {
-                    taken[feature as usize]
-                        || scene.contacts.iter().any(|c| {
-                            c.object == at
-                                && c.against() == Against::Device(number)
-                                && c.key.feature == feature
-                        })
-                };
+                let used =
+                    |feature: u64| taken[feature as usize] || known.iter().any(|c| c.key.feature == feature);
                 (0..taken.len() as u64).find(|&feature| !used(feature)).unwrap_or_default()
             }
         };

@@ -171,18 +171,7 @@ fn take(
             }
         }
     };
-    // The last step's force is the first guess; when the normal turns, it turns along.
-    let (force, trend) = before.map_or((DVec3::ZERO, DVec3::ZERO), |contact| match wanted.law {
-        Law::Held if fresh => (DVec3::ZERO, DVec3::ZERO),
-        Law::Held => (contact.force, DVec3::ZERO),
-        Law::Touch { .. } => {
-            let turn = glam::DQuat::from_rotation_arc(contact.normal, wanted.normal);
-            let (force, trend) = (turn * contact.force, turn * contact.trend);
-            let next = force + trend;
-            // Not beyond where it would pull.
-            if next.dot(wanted.normal) > 0.0 { (force, DVec3::ZERO) } else { (next, -force) }
-        }
-    });
+    let (force, guessed_from) = before.map_or((DVec3::ZERO, None), |known| guess(known, wanted, fresh));
     Some(Contact {
         key: wanted.key,
         object,
@@ -195,7 +184,8 @@ fn take(
         start: DVec3::ZERO,
         end: DVec3::ZERO,
         least_gap: 0.0,
-        trend,
+        trend: DVec3::ZERO,
+        guessed_from,
         before: DVec3::ZERO,
         along: DVec3::ZERO,
         axes: DMat3::ZERO,
@@ -203,4 +193,17 @@ fn take(
         stiffness: DMat3::ZERO,
         force,
     })
+}
+
+/// The force of a known contact to begin with: that of the last step with its trend, from which it is guessed then.
+fn guess(known: &Contact, wanted: &Wanted, fresh: bool) -> (DVec3, Option<DVec3>) {
+    if wanted.law == Law::Held {
+        return (if fresh { DVec3::ZERO } else { known.force }, None);
+    }
+    // When the normal turns, it turns along.
+    let turn = glam::DQuat::from_rotation_arc(known.normal, wanted.normal);
+    let (force, next) = (turn * known.force, turn * (known.force + known.trend));
+    // Not beyond where it would pull.
+    let pulls = next.dot(wanted.normal) > 0.0;
+    if pulls || force == DVec3::ZERO { (force, None) } else { (next, Some(force)) }
 }

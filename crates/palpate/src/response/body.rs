@@ -61,8 +61,9 @@ pub(crate) struct Body {
     /// The triangles around every surface node, one after the other.
     around: Vec<u32>,
     first_around: Vec<u32>,
-    middle: DVec3,
-    half_extents: DVec3,
+    /// The box around the body at rest [m, body].
+    low: DVec3,
+    high: DVec3,
 }
 
 impl Body {
@@ -82,16 +83,13 @@ impl Body {
             around.extend(triangles);
             first_around.push(around.len() as u32);
         }
-        let places = || recording.surface.positions.iter().copied();
-        let low = places().reduce(DVec3::min).unwrap_or_default();
-        let high = places().reduce(DVec3::max).unwrap_or_default();
-        let (middle, half_extents) = ((low + high) * 0.5, (high - low) * 0.5);
-        Self { recording, patches, tree, bounds, edge, around, first_around, middle, half_extents }
+        let (low, high) = recording.surface.extent();
+        Self { recording, patches, tree, bounds, edge, around, first_around, low, high }
     }
 
-    /// Middle and half extents of the box around the body at rest [m, body].
-    pub(crate) fn extent(&self) -> (DVec3, DVec3) {
-        (self.middle, self.half_extents)
+    /// Whether a place [m, body] is within a reach [m] of the box around the body at rest.
+    pub(crate) fn is_near(&self, place: DVec3, reach: f64) -> bool {
+        (place - place.clamp(self.low, self.high)).length() < reach
     }
 
     /// The triangles around a surface node.
@@ -119,8 +117,11 @@ impl Body {
         omegas.iter().zip(q).map(|(omega, q)| (omega * q) * (omega * q)).sum()
     }
 
-    /// How far modal coordinates with such a norm squared [J] can move any surface node [m].
-    pub(crate) fn reach(&self, norm_squared: f64) -> f64 {
+    /// How far any surface node can go between two modal coordinates [m].
+    pub(crate) fn way(&self, from: &[f64], to: &[f64]) -> f64 {
+        let omegas = &self.recording.modes.angular_frequencies;
+        let change = omegas.iter().zip(from.iter().zip(to)).map(|(omega, (a, b))| omega * (b - a));
+        let norm_squared: f64 = change.map(|x| x * x).sum();
         self.bounds.reach(&Visit { modal: libm::sqrt(norm_squared), ..Visit::STILL })
     }
 

@@ -117,18 +117,17 @@ impl SampledModes {
     ) -> DMat3 {
         let m = self.len();
         let (rows_a, rows_b) = (state.rows(a.0), state.rows(b.0));
-        let row = |rows: &'_ [f64], axis: usize| -> usize { axis * (rows.len() / 3) };
         let mut sum = [[0.0; 3]; 3];
         let mut weighted = [0.0; LANES];
         for start in (0..m).step_by(LANES) {
             let lanes = LANES.min(m - start);
             for (column, sums) in sum.iter_mut().enumerate() {
-                let from = &rows_b[row(rows_b, column) + start..][..lanes];
+                let from = &rows_b[column * m + start..][..lanes];
                 for ((w, b), oscillator) in weighted.iter_mut().zip(from).zip(&self.oscillators[start..]) {
                     *w = oscillator.b * b;
                 }
                 for (axis, value) in sums.iter_mut().enumerate() {
-                    *value += dot(&rows_a[row(rows_a, axis) + start..][..lanes], &weighted[..lanes]);
+                    *value += dot(&rows_a[axis * m + start..][..lanes], &weighted[..lanes]);
                 }
             }
         }

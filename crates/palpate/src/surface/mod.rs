@@ -10,7 +10,7 @@ mod triangle;
 
 pub(crate) use patch::{PatchWeights, triangles_around};
 pub(crate) use tree::{Bounds, SurfaceTree, Visit};
-pub(crate) use triangle::{at_weights, nearest_on_triangle};
+pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -54,11 +54,24 @@ impl Surface {
         self.positions.iter().map(|p| p.length()).fold(0.0, f64::max)
     }
 
-    /// Diagonal [m] of the bounding box at rest.
-    pub fn diagonal(&self) -> f64 {
+    /// Lowest and highest corner of the bounding box at rest [m, body frame].
+    pub(crate) fn extent(&self) -> (DVec3, DVec3) {
         let low = self.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
         let high = self.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
+        (low, high)
+    }
+
+    /// Diagonal [m] of the bounding box at rest.
+    pub fn diagonal(&self) -> f64 {
+        let (low, high) = self.extent();
         (high - low).length()
+    }
+
+    /// Whether a point is one of this surface.
+    pub(crate) fn holds(&self, point: &SurfacePoint) -> bool {
+        (point.triangle as usize) < self.triangles.len()
+            && libm::fabs(point.weights.iter().sum::<f64>() - 1.0) < 1e-9
+            && point.weights.iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))
     }
 
     /// Mean edge length [m] of the triangles at rest.

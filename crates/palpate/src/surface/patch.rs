@@ -9,7 +9,7 @@
 //! with the linear hat functions Nᵢ, over the part of the surface that hangs together with c. Displacement is
 //! averaged and force is spread with the same weights. As a → 0 the patch becomes the node.
 
-use super::{Surface, at_weights};
+use super::{Surface, area_normal, at_weights};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -114,8 +114,7 @@ pub(crate) fn triangles_around(surface: &Surface) -> Vec<Vec<u32>> {
 
 /// Twice the area of a triangle, along its normal [m²].
 fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
-    let [a, b, c] = surface.triangles[triangle].map(|node| surface.positions[node as usize]);
-    (b - a).cross(c - a)
+    area_normal(surface.triangles[triangle].map(|node| surface.positions[node as usize]))
 }
 
 /// Give weights of the corners and shares of the area, times the kernel, at points that integrate over a triangle.

@@ -39,6 +39,11 @@ pub(crate) fn nearest_on_triangle([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
+/// Normal, twice as long as the area, on the side from which the corners go counter-clockwise.
+pub(crate) fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
 /// The point with barycentric weights.
 pub(crate) fn at_weights(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
