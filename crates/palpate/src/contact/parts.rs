@@ -184,8 +184,9 @@ impl Parts<'_> {
         }
     }
 
-    /// What a contact's law is solved with, in linear terms.
-    pub(super) fn prepare(&mut self, at: usize) {
+    /// What a contact's law is solved with, in linear terms. A guess that moves its sides by less than `enough` [m]
+    /// from where they were is noise.
+    pub(super) fn prepare(&mut self, at: usize, enough: f64) {
         let contact = self.contacts[at];
         let mut w = self.compliance(contact.object, contact.slot, contact.slot);
         match contact.other {
@@ -198,6 +199,10 @@ impl Parts<'_> {
         let compliance = axes.transpose() * w * axes;
         let contact = &mut self.contacts[at];
         (contact.axes, contact.compliance, contact.stiffness) = (axes, compliance, compliance.inverse());
+        let noise = |last: &DVec3| (w * (contact.force - *last)).length() < enough;
+        if let Some(last) = contact.guessed_from.filter(noise) {
+            contact.force = last;
+        }
     }
 
     pub(super) fn add_force(&mut self, contact: usize, change: DVec3) {

@@ -126,19 +126,11 @@ impl ContactPoints {
         (point.place, point.rest, point.placed, point.fresh) = (place, rest, placed, true);
         let corners = responding.body.recording.surface.corners(&place.point);
         point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
-        for other in 0..self.points.len() {
-            let (a, b) = (self.points[at], self.points[other]);
-            let block = responding.response.compliance(
-                responding.body,
-                responding.state,
-                (a.slot, &a.place),
-                (b.slot, &b.place),
-            );
-            self.write(at, other, &block);
-            if other != at {
-                self.write(other, at, &block.transpose());
-            }
-        }
+        let Self { points, compliance, stride, .. } = self;
+        responding.compliance((slot, &place), points, |other, block| {
+            write(compliance, *stride, (at, other), &block);
+            write(compliance, *stride, (other, at), &block.transpose());
+        });
         let force = DVec3::from_slice(&self.forces[3 * at..]);
         debug_assert_eq!(force, DVec3::ZERO);
         let forces = &self.forces[..3 * self.points.len()];
@@ -160,26 +152,18 @@ impl ContactPoints {
             for other in 0..last {
                 if other != at {
                     let block = self.block(last, other);
-                    self.write(at, other, &block);
-                    self.write(other, at, &block.transpose());
+                    write(&mut self.compliance, self.stride, (at, other), &block);
+                    write(&mut self.compliance, self.stride, (other, at), &block.transpose());
                 }
             }
             let own = self.block(last, last);
-            self.write(at, at, &own);
+            write(&mut self.compliance, self.stride, (at, at), &own);
             self.forces.copy_within(3 * last..3 * last + 3, 3 * at);
             self.moved.copy_within(3 * last..3 * last + 3, 3 * at);
             self.at[self.points[last].slot] = at;
         }
         self.points.swap_remove(at);
         self.unused.push(slot);
-    }
-
-    fn write(&mut self, row: usize, column: usize, block: &DMat3) {
-        for axis in 0..3 {
-            block
-                .row(axis)
-                .write_to_slice(&mut self.compliance[(3 * row + axis) * self.stride + 3 * column..]);
-        }
     }
 
     /// C between two points, by where they stand.
@@ -291,5 +275,12 @@ impl ContactPoints {
         for point in self.points.iter_mut().filter(|point| point.fresh) {
             point.free = responding.free(point.slot, &point.placed);
         }
+    }
+}
+
+/// Write the block of a row and a column of points.
+fn write(compliance: &mut [f64], stride: usize, (row, column): (usize, usize), block: &DMat3) {
+    for axis in 0..3 {
+        block.row(axis).write_to_slice(&mut compliance[(3 * row + axis) * stride + 3 * column..]);
     }
 }

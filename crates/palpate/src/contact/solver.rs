@@ -122,10 +122,10 @@ impl Solver {
             size = size.min(radius);
         }
         for &member in &self.members {
-            let contact = parts.contacts[member as usize];
-            if contact.law != Law::Held {
-                parts.prepare(member as usize);
+            if parts.contacts[member as usize].law != Law::Held {
+                parts.prepare(member as usize, self.accuracy(0, size));
             }
+            let contact = parts.contacts[member as usize];
             parts.apply(contact.object, contact.slot, contact.other, contact.force);
         }
         let dependent = self.factorise_held(parts);

@@ -94,23 +94,6 @@ impl Response {
             Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
         }
     }
-
-    /// R[0] between the places of two slots [m/N, body]: displacement of `a` per force on `b`.
-    ///
-    /// # Real time
-    pub(crate) fn compliance(
-        &self,
-        body: &Body,
-        state: &ResponseState,
-        a: (usize, &Place),
-        b: (usize, &Place),
-    ) -> DMat3 {
-        match (self, state) {
-            (Self::Modal(modes), ResponseState::Modal(state)) => modes.compliance(body, state, a, b),
-            (Self::Fir(fir), _) => fir.compliance(&a.1.point, &b.1.point),
-            _ => DMat3::ZERO,
-        }
-    }
 }
 
 /// An object's response with its state, for one step.
@@ -145,6 +128,29 @@ impl<'a> Responding<'a> {
                 Placed { displacement, ..Placed::default() }
             }
             _ => Placed::default(),
+        }
+    }
+
+    /// R[0] [m/N, body] between the place of a slot and every contact point: displacement there per force on the point.
+    /// Given with where the point stands.
+    ///
+    /// # Real time
+    pub(crate) fn compliance(
+        &mut self,
+        (slot, place): (usize, &Place),
+        points: &[ContactPoint],
+        mut give: impl FnMut(usize, DMat3),
+    ) {
+        match (self.response, &mut *self.state) {
+            (Response::Modal(modes), ResponseState::Modal(state)) => {
+                modes.compliance(self.body, state, (slot, place), points, give);
+            }
+            (Response::Fir(fir), _) => {
+                for (at, point) in points.iter().enumerate() {
+                    give(at, fir.compliance(&place.point, &point.place.point));
+                }
+            }
+            _ => {}
         }
     }
 

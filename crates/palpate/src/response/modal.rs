@@ -3,7 +3,7 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
-use super::dot::{dot, dot3};
+use super::dot::{dot3, dot9};
 use super::oscillator::{HeldOscillator, Oscillation};
 use super::{Acting, Body, Place, Placed};
 use crate::contact::ContactPoint;
@@ -14,9 +14,6 @@ use glam::{DMat3, DVec3};
 
 /// States below this size [√J] are set to zero: denormal numbers cost 40 times as much.
 const FLUSH_BELOW: f64 = 1e-150;
-
-/// Modes that are multiplied at a time.
-const LANES: usize = 64;
 
 /// All modes of one object at one step size.
 #[derive(Debug, Clone)]
@@ -35,6 +32,8 @@ pub(crate) struct ModalState {
     forces: Vec<f64>,
     /// Three rows J·Φ per contact point, by its slot.
     rows: Vec<f64>,
+    /// Three rows times B.
+    weighted: Vec<f64>,
     /// Forces [N, body] of the last step with their places, for the residual compliance.
     pub(super) acting: Vec<Acting>,
     /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
@@ -49,6 +48,7 @@ impl ModalState {
             free: vec![0.0; modes],
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
+            weighted: vec![0.0; 3 * modes],
             acting: Vec::with_capacity(capacity),
             residual_energy: 0.0,
         }
@@ -105,33 +105,29 @@ impl SampledModes {
         Placed { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }
 
-    /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the places of two slots.
+    /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
     ///
     /// # Real time
+    /// Costs modes × points.
     pub(crate) fn compliance(
         &self,
         body: &Body,
-        state: &ModalState,
-        a: (usize, &Place),
-        b: (usize, &Place),
-    ) -> DMat3 {
+        state: &mut ModalState,
+        (slot, place): (usize, &Place),
+        points: &[ContactPoint],
+        mut give: impl FnMut(usize, DMat3),
+    ) {
         let m = self.len();
-        let (rows_a, rows_b) = (state.rows(a.0), state.rows(b.0));
-        let mut sum = [[0.0; 3]; 3];
-        let mut weighted = [0.0; LANES];
-        for start in (0..m).step_by(LANES) {
-            let lanes = LANES.min(m - start);
-            for (column, sums) in sum.iter_mut().enumerate() {
-                let from = &rows_b[column * m + start..][..lanes];
-                for ((w, b), oscillator) in weighted.iter_mut().zip(from).zip(&self.oscillators[start..]) {
-                    *w = oscillator.b * b;
-                }
-                for (axis, value) in sums.iter_mut().enumerate() {
-                    *value += dot(&rows_a[axis * m + start..][..lanes], &weighted[..lanes]);
-                }
+        let ModalState { rows, weighted, .. } = state;
+        let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
+        for (weighted, own) in weighted.chunks_exact_mut(m.max(1)).zip(of(slot).chunks_exact(m.max(1))) {
+            for ((w, phi), oscillator) in weighted.iter_mut().zip(own).zip(&self.oscillators) {
+                *w = oscillator.b * phi;
             }
         }
-        DMat3::from_cols_array_2d(&sum) + body.residual(a.1, b.1)
+        for (at, point) in points.iter().enumerate() {
+            give(at, dot9(weighted, of(point.slot)) + body.residual(place, &point.place));
+        }
     }
 
     /// Modal coordinates at the end of the step if no contact force acts.
