@@ -2,7 +2,9 @@
 
 use crate::error::Error;
 use crate::spatial::Pose;
-use crate::surface::{Bounds, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle};
+use crate::surface::{
+    Bands, Bounds, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle,
+};
 use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -109,7 +111,7 @@ impl ObstacleMesh {
         let source_nodes = (0..positions.len() as u32).collect();
         let surface = Surface { positions, triangles, source_nodes };
         let tree = SurfaceTree::new(&surface);
-        let bounds = tree.bounds(&surface, |_, _| 0.0, |_| 0.0);
+        let bounds = tree.bounds(&surface, |_, _| Bands::default(), |_| 0.0);
         let radius = surface.radius();
         let mut owners = vec![0; surface.positions.len()];
         for (t, corners) in surface.triangles.iter().enumerate() {
@@ -124,8 +126,7 @@ impl ObstacleMesh {
         self.tree.walk(
             (&self.bounds, &Visit::STILL),
             &mut (),
-            |_, n| place(n),
-            |_, n| place(n),
+            (|_, n| place(n), |_, _| None, |_, n| place(n)),
             |_, _, centre, radius| near(centre, radius),
             |_, t| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
         );

@@ -12,7 +12,7 @@ use crate::obstacle::Obstacle;
 use crate::response::{Body, Place, Reading};
 use crate::spatial::Pose;
 use crate::state::ObjectState;
-use crate::surface::{SurfacePoint, at_weights};
+use crate::surface::{Centre, SurfacePoint, at_weights};
 use glam::DVec3;
 
 /// What a force moves on a node that is not pushed itself, as a share of what it moves where it acts: below it, from
@@ -95,15 +95,15 @@ impl Encounter<'_> {
         let dent = sight.most_dent();
         sight.begin_visit();
         sight.walk(
-            |sight, node, centre, radius| {
+            |sight, of, centre, radius| {
                 let reach = radius + self.margin + self.beside;
-                match node {
+                let start = |within: f64| self.distance(centre, within) < within;
+                let end = |place: DVec3| self.distance_after(place, reach) < reach;
+                match of {
                     // At rest: nothing is known but how far the deformation can go.
-                    None => self.distance(centre, reach + self.way) < reach + self.way,
-                    Some(node) => {
-                        self.distance(centre, reach) < reach
-                            || self.distance_after(sight.free_node(node), reach) < reach
-                    }
+                    Centre::Rest => start(reach + self.way),
+                    Centre::Low(node) => start(reach) || end(sight.free_low(node)),
+                    Centre::Moved(node) => start(reach) || end(sight.free_node(node)),
                 }
             },
             |sight, triangle| {

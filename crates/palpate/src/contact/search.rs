@@ -1,8 +1,8 @@
 //! Finding what is near on the moving, deformed surface of an object, without passing over the surface.
 
 use crate::contact::ContactPoints;
-use crate::response::{Acting, Body, Place, Reading, ResponseState, dot3};
-use crate::surface::{Visit, area_normal, at_weights, nearest_on_triangle};
+use crate::response::{Acting, Body, Place, Reading, ResponseState};
+use crate::surface::{Centre, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -10,9 +10,9 @@ use glam::DVec3;
 /// Surface points that a search keeps at most; where a mesh is finer the nearest count.
 const MOST_FOUND: usize = 192;
 
-/// Triangles that a vicinity can hold, and what it is found with to spare, as a share of the mean edge.
-const MOST_AROUND: usize = 48;
-const SPARE: f64 = 0.15;
+/// What a vicinity is found with to spare, as a share of the mean edge and of what is asked for.
+const SPARE_EDGE: f64 = 0.15;
+const SPARE_REACH: f64 = 0.05;
 
 /// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
 pub(super) const ONE_FACE: f64 = 0.85;
@@ -134,7 +134,7 @@ impl<'a> Sight<'a> {
         let same = points.points.iter().filter(|p| p.place.reading == reading);
         let beside = same.map(|p| p.placed.residual.length()).fold(0.0, f64::max);
         let visit = Visit {
-            modal: libm::sqrt(body.norm_squared(q)),
+            modal: body.norms(q),
             residual: libm::sqrt(2.0 * state.residual_energy()),
             most_residual: 2.0 * beside,
             slope: body.dent_slope(reading),
@@ -188,7 +188,8 @@ impl<'a> Sight<'a> {
 
     /// Let spheres hold also what the step without contact force does.
     pub(crate) fn widen(&mut self) {
-        self.visit.modal = self.visit.modal.max(libm::sqrt(self.body.norm_squared(self.free)));
+        let free = self.body.norms(self.free);
+        self.visit.modal = core::array::from_fn(|band| self.visit.modal[band].max(free[band]));
     }
 
     /// A node's place by the modes at the end of the step without contact force.
@@ -201,8 +202,7 @@ impl<'a> Sight<'a> {
     }
 
     fn displacement(&self, node: usize, q: &[f64]) -> DVec3 {
-        let m = q.len();
-        dot3(&self.body.rows(self.reading)[3 * m * node..3 * m * (node + 1)], q)
+        self.body.displacement(self.reading, node, q.len(), q)
     }
 
     /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
@@ -229,7 +229,14 @@ impl<'a> Sight<'a> {
         if self.cache.whole_stamps[node] == self.cache.whole_now {
             return self.cache.whole[node];
         }
-        let mut place = self.smooth(node);
+        let smooth = self.smooth(node);
+        let place = self.with_dents(node, smooth);
+        (self.cache.whole[node], self.cache.whole_stamps[node]) = (place, self.cache.whole_now);
+        place
+    }
+
+    fn with_dents(&self, node: usize, smooth: DVec3) -> DVec3 {
+        let mut place = smooth;
         for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
             let own = self.own.iter().flatten().any(|own| *own == other.place);
             let flat = if own { self.flat } else { 0.0 };
@@ -238,7 +245,6 @@ impl<'a> Sight<'a> {
                 own && self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
             place += if beside { other.own_dent } else { self.body.dent(node, other, flat) };
         }
-        (self.cache.whole[node], self.cache.whole_stamps[node]) = (place, self.cache.whole_now);
         place
     }
 
@@ -248,6 +254,27 @@ impl<'a> Sight<'a> {
             Reading::Point => self.smooth(node),
             Reading::Patch(_) => self.node(node),
         }
+    }
+
+    /// Where a sphere's centre is by the low modes; none where it is known by all of them.
+    fn low_centre(&self, node: usize) -> Option<DVec3> {
+        if self.cache.stamps[node] == self.cache.now {
+            return None;
+        }
+        let smooth = self.low_place(node, self.q);
+        Some(match self.reading {
+            Reading::Point => smooth,
+            Reading::Patch(_) => self.with_dents(node, smooth),
+        })
+    }
+
+    /// A node's place by the low modes at the end of the step without contact force.
+    pub(crate) fn free_low(&self, node: usize) -> DVec3 {
+        self.low_place(node, self.free)
+    }
+
+    fn low_place(&self, node: usize, q: &[f64]) -> DVec3 {
+        self.rest(node) + self.body.displacement(self.reading, node, low_modes(q.len()), q)
     }
 
     /// Where the corners of a triangle are.
@@ -265,16 +292,17 @@ impl<'a> Sight<'a> {
         Found { triangle, weights, position, distance: (p - position).length(), normal }
     }
 
-    /// Visit all triangles in spheres that `near` takes: (node, centre, radius) in the body frame, see
+    /// Visit all triangles in spheres that `near` takes: (what its centre is, centre, radius) in the body frame, see
     /// [`crate::surface::SurfaceTree::walk`].
     pub(crate) fn walk(
         &mut self,
-        near: impl Fn(&mut Self, Option<usize>, DVec3, f64) -> bool,
+        near: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
         found: impl FnMut(&mut Self, u32),
     ) {
         let body = self.body;
         let visit = self.visit;
-        body.tree.walk((body.bounds(self.reading), &visit), self, Self::rest, Self::centre, near, found);
+        let places = (Self::rest, Self::low_centre, Self::centre);
+        body.tree.walk((body.bounds(self.reading), &visit), self, places, near, found);
     }
 }
 
@@ -282,7 +310,8 @@ impl<'a> Sight<'a> {
 /// surface have not gone farther than what they were found with to spare.
 #[derive(Debug, Clone)]
 pub(crate) struct Vicinity {
-    triangles: Vec<u32>,
+    /// The nearest first, with their distances then [m].
+    triangles: Vec<(u32, f64)>,
     /// Where the point was [m, body], the modal coordinates, the largest dent [m].
     point: DVec3,
     q: Vec<f64>,
@@ -294,7 +323,7 @@ pub(crate) struct Vicinity {
 impl Vicinity {
     pub(crate) fn new(modes: usize) -> Self {
         Self {
-            triangles: Vec::with_capacity(MOST_AROUND),
+            triangles: Vec::with_capacity(MOST_FOUND),
             point: DVec3::ZERO,
             q: vec![0.0; modes],
             dent: 0.0,
@@ -302,14 +331,10 @@ impl Vicinity {
         }
     }
 
-    /// Within which distance [m] of a point no triangle is missing.
-    fn covers(&self, sight: &Sight, p: DVec3) -> f64 {
-        if self.reach == 0.0 {
-            return 0.0;
-        }
+    /// How far the point and the surface have gone relative to each other since then, at most [m].
+    fn gone(&self, sight: &Sight, p: DVec3) -> f64 {
         let deformed = sight.body.way(&self.q[..sight.q.len()], sight.q);
-        let moved = deformed + 2.0 * libm::fabs(sight.most_dent() - self.dent);
-        self.reach - moved - (p - self.point).length()
+        deformed + 2.0 * libm::fabs(sight.most_dent() - self.dent) + (p - self.point).length()
     }
 }
 
@@ -355,21 +380,24 @@ impl Search {
     ///
     /// # Real time
     pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {
-        if vicinity.covers(sight, p) < reach {
-            let wide = reach + SPARE * sight.body.edge;
-            self.near(sight, p, wide);
-            vicinity.reach = 0.0;
-            if self.found.len() <= MOST_AROUND {
-                vicinity.triangles.clear();
-                vicinity.triangles.extend(self.found.iter().map(|found| found.triangle));
-                vicinity.q[..sight.q.len()].copy_from_slice(sight.q);
-                (vicinity.point, vicinity.dent, vicinity.reach) = (p, sight.most_dent(), wide);
-            }
+        let gone = if vicinity.reach > 0.0 { vicinity.gone(sight, p) } else { f64::INFINITY };
+        if gone + reach < vicinity.reach {
+            self.found.clear();
+            let can = vicinity.triangles.iter().take_while(|(_, distance)| *distance < reach + gone);
+            self.found.extend(can.map(|&(triangle, _)| sight.nearest_on(triangle, p)));
+            self.sort();
             return;
         }
-        self.found.clear();
-        self.found.extend(vicinity.triangles.iter().map(|&triangle| sight.nearest_on(triangle, p)));
-        self.sort();
+        let wide = reach + SPARE_EDGE * sight.body.edge + SPARE_REACH * reach;
+        self.near(sight, p, wide);
+        vicinity.triangles.clear();
+        vicinity.triangles.extend(self.found.iter().map(|found| (found.triangle, found.distance)));
+        vicinity.q[..sight.q.len()].copy_from_slice(sight.q);
+        // Where there was no room for all, nothing is known beyond the farthest.
+        let full = self.found.len() == MOST_FOUND;
+        let farthest = self.found.last().map_or(wide, |found| found.distance);
+        (vicinity.point, vicinity.dent) = (p, sight.most_dent());
+        vicinity.reach = if full { farthest } else { wide };
     }
 
     fn sort(&mut self) {
@@ -426,5 +454,70 @@ impl Search {
             }
         }
         self.found.truncate(kept);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::response::{Response, ResponseForm};
+    use alloc::sync::Arc;
+
+    #[test]
+    fn nothing_that_is_near_is_missed_however_the_body_deforms() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let radius = 2.0 * recording.surface.mean_edge();
+        let body = Body::new(recording.clone(), &[radius]);
+        let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
+        let (state, points) = (response.at_rest(1), ContactPoints::new(1));
+        let mut cache = NodeCache::new(recording.surface.positions.len());
+        let mut search = Search::new();
+        let (mut vicinity, omegas) =
+            (Vicinity::new(recording.modes.len()), &recording.modes.angular_frequencies);
+        let (mut found, mut full) = (0, 0);
+        for case in 0..4000 {
+            let angle = |k: f64| libm::sin(12.9 * f64::from(case) + 7.3 * k + 1.0);
+            let reading = if case % 2 == 0 { Reading::Point } else { Reading::Patch(0) };
+            // Deformations of some hundredths to twice the body's size, of low modes and of all.
+            let fall = if case % 3 == 0 { 1.0 } else { 0.1 };
+            let size = 0.1 * libm::exp(1.5 * angle(0.0));
+            let mode = |(k, omega): (usize, &f64)| {
+                size * angle(k as f64 + 1.0) * libm::exp(-fall * k as f64) * omegas[0] / omega * 0.3
+            };
+            let q: Vec<f64> = omegas.iter().enumerate().map(mode).collect();
+            let p = DVec3::new(angle(0.3), angle(0.6), angle(0.9)) * 0.12;
+            let reach = 0.05 * (1.0 + angle(0.2));
+            let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&q));
+            search.near(&mut sight, p, reach);
+            let mut all: Vec<u32> = (0..recording.surface.triangles.len() as u32)
+                .filter(|&t| sight.nearest_on(t, p).distance < reach)
+                .collect();
+            full += usize::from(all.len() >= MOST_FOUND);
+            if all.len() < MOST_FOUND {
+                let mut got: Vec<u32> = search.found.iter().map(|one| one.triangle).collect();
+                got.sort_unstable();
+                all.sort_unstable();
+                assert_eq!(got, all, "case {case}");
+            }
+            found += search.found.len();
+
+            // By the vicinity, a little later.
+            let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&q));
+            vicinity.reach = 0.0;
+            search.around(&mut sight, &mut vicinity, p, reach);
+            let later: Vec<f64> = q.iter().map(|q| q * 1.001).collect();
+            let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&later));
+            let p = p * 1.0005;
+            search.around(&mut sight, &mut vicinity, p, reach);
+            let near: Vec<u32> =
+                search.found.iter().filter(|one| one.distance < reach).map(|one| one.triangle).collect();
+            let count = (0..recording.surface.triangles.len() as u32)
+                .filter(|&t| sight.nearest_on(t, p).distance < reach)
+                .count();
+            assert!(near.len() == count || count >= MOST_FOUND, "case {case}: {} of {count}", near.len());
+        }
+        assert!(found > 5000 && full < 200, "{found} {full}");
     }
 }

@@ -1,8 +1,9 @@
 //! A body as contacts see it: its recording, how displacement is read on it, and the tree over its surface.
 
-use super::patch_field::{PatchField, modal_distance, residual_size};
+use super::dot::dot;
+use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
-use crate::surface::{Bounds, SurfacePoint, SurfaceTree, Visit, triangles_around};
+use crate::surface::{Bands, Bounds, SurfacePoint, SurfaceTree, Visit, band, triangles_around};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -71,11 +72,9 @@ impl Body {
     pub(crate) fn new(recording: Arc<Recording>, radii: &[f64]) -> Self {
         let tree = SurfaceTree::new(&recording.surface);
         let shapes = &recording.modes.mode_shapes;
-        let bounds = tree.bounds(
-            &recording.surface,
-            |i, c| modal_distance(&recording, shapes, i, c),
-            |i| residual_size(&recording, i),
-        );
+        let distances = ModalDistances::new(&recording, shapes);
+        let modal = |i: usize, c: Option<usize>| distances.between(i, c);
+        let bounds = tree.bounds(&recording.surface, modal, |i| residual_size(&recording, i));
         let patches = radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
@@ -111,18 +110,21 @@ impl Body {
         SurfacePoint { triangle, weights }
     }
 
-    /// Σω²·q² [J]: twice the elastic energy of modal coordinates.
-    pub(crate) fn norm_squared(&self, q: &[f64]) -> f64 {
-        let omegas = &self.recording.modes.angular_frequencies;
-        omegas.iter().zip(q).map(|(omega, q)| (omega * q) * (omega * q)).sum()
+    /// √(Σω²·q²) of every band of modes [√J]: √(2·elastic energy) of modal coordinates.
+    pub(crate) fn norms(&self, q: &[f64]) -> Bands {
+        self.norms_of(q.iter().copied())
     }
 
     /// How far any surface node can go between two modal coordinates [m].
     pub(crate) fn way(&self, from: &[f64], to: &[f64]) -> f64 {
+        let modal = self.norms_of(from.iter().zip(to).map(|(a, b)| b - a));
+        self.bounds.reach(&Visit { modal, ..Visit::STILL })
+    }
+
+    fn norms_of(&self, q: impl Iterator<Item = f64>) -> Bands {
         let omegas = &self.recording.modes.angular_frequencies;
-        let change = omegas.iter().zip(from.iter().zip(to)).map(|(omega, (a, b))| omega * (b - a));
-        let norm_squared: f64 = change.map(|x| x * x).sum();
-        self.bounds.reach(&Visit { modal: libm::sqrt(norm_squared), ..Visit::STILL })
+        let mut squares = omegas.iter().zip(q).map(|(omega, q)| (omega * q) * (omega * q));
+        core::array::from_fn(|at| libm::sqrt(squares.by_ref().take(band(omegas.len(), at).len()).sum()))
     }
 
     /// The reading for a patch of a radius [m]; the point itself for 0.
@@ -138,9 +140,29 @@ impl Body {
         }
     }
 
-    /// Mode shapes as a reading sees them: (3·node + axis)·m + mode.
-    pub(crate) fn rows(&self, reading: Reading) -> &[f64] {
-        self.patch(reading).map_or(&self.recording.modes.mode_shapes, |patch| &patch.rows)
+    /// What the first few modes, or all, do to a surface node [m, body], as a reading sees it.
+    ///
+    /// # Real time
+    pub(crate) fn displacement(&self, reading: Reading, node: usize, first: usize, q: &[f64]) -> DVec3 {
+        let (m, shapes) = (self.recording.modes.len(), &self.recording.modes.mode_shapes);
+        match self.patch(reading) {
+            None => rows_times(&shapes[3 * m * node..3 * m * (node + 1)], first, q),
+            Some(patch) => rows_times(&patch.rows[3 * m * node..3 * m * (node + 1)], first, q),
+        }
+    }
+
+    /// Add the mode shapes of a surface node with a weight, as a reading sees them: three rows.
+    ///
+    /// # Real time
+    pub(crate) fn add_rows(&self, reading: Reading, node: usize, weight: f64, rows: &mut [f64]) {
+        let (own, shapes) = (rows.len() * node..rows.len() * (node + 1), &self.recording.modes.mode_shapes);
+        match self.patch(reading) {
+            None => rows.iter_mut().zip(&shapes[own]).for_each(|(row, phi)| *row += weight * phi),
+            Some(patch) => {
+                let pairs = rows.iter_mut().zip(&patch.rows[own]);
+                pairs.for_each(|(row, phi)| *row += weight * f64::from(*phi));
+            }
+        }
     }
 
     /// What of a dent can change over a distance, as a share per metre.
@@ -221,4 +243,10 @@ impl Body {
         }
         sum
     }
+}
+
+/// Three rows times the first few of q.
+fn rows_times<X: Copy + Into<f64>>(rows: &[X], first: usize, q: &[f64]) -> DVec3 {
+    let (m, q) = (rows.len() / 3, &q[..first]);
+    DVec3::new(dot(&rows[..m], q), dot(&rows[m..2 * m], q), dot(&rows[2 * m..], q))
 }

@@ -9,18 +9,18 @@ const LANES: usize = 8;
 /// The same where nine products run side by side.
 const NINE: usize = 2;
 
-/// Σ a·b over the shorter length.
+/// Σ a·b over the shorter length; a in either precision.
 ///
 /// # Real time
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot<X: Copy + Into<f64>>(a: &[X], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let (a, b) = (&a[..n], &b[..n]);
     let mut sums = [0.0; LANES];
     let (heads, tails) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = heads.remainder().iter().zip(tails.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = heads.remainder().iter().zip(tails.remainder()).map(|(&x, y)| x.into() * y).sum();
     for (x, y) in heads.zip(tails) {
         for lane in 0..LANES {
-            sums[lane] += x[lane] * y[lane];
+            sums[lane] += x[lane].into() * y[lane];
         }
     }
     rest + ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
@@ -29,7 +29,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Three rows, one after the other, times q.
 ///
 /// # Real time
-pub(crate) fn dot3(rows: &[f64], q: &[f64]) -> DVec3 {
+pub(crate) fn dot3<X: Copy + Into<f64>>(rows: &[X], q: &[f64]) -> DVec3 {
     let m = rows.len() / 3;
     DVec3::new(dot(&rows[..m], q), dot(&rows[m..2 * m], q), dot(&rows[2 * m..], q))
 }

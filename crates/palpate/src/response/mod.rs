@@ -9,7 +9,7 @@ mod oscillator;
 mod patch_field;
 
 pub(crate) use body::{Acting, Body, Place, Placed, Reading};
-pub(crate) use dot::{dot, dot3};
+pub(crate) use dot::dot;
 pub use oscillator::{HeldOscillator, Oscillation};
 
 use crate::contact::ContactPoint;

@@ -89,14 +89,12 @@ impl SampledModes {
         gravity: DVec3,
     ) -> Placed {
         let m = self.len();
-        let (corners, shapes) = (body.recording.surface.corners(&place.point), body.rows(place.reading));
+        let corners = body.recording.surface.corners(&place.point);
         // J·Φ: the weighted rows of the triangle's corners.
         let rows = &mut state.rows[3 * m * slot..3 * m * (slot + 1)];
         rows.fill(0.0);
         for (node, weight) in corners.into_iter().filter(|(_, w)| *w != 0.0) {
-            for (row, phi) in rows.iter_mut().zip(&shapes[3 * m * node..3 * m * (node + 1)]) {
-                *row += weight * phi;
-            }
+            body.add_rows(place.reading, node, weight, rows);
         }
         let sag = body.recording.gravity.as_ref().map_or(DVec3::ZERO, |response| {
             corners.iter().map(|&(node, w)| response.residual_displacement(node, gravity) * w).sum()

@@ -9,15 +9,38 @@
 //!
 //! and likewise |uᵢ| ≤ √tr(Sᵢᵢ)·√(fᵀ·S·f) for the residual compliance S. So a sphere about the *moved* centre
 //! needs one number per energy, found once. This takes the place of the bounds on |q| of James & Pai's bounded
-//! deformation tree (2004, ACM Trans. Graph. 23, 393).
+//! deformation tree (2004, ACM Trans. Graph. 23, 393). The modes go in bands, each twice as wide as the one before,
+//! with an energy of its own: low modes carry most of it, and high ones most of what is different from node to node.
 
 use super::Surface;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use glam::DVec3;
 
 /// Triangles in a leaf: so many that their nodes are worth one test.
 const LEAF: usize = 4;
+
+/// Bands of modes, and how many of them make a centre that is nearly right and soon found.
+pub(crate) const BANDS: usize = 8;
+const LOW: usize = 5;
+
+/// A sphere is much smaller than another that is so many times as large.
+const MUCH: f64 = 1.3;
+
+/// A number for every band.
+pub(crate) type Bands = [f64; BANDS];
+
+/// The modes of a band, of so many in all.
+pub(crate) fn band(modes: usize, at: usize) -> Range<usize> {
+    let end = |at: usize| modes.div_ceil(1 << (BANDS - 1 - at));
+    if at == 0 { 0..end(0) } else { end(at - 1)..end(at) }
+}
+
+/// The modes whose displacement makes a centre nearly right.
+pub(crate) fn low_modes(modes: usize) -> usize {
+    band(modes, LOW - 1).end
+}
 
 /// A tree over the triangles; immutable.
 #[derive(Debug, Clone)]
@@ -39,15 +62,15 @@ struct TreeNode {
     second: u32,
 }
 
-/// How far the surface nodes below a tree node can go: per √(2·energy of the modes) and per √(2·energy of the
-/// residual compliance) [m/√J].
+/// How far the surface nodes below a tree node can go: per √(2·energy) of each band of modes and of the residual
+/// compliance [m/√J].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Spread {
     /// From where they are at rest.
-    modal: f64,
-    residual: f64,
+    modal: [f32; BANDS],
+    residual: f32,
     /// From the way that the centre goes.
-    modal_apart: f64,
+    apart: [f32; BANDS],
 }
 
 /// Spreads of all tree nodes, for one way to read the displacement.
@@ -59,8 +82,8 @@ pub(crate) struct Bounds {
 /// How far a deformation can move surface nodes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Visit {
-    /// √(2·energy) [√J] of modes and residual compliance.
-    pub(crate) modal: f64,
+    /// √(2·energy) [√J] of the bands of modes, and of the residual compliance.
+    pub(crate) modal: Bands,
     pub(crate) residual: f64,
     /// The most [m] that the residual compliance moves any node, where that is known.
     pub(crate) most_residual: f64,
@@ -71,15 +94,53 @@ pub(crate) struct Visit {
 impl Visit {
     /// Nothing moves.
     pub(crate) const STILL: Self =
-        Self { modal: 0.0, residual: 0.0, most_residual: 0.0, slope: f64::INFINITY };
+        Self { modal: [0.0; BANDS], residual: 0.0, most_residual: 0.0, slope: f64::INFINITY };
 
-    fn reach(&self, spread: &Spread) -> f64 {
-        spread.modal * self.modal + (spread.residual * self.residual).min(self.most_residual)
+    fn dent(&self, spread: &Spread) -> f64 {
+        (f64::from(spread.residual) * self.residual).min(self.most_residual)
     }
 
+    /// From rest.
+    fn reach(&self, spread: &Spread) -> f64 {
+        self.sum(&spread.modal, 0..BANDS) + self.dent(spread)
+    }
+
+    /// From the centre as the low modes move it.
+    fn beside_low(&self, spread: &Spread, radius: f64) -> f64 {
+        let modal = self.sum(&spread.apart, 0..LOW) + self.sum(&spread.modal, LOW..BANDS);
+        modal + self.dent_apart(spread, radius)
+    }
+
+    /// From the centre as it moves.
     fn apart(&self, spread: &Spread, radius: f64) -> f64 {
+        self.sum(&spread.apart, 0..BANDS) + self.dent_apart(spread, radius)
+    }
+
+    fn dent_apart(&self, spread: &Spread, radius: f64) -> f64 {
         let change = self.most_residual * (self.slope * radius).min(1.0);
-        spread.modal_apart * self.modal + (spread.residual * self.residual).min(change)
+        (f64::from(spread.residual) * self.residual).min(change)
+    }
+
+    fn sum(&self, spread: &[f32; BANDS], bands: Range<usize>) -> f64 {
+        bands.map(|at| f64::from(spread[at]) * self.modal[at]).sum()
+    }
+}
+
+/// What the centre of a sphere is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Centre {
+    /// A place at rest.
+    Rest,
+    /// A surface node as the low modes move it.
+    Low(usize),
+    /// A surface node where it is.
+    Moved(usize),
+}
+
+/// The larger of each pair, rounded up.
+fn widen(of: &mut [f32; BANDS], by: impl Fn(usize) -> f64) {
+    for (at, of) in of.iter_mut().enumerate() {
+        *of = of.max((by(at) as f32).next_up());
     }
 }
 
@@ -123,14 +184,16 @@ impl SurfaceTree {
         }
     }
 
-    /// Spreads for a way to read the displacement: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²), or √(Σ|φᵢ|²/ω²) without
-    /// c, and `residual(i)` √tr(Sᵢᵢ).
+    /// Spreads for a way to read the displacement: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²) for every band, or
+    /// √(Σ|φᵢ|²/ω²) without c, and `residual(i)` √tr(Sᵢᵢ).
     pub(crate) fn bounds(
         &self,
         surface: &Surface,
-        modal: impl Fn(usize, Option<usize>) -> f64,
+        modal: impl Fn(usize, Option<usize>) -> Bands,
         residual: impl Fn(usize) -> f64,
     ) -> Bounds {
+        let own: Vec<(Bands, f32)> =
+            (0..surface.positions.len()).map(|i| (modal(i, None), (residual(i) as f32).next_up())).collect();
         let mut spreads = vec![Spread::default(); self.nodes.len()];
         // Children come after their parents.
         for at in (0..self.nodes.len()).rev() {
@@ -141,10 +204,11 @@ impl SurfaceTree {
                 for triangle in self.triangles_of(&node) {
                     for i in surface.triangles[triangle as usize] {
                         let i = i as usize;
-                        spread.modal = spread.modal.max(modal(i, None));
-                        spread.residual = spread.residual.max(residual(i));
+                        widen(&mut spread.modal, |band| own[i].0[band]);
+                        spread.residual = spread.residual.max(own[i].1);
                         if i != c {
-                            spread.modal_apart = spread.modal_apart.max(modal(i, Some(c)));
+                            let apart = modal(i, Some(c));
+                            widen(&mut spread.apart, |band| apart[band]);
                         }
                     }
                 }
@@ -152,10 +216,10 @@ impl SurfaceTree {
                 // Higher up, by way of the children's centres.
                 for child in [at + 1, node.second as usize] {
                     let (below, middle) = (spreads[child], self.nodes[child].centre as usize);
-                    let far = if middle == c { 0.0 } else { modal(middle, Some(c)) };
-                    spread.modal = spread.modal.max(below.modal);
+                    let far = if middle == c { Bands::default() } else { modal(middle, Some(c)) };
+                    widen(&mut spread.modal, |band| below.modal[band].into());
                     spread.residual = spread.residual.max(below.residual);
-                    spread.modal_apart = spread.modal_apart.max(far + below.modal_apart);
+                    widen(&mut spread.apart, |band| far[band] + f64::from(below.apart[band]));
                 }
             }
             spreads[at] = spread;
@@ -167,21 +231,25 @@ impl SurfaceTree {
         self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
     }
 
-    /// Walk through the tree: a sphere (node, centre, radius) is entered where `near` says so, first about the rest
-    /// position of a node, which is not named, then about where it is, and the triangles of the
-    /// leaves that are reached are given to `found`. `rest` tells where a surface node is at rest, `moved` where it
-    /// is now; all in one frame.
+    /// Walk through the tree: a sphere (what its centre is, centre, radius) is entered where `near` says so, first about
+    /// the rest position of a surface node, then about where the low modes move it, then about where it is, and the
+    /// triangles of the leaves that are reached are given to `found`. `places` tells these places, the second only where
+    /// the third is not known; all in one frame.
     ///
     /// # Real time
     pub(crate) fn walk<C>(
         &self,
         (bounds, visit): (&Bounds, &Visit),
         context: &mut C,
-        rest: impl Fn(&C, usize) -> DVec3,
-        moved: impl Fn(&mut C, usize) -> DVec3,
-        near: impl Fn(&mut C, Option<usize>, DVec3, f64) -> bool,
+        places: (
+            impl Fn(&C, usize) -> DVec3,
+            impl Fn(&C, usize) -> Option<DVec3>,
+            impl Fn(&mut C, usize) -> DVec3,
+        ),
+        near: impl Fn(&mut C, Centre, DVec3, f64) -> bool,
         mut found: impl FnMut(&mut C, u32),
     ) {
+        let (rest, low, moved) = places;
         // Deeper than any tree of 2³² triangles.
         let mut stack = [0_u32; 64];
         let mut depth = usize::from(!self.nodes.is_empty());
@@ -190,14 +258,22 @@ impl SurfaceTree {
             let at = stack[depth] as usize;
             let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
             let c = node.centre as usize;
-            // The sphere that holds whatever the energies allow, then the one about the moved centre.
             let at_rest = rest(context, c);
-            if !near(context, None, at_rest, node.radius + visit.reach(spread)) {
+            if !near(context, Centre::Rest, at_rest, node.radius + visit.reach(spread)) {
                 continue;
             }
-            let centre = moved(context, c);
-            if !near(context, Some(c), centre, node.radius + visit.apart(spread, node.radius)) {
+            let within = node.radius + visit.apart(spread, node.radius);
+            let nearly = node.radius + visit.beside_low(spread, node.radius);
+            let low = low(context, c);
+            if low.is_some_and(|centre| !near(context, Centre::Low(c), centre, nearly)) {
                 continue;
+            }
+            // The sphere about where it is costs all modes: only where that is much smaller.
+            if low.is_none() || nearly > MUCH * within {
+                let centre = moved(context, c);
+                if !near(context, Centre::Moved(c), centre, within) {
+                    continue;
+                }
             }
             if node.second == 0 {
                 self.triangles_of(node).for_each(|triangle| found(context, triangle));
