@@ -128,7 +128,7 @@ impl ObstacleMesh {
             &mut (),
             (|_, n| place(n), |_, _| None, |_, n| place(n)),
             |_, _, centre, radius| near(centre, radius),
-            |_, t| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
+            |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
         );
     }
 

@@ -106,12 +106,11 @@ impl Encounter<'_> {
                     Centre::Moved(node) => start(reach) || end(sight.free_node(node)),
                 }
             },
-            |sight, triangle| {
+            |sight, triangle, high| {
                 for node in self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize) {
                     if !sight.first_visit(node) {
                         continue;
                     }
-                    let free = sight.free_node(node);
                     let place = match known.binary_search_by(|c| c.key.feature.cmp(&(node as u64))) {
                         Ok(contact) => {
                             let point = self.own.points.of(known[contact].slot);
@@ -119,15 +118,20 @@ impl Encounter<'_> {
                         }
                         Err(_) => {
                             let reach = self.margin + dent + self.beside;
-                            let smooth = sight.smooth(node);
-                            if self.distance(smooth, reach) >= reach
-                                && self.distance_after(free, reach) >= reach
+                            let comes_near = |start: DVec3, end: DVec3, within: f64| {
+                                self.distance(start, within) < within
+                                    || self.distance_after(end, within) < within
+                            };
+                            // The low modes alone can tell that it does not.
+                            if !comes_near(sight.low(node), sight.free_low(node), reach + high)
+                                || !comes_near(sight.smooth(node), sight.free_node(node), reach)
                             {
                                 continue;
                             }
                             sight.node(node)
                         }
                     };
+                    let free = sight.free_node(node);
                     self.meet(wanted, place, free, self.body.node_point(node), node);
                 }
                 self.middle(sight, triangle, dent, wanted);

@@ -50,7 +50,7 @@ impl Finding<'_> {
             |_, _, centre, radius| {
                 base.body.is_near(base_pose.body_from_world(pose.world_from_body(centre)), radius + grown)
             },
-            |sight, triangle| {
+            |sight, triangle, _| {
                 for node in object.body.recording.surface.triangles[triangle as usize] {
                     if sight.first_visit(node as usize) && near.len() < near.capacity() {
                         near.push(node);

@@ -261,14 +261,19 @@ impl<'a> Sight<'a> {
         if self.cache.stamps[node] == self.cache.now {
             return None;
         }
-        let smooth = self.low_place(node, self.q);
+        let smooth = self.low(node);
         Some(match self.reading {
             Reading::Point => smooth,
             Reading::Patch(_) => self.with_dents(node, smooth),
         })
     }
 
-    /// A node's place by the low modes at the end of the step without contact force.
+    /// A node's place by the low modes.
+    pub(crate) fn low(&self, node: usize) -> DVec3 {
+        self.low_place(node, self.q)
+    }
+
+    /// The same at the end of the step without contact force.
     pub(crate) fn free_low(&self, node: usize) -> DVec3 {
         self.low_place(node, self.free)
     }
@@ -297,7 +302,7 @@ impl<'a> Sight<'a> {
     pub(crate) fn walk(
         &mut self,
         near: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
-        found: impl FnMut(&mut Self, u32),
+        found: impl FnMut(&mut Self, u32, f64),
     ) {
         let body = self.body;
         let visit = self.visit;
@@ -358,7 +363,7 @@ impl Search {
         found.clear();
         sight.walk(
             |_, _, centre, radius| (p - centre).length() - radius < reach,
-            |sight, triangle| {
+            |sight, triangle, _| {
                 let one = sight.nearest_on(triangle, p);
                 if one.distance >= reach {
                     return;
@@ -413,7 +418,7 @@ impl Search {
         let least = || best.get().map_or(reach, |found| found.distance.min(reach));
         sight.walk(
             |_, _, centre, radius| (p - centre).length() - radius < least(),
-            |sight, triangle| {
+            |sight, triangle, _| {
                 let one = sight.nearest_on(triangle, p);
                 if one.distance < least() {
                     best.set(Some(one));

@@ -233,8 +233,9 @@ impl SurfaceTree {
 
     /// Walk through the tree: a sphere (what its centre is, centre, radius) is entered where `near` says so, first about
     /// the rest position of a surface node, then about where the low modes move it, then about where it is, and the
-    /// triangles of the leaves that are reached are given to `found`. `places` tells these places, the second only where
-    /// the third is not known; all in one frame.
+    /// triangles of the leaves that are reached are given to `found`, with how far their nodes are from where the low
+    /// modes move them at most. `places` tells these places, the second only where the third is not known; all in one
+    /// frame.
     ///
     /// # Real time
     pub(crate) fn walk<C>(
@@ -247,7 +248,7 @@ impl SurfaceTree {
             impl Fn(&mut C, usize) -> DVec3,
         ),
         near: impl Fn(&mut C, Centre, DVec3, f64) -> bool,
-        mut found: impl FnMut(&mut C, u32),
+        mut found: impl FnMut(&mut C, u32, f64),
     ) {
         let (rest, low, moved) = places;
         // Deeper than any tree of 2³² triangles.
@@ -276,7 +277,8 @@ impl SurfaceTree {
                 }
             }
             if node.second == 0 {
-                self.triangles_of(node).for_each(|triangle| found(context, triangle));
+                let high = visit.sum(&spread.modal, LOW..BANDS) + visit.dent(spread);
+                self.triangles_of(node).for_each(|triangle| found(context, triangle, high));
             } else {
                 stack[depth] = node.second;
                 stack[depth + 1] = at as u32 + 1;
