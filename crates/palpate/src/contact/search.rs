@@ -106,8 +106,9 @@ pub(crate) struct Sight<'a> {
     free: &'a [f64],
     /// Forces of the last step with their places.
     acting: &'a [Acting],
-    /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does.
-    own: [Option<Place>; MOST_FACES],
+    /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does, by so
+    /// much [m] where a reading's dents have no shape.
+    own: [Option<(Place, DVec3)>; MOST_FACES],
     flat: f64,
     cache: &'a mut NodeCache,
     visit: Visit,
@@ -156,7 +157,12 @@ impl<'a> Sight<'a> {
     /// Leave out the own dents of places within a distance [m]: a tip that presses is not beside itself.
     pub(crate) fn without_dents(&mut self, own: [Option<Place>; MOST_FACES], flat: f64) {
         if own.iter().any(Option::is_some) {
-            (self.own, self.flat) = (own, flat);
+            let dent = |place: Place| {
+                let its = |other: &&Acting| self.reading == Reading::Point && other.place == place;
+                let other = self.acting.iter().find(its);
+                (place, other.map_or(DVec3::ZERO, |o| self.body.residual(&place, &place) * o.force))
+            };
+            (self.own, self.flat) = (own.map(|place| place.map(dent)), flat);
             self.cache.whole_now += 1;
             self.cache.some_dents = true;
         }
@@ -238,12 +244,14 @@ impl<'a> Sight<'a> {
     fn with_dents(&self, node: usize, smooth: DVec3) -> DVec3 {
         let mut place = smooth;
         for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
-            let own = self.own.iter().flatten().any(|own| *own == other.place);
-            let flat = if own { self.flat } else { 0.0 };
+            let own = self.own.iter().flatten().find(|(own, _)| *own == other.place);
+            let flat = if own.is_some() { self.flat } else { 0.0 };
             // A dent that a point leaves has no shape between the nodes.
-            let beside =
-                own && self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
-            place += if beside { other.own_dent } else { self.body.dent(node, other, flat) };
+            let beside = self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
+            place += match own.filter(|_| beside) {
+                Some((_, dent)) => *dent,
+                None => self.body.dent(node, other, flat),
+            };
         }
         place
     }

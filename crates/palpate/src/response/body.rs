@@ -46,8 +46,6 @@ pub(crate) struct Acting {
     pub(crate) rest: DVec3,
     /// For patches Aᵀ·f [√J] of the patch field's equation.
     pull: DVec3,
-    /// What the residual compliance moves the place itself [m, body].
-    pub(crate) own_dent: DVec3,
 }
 
 /// One object's body; immutable.
@@ -203,15 +201,9 @@ impl Body {
     /// # Real time
     pub(crate) fn acting(&self, place: Place, force: DVec3) -> Acting {
         let rest = self.recording.surface.rest_position(&place.point);
-        let (pull, own_dent) = match self.patch(place.reading) {
-            Some(patch) => {
-                let root = patch.root_at(&self.recording, &place.point);
-                let pull = root.transpose() * force;
-                (pull, root * pull)
-            }
-            None => (DVec3::ZERO, self.residual(&place, &place) * force),
-        };
-        Acting { place, force, rest, pull, own_dent }
+        let root = self.patch(place.reading).map(|patch| patch.root_at(&self.recording, &place.point));
+        let pull = root.map_or(DVec3::ZERO, |root| root.transpose() * force);
+        Acting { place, force, rest, pull }
     }
 
     /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
