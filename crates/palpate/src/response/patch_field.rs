@@ -39,7 +39,7 @@ impl PatchField {
     pub(crate) fn new(recording: &Recording, tree: &SurfaceTree, radius: f64) -> Self {
         let (surface, modes) = (&recording.surface, &recording.modes);
         let (n, m) = (surface.positions.len(), modes.len());
-        let weights = PatchWeights::new(surface, radius);
+        let weights = PatchWeights::new(surface, recording.metadata.mesh.order, radius);
         let mut rows = Vec::with_capacity(3 * n * m);
         let mut sums = vec![0.0; 3 * m];
         for c in 0..n {

@@ -4,6 +4,7 @@
 //! Σ w·u over its corners; a force at the point enters the corners with the same weights, so
 //! that work is the same on both sides and reciprocity holds.
 
+mod face;
 mod patch;
 mod tree;
 mod triangle;

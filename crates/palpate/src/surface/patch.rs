@@ -6,9 +6,10 @@
 //! wᵢ = ∫ k(|x − x_c|/a)·max(0, n·n_c)·Nᵢ(x) dA / ∫ k·max(0, n·n_c) dA,        k(s) = (1 − s²)² for s < 1
 //! ```
 //!
-//! with the linear hat functions Nᵢ, over the part of the surface that hangs together with c. Displacement is
+//! with the shape functions Nᵢ of the finite elements, over the part of the surface that hangs together with c. Displacement is
 //! averaged and force is spread with the same weights. As a → 0 the patch becomes the node.
 
+use super::face::Faces;
 use super::{Surface, area_normal, at_weights};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -30,13 +31,16 @@ const FINE: f64 = 0.25;
 const MOST_HALVINGS: u32 = 7;
 
 impl PatchWeights {
-    pub(crate) fn new(surface: &Surface, radius: f64) -> Self {
+    /// On a surface of finite elements of an order.
+    pub(crate) fn new(surface: &Surface, order: u32, radius: f64) -> Self {
+        let faces = Faces::new(surface, order);
         let n = surface.positions.len();
         let around = triangles_around(surface);
         let normals: Vec<DVec3> = (0..surface.triangles.len()).map(|t| area_vector(surface, t)).collect();
         let mut patches = Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() };
         let mut weight = vec![0.0; n];
         let mut seen = vec![u32::MAX; surface.triangles.len()];
+        let mut known = vec![u32::MAX; n];
         let (mut queue, mut touched) = (Vec::new(), Vec::new());
         for c in 0..n {
             let centre = surface.positions[c];
@@ -44,7 +48,8 @@ impl PatchWeights {
             queue.clear();
             touched.clear();
             let mut add = |node: u32, w: f64, weight: &mut Vec<f64>| {
-                if weight[node as usize] == 0.0 && w > 0.0 {
+                if known[node as usize] != c as u32 {
+                    known[node as usize] = c as u32;
                     touched.push(node);
                 }
                 weight[node as usize] += w;
@@ -64,9 +69,7 @@ impl PatchWeights {
                 let mut reached = false;
                 integrate(places, centre, radius, |w, share| {
                     reached = true;
-                    for (node, w) in corners.into_iter().zip(w) {
-                        add(node, w * share * area, &mut weight);
-                    }
+                    faces.shapes(surface, t as usize, w, |node, w| add(node, w * share * area, &mut weight));
                 });
                 if reached {
                     for node in corners {
@@ -173,7 +176,7 @@ mod tests {
         // ∫k·r²/∫k = a²/4; the hat functions add a sixth of an edge squared per axis, and a bit across the diagonals.
         let (a, n) = (0.3, 40);
         let surface = sheet(n);
-        let patches = PatchWeights::new(&surface, a);
+        let patches = PatchWeights::new(&surface, 1, a);
         let c = (n / 2 * (n + 1) + n / 2) as usize;
         let (mut sum, mut mean, mut square) = (0.0, DVec3::ZERO, 0.0);
         for (node, w) in patches.of(c) {
@@ -192,9 +195,48 @@ mod tests {
     fn a_small_patch_is_its_node() {
         let surface = sheet(4);
         for radius in [0.0, 1e-5] {
-            let patches = PatchWeights::new(&surface, radius);
+            let patches = PatchWeights::new(&surface, 1, radius);
             let most = patches.of(12).fold(0.0, |most: f64, (node, w)| if node == 12 { w } else { most });
             assert!(most > 0.999, "{most}");
+        }
+    }
+
+    /// The same sheet as the surface of quadratic elements: faces of 2 × 2 cells, numbered so.
+    fn quadratic_sheet(n: u32) -> Surface {
+        let mut surface = sheet(n);
+        let node = |i: u32, j: u32| i * (n + 1) + j;
+        surface.triangles.clear();
+        for (i, j) in (0..n / 2).flat_map(|i| (0..n / 2).map(move |j| (2 * i, 2 * j))) {
+            for [a, b, c] in [[[0, 0], [2, 0], [2, 2]], [[0, 0], [2, 2], [0, 2]]] {
+                let middle = |p: [u32; 2], q: [u32; 2]| [(p[0] + q[0]) / 2, (p[1] + q[1]) / 2];
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+                    surface.triangles.push(corners.map(|[x, y]| node(i + x, j + y)));
+                }
+            }
+        }
+        let is_corner = |k: u32| (k / (n + 1)).is_multiple_of(2) && (k % (n + 1)).is_multiple_of(2);
+        let count = (n + 1) * (n + 1);
+        surface.source_nodes = (0..count).map(|k| if is_corner(k) { k } else { count + k }).collect();
+        surface
+    }
+
+    #[test]
+    fn patches_of_quadratic_elements_average_quadratic_fields_exactly() {
+        // ∫k·x²/∫k = a²/8, with nothing added by the mesh, however coarse.
+        let n = 8;
+        let surface = quadratic_sheet(n);
+        for (a, place) in [(0.4, [4, 4]), (0.3, [4, 5]), (0.25, [5, 4]), (0.2, [5, 5])] {
+            let patches = PatchWeights::new(&surface, 2, a);
+            let c = (place[0] * (n + 1) + place[1]) as usize;
+            let centre = surface.positions[c];
+            let field = |of: fn(DVec3) -> f64| -> f64 {
+                patches.of(c).map(|(node, w)| w * of(surface.positions[node] - centre)).sum()
+            };
+            assert!((field(|_| 1.0) - 1.0).abs() < 1e-12);
+            assert!(field(|p| p.x).abs().max(field(|p| p.x * p.y).abs()) < 1e-3 * a);
+            assert!((field(|p| p.x * p.x) / (a * a / 8.0) - 1.0).abs() < 5e-3, "{}", field(|p| p.x * p.x));
+            assert!((field(|p| p.y * p.y) / (a * a / 8.0) - 1.0).abs() < 5e-3, "{}", field(|p| p.y * p.y));
         }
     }
 }
