@@ -1,7 +1,7 @@
 //! The paper's cube falls flat on a frictionless floor, and lies on one.
 
-use super::Check;
 use super::scene::{G, PAPER, Stuff, Watch, at, floor, scene};
+use super::{Check, column};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{HeldOscillator, Input, Oscillation, Recording, State, step};
@@ -16,10 +16,6 @@ const AT_2_MS: &str = include_str!("../../../../data/reference/bounce_full_2ms.c
 const DROP: f64 = 0.05;
 /// Before the second contact [s].
 const FIRST_JUMP: f64 = 0.29;
-
-fn column(reference: &str, number: usize) -> Vec<f64> {
-    reference.lines().skip(1).filter_map(|row| row.split(',').nth(number)?.parse().ok()).collect()
-}
 
 /// Steps at which 200 modes + S rebound within 2 % of 24.5 mm. At 0.5 ms they are 2.2 % low, 23.97 mm, which is what the
 /// modes give and not how contacts are solved: see `by_hand`. With 1200 modes it is 24.49 mm; see `bounce_many_modes`.

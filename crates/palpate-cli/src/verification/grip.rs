@@ -1,7 +1,7 @@
 //! A finger that sticks does what a hand does that holds: the same three rows, by two routes.
 
-use super::Check;
 use super::scene::{PAPER, Stuff, Watch, at, scene};
+use super::{Check, smooth};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Grasp, Input, Recording, State, step};
@@ -17,9 +17,7 @@ const JELLY: Stuff = Stuff { beta: 2e-4, ..PAPER };
 
 /// Into the upper face and aside, by smooth ramps [m]; the first step is at rest, for the finger begins where it is then.
 fn way(number: usize) -> DVec3 {
-    let s = number as f64 / STEPS as f64;
-    let smooth = s * s * (3.0 - 2.0 * s);
-    DVec3::new(0.002 * smooth, -0.006 * smooth, 0.001 * smooth)
+    DVec3::new(0.002, -0.006, 0.001) * smooth(number as f64 / STEPS as f64)
 }
 
 /// Force on the hand [N], one a step: touching, or holding the point below where the tip starts. And by how much the

@@ -11,8 +11,8 @@
 //! Hertz leaves out that the surface moves inwards, a share (1 − 2ν)·√(δ/R) of the depth: hence ν near ½ and small δ/R.
 //! Linear elements are 13 % too stiff here, with twice the cells.
 
-use super::Check;
 use super::scene::{Stuff, Watch, at, scene};
+use super::{Check, smooth};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{Input, Obstacle, Pose, Recording, Shape, State, step};
@@ -62,8 +62,7 @@ fn pressed(body: &Arc<Recording>, depth: f64, watch: &mut Watch) -> Result<(f64,
     let mut state = State::new(&model);
     watch.look(state.output());
     for number in 1..=800 {
-        let s = (f64::from(number) / 300.0).min(1.0);
-        let down = (depth + 1e-4) * s * s * (3.0 - 2.0 * s) - 1e-4;
+        let down = (depth + 1e-4) * smooth(f64::from(number) / 300.0) - 1e-4;
         watch.look(step(&model, &mut state, &Input { obstacles: vec![ball(down)], ..Input::default() }));
     }
     let contacts = &state.output().contacts;

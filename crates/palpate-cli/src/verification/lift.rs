@@ -1,7 +1,7 @@
 //! Two fingers pinch the paper's cube, lift it from the floor, shake and throw it.
 
-use super::Check;
 use super::scene::{G, PAPER, Stuff, Watch, at, floor, scene};
+use super::{Check, smooth};
 use crate::Failure;
 use glam::DVec3;
 use palpate::{Against, Coupling, DeviceInput, DeviceParameters, Input, Output, State, step};
@@ -26,10 +26,9 @@ const END: f64 = 4.4;
 const SQUEEZE: f64 = 0.015;
 const HEIGHT: f64 = 0.05;
 
-/// 3s² − 2s³ between two times.
+/// From 0 to 1 between two times.
 fn ramp(t: f64, from: f64, to: f64) -> f64 {
-    let s = ((t - from) / (to - from)).clamp(0.0, 1.0);
-    s * s * (3.0 - 2.0 * s)
+    smooth((t - from) / (to - from))
 }
 
 /// Distance of the tips' centres from the middle, and their height [m].

@@ -213,6 +213,17 @@ fn frequencies_hz(modes: &Modes) -> Vec<f64> {
     modes.squares.iter().map(|square| square.sqrt() / std::f64::consts::TAU).collect()
 }
 
+/// 3s² − 2s³, from 0 to 1 as s does, and even at both ends.
+fn smooth(s: f64) -> f64 {
+    let s = s.clamp(0.0, 1.0);
+    s * s * (3.0 - 2.0 * s)
+}
+
+/// A column of a reference series, by its number; the first row is the header.
+fn column(reference: &str, number: usize) -> Vec<f64> {
+    reference.lines().skip(1).filter_map(|row| row.split(',').nth(number)?.parse().ok()).collect()
+}
+
 /// Mean of a group of equal frequencies, split by the mesh's lesser symmetry.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64

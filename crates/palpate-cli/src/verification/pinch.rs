@@ -1,6 +1,6 @@
 //! The pinch: two opposite face centres of the paper's cube moved in by 5 mm within 50 ms and held.
 
-use super::{Check, recorded};
+use super::{Check, column, recorded, smooth};
 use crate::Failure;
 use crate::verbs::demo::paper_cube;
 use glam::DVec3;
@@ -15,12 +15,6 @@ use std::sync::Arc;
 
 const REFERENCE: &str = include_str!("../../../../data/reference/pinch_full_1ms.csv");
 
-/// Force on the left node with all modes [N], one a step.
-fn reference() -> Vec<f64> {
-    let rows = REFERENCE.lines().skip(1);
-    rows.filter_map(|row| row.split(',').nth(1)?.parse().ok()).collect()
-}
-
 /// Force on the left node [N].
 fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, Failure> {
     const REACH: f64 = 0.05;
@@ -33,8 +27,7 @@ fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, Failure> {
     let model = Model::new(parameters, vec![ModelObject::new(Arc::new(recording), start)])?;
     let mut state = State::new(&model);
     let forces = (1..=steps).map(|number| {
-        let s = (number as f64 / 50.0).min(1.0);
-        let inward = 0.005 * s * s * (3.0 - 2.0 * s);
+        let inward = 0.005 * smooth(number as f64 / 50.0);
         let hand = |side: f64, grasp: Option<Grasp>| DeviceInput {
             position: DVec3::X * side * (REACH - inward),
             mode: grasp.into(),
@@ -53,7 +46,8 @@ fn apart(forces: &[f64], reference: &[f64]) -> f64 {
 
 /// Modes with residual compliance against all modes; modes alone, whose error the certificate must show.
 pub fn pinch() -> Result<Vec<Check>, Failure> {
-    let reference = reference();
+    // Force on the left node with all modes [N], one a step.
+    let reference = column(REFERENCE, 1);
     let mut checks = Vec::new();
     // The errors found independently, with half a digit.
     for (modes, error) in [(50, 0.0019), (100, 0.0017), (200, 0.0012)] {

@@ -5,7 +5,7 @@
 //! compliance, whatever the mesh. The expected value is solved for on a finer mesh, with its own quadrature.
 
 use super::scene::{PAPER, Stuff, Watch, at, scene};
-use super::{Check, recorded};
+use super::{Check, recorded, smooth};
 use crate::Failure;
 use faer::Mat;
 use glam::DVec3;
@@ -106,9 +106,8 @@ fn pressed(body: &Arc<Recording>, at_place: [f64; 2], watch: &mut Watch) -> Resu
     watch.look(state.output());
     let mut force = 0.0;
     for number in 1..=1200 {
-        let s = (f64::from(number) / 200.0).min(1.0);
         // From a tenth of a millimetre above.
-        let down = (DEPTH + 1e-4) * s * s * (3.0 - 2.0 * s) - 1e-4;
+        let down = (DEPTH + 1e-4) * smooth(f64::from(number) / 200.0) - 1e-4;
         let hand = place(at_place) + DVec3::Y * (TIP - down);
         let input = Input { devices: vec![DeviceInput::touching(hand)], ..Input::default() };
         let output = step(&model, &mut state, &input);

@@ -27,7 +27,7 @@ name = "finger"
 mode = "touch"
 path = { file = "finger.csv" }
 tip_radius = 0.005
-patch_radius = 0.06
+patch_radius = 0.23
 friction = 0.6
 coupling = { stiffness = 500.0, damping = 1.0 }
 "#;
@@ -130,7 +130,7 @@ fn numbers_out_of_range_are_named_with_their_line() {
             "line 24: tip_radius is -0.005 m, expected at least 0 and below 1e6",
         ),
         (
-            "patch_radius = 0.06",
+            "patch_radius = 0.23",
             "patch_radius = inf",
             "line 25: patch_radius is inf m, expected at least 0 and below 1e6",
         ),
@@ -174,7 +174,7 @@ fn keys_that_exclude_each_other_are_refused() {
             "line 25: patch_radius is of a device that touches; with mode = \"held\" leave it out",
         ),
         (
-            "mode = \"touch\"\npath = { file = \"finger.csv\" }\ntip_radius = 0.005\npatch_radius = 0.06\n",
+            "mode = \"touch\"\npath = { file = \"finger.csv\" }\ntip_radius = 0.005\npatch_radius = 0.23\n",
             &format!("{held}\npath = {{ file = \"finger.csv\" }}\n"),
             "line 25: friction is of a device that touches; with mode = \"held\" leave it out",
         ),
@@ -322,20 +322,21 @@ fn a_patch_that_shows_the_mesh_and_a_table_that_nothing_touches_get_a_warning() 
         assert_eq!(output.status.code(), Some(0));
         String::from_utf8(output.stderr).expect("text on standard error")
     };
-    // Cells of a third of 0.1 m, with their diagonals.
+    // Linear elements in cells of a third of 0.1 m, with their diagonals.
     assert_eq!(warnings(SCENE.to_string()), "");
     let edge = 0.1 / 3.0 * (2.0 + 2_f64.sqrt()) / 3.0;
-    let smooth = format!("{:.2e}", 1.5 * edge);
-    for (patch, shown) in [("patch_radius = 0.01", "1.00e-2"), ("", "5.00e-3")] {
+    let smooth = format!("{:.2e}", 6.0 * edge);
+    for (patch, shown) in [("patch_radius = 0.2", "2.00e-1"), ("", "5.00e-3")] {
         assert_eq!(
-            warnings(SCENE.replacen("patch_radius = 0.06", patch, 1)),
+            warnings(SCENE.replacen("patch_radius = 0.23", patch, 1)),
             format!(
-                "warning: device \"finger\" touches with a patch of {shown} m, less than 1.5 mean edges of \"cube\": the \
-                 feel will show the mesh; with patch_radius = {smooth} it does not\n"
+                "warning: device \"finger\" touches with a patch of {shown} m, less than 6 mean edges of \"cube\": its finite \
+                 elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
+                 {smooth} it does not\n"
             )
         );
     }
-    assert_eq!(warnings(SCENE.replacen("patch_radius = 0.06", "patch_radius = 0", 1)), "");
+    assert_eq!(warnings(SCENE.replacen("patch_radius = 0.23", "patch_radius = 0", 1)), "");
 
     let mut arguments = [&["record", "box:0.1x0.1x0.1/2x2x2"], &CUBE[2..12]].concat();
     arguments.extend(["--duration", "0.05", "--dense", "cube.zarr"]);

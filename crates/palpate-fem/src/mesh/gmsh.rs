@@ -20,7 +20,7 @@ use std::path::Path;
 use self::elements::Elements;
 use self::labels::Labels;
 use self::nodes::Nodes;
-use super::scan::{CURVED_REMARK, Encoding, Scan, quoted, regions};
+use super::scan::{CURVED_REMARK, Encoding, Scan, quoted, read_bytes, regions};
 use super::{Mesh, MeshError};
 
 /// Reads a mesh file of Gmsh.
@@ -29,8 +29,7 @@ use super::{Mesh, MeshError};
 /// When the file cannot be opened, is damaged or of another version, or holds solid elements
 /// other than tetrahedra.
 pub fn read(path: &Path) -> Result<Mesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
-    parse(&bytes, path)
+    parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of a mesh file; `path` is for messages.

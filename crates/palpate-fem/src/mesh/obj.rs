@@ -5,7 +5,7 @@
 //!
 //! Reference: Wavefront, Object Files, version 3.0 (Appendix B1 of the Advanced Visualizer manual).
 
-use super::scan::{Scan, quoted};
+use super::scan::{Scan, quoted, read_bytes};
 use super::{MeshError, SurfaceMesh};
 use glam::DVec3;
 use std::path::Path;
@@ -15,8 +15,7 @@ use std::path::Path;
 /// # Errors
 /// When the file cannot be opened, is damaged, or has no faces.
 pub fn read(path: &Path) -> Result<SurfaceMesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
-    parse(&bytes, path)
+    parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of an OBJ file; `path` is for messages.

@@ -49,6 +49,11 @@ impl Number {
     }
 }
 
+/// The bytes of a mesh file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshError> {
+    std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })
+}
+
 /// A cursor over the bytes of a mesh file.
 pub(super) struct Scan<'a> {
     bytes: &'a [u8],

@@ -5,7 +5,7 @@
 //!
 //! Reference: 3D Systems, StereoLithography Interface Specification (1989).
 
-use super::scan::{Encoding, Number, Scan};
+use super::scan::{Encoding, Number, Scan, read_bytes};
 use super::{MeshError, SurfaceMesh};
 use glam::DVec3;
 use std::path::Path;
@@ -20,8 +20,7 @@ const TRIANGLE: usize = 50;
 /// # Errors
 /// When the file cannot be opened, is damaged, or has no triangles.
 pub fn read(path: &Path) -> Result<SurfaceMesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
-    parse(&bytes, path)
+    parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of an STL file; `path` is for messages.

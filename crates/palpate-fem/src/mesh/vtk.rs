@@ -20,7 +20,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::scan::{Encoding, Number, Scan, quoted, regions};
+use super::scan::{Encoding, Number, Scan, quoted, read_bytes, regions};
 use super::{Mesh, MeshError, NodeGroup};
 use cells::{Cells, Tets};
 
@@ -44,8 +44,7 @@ pub const REGION_ARRAYS: [&str; 11] = [
 /// # Errors
 /// When the file cannot be opened, is damaged, or holds solid cells other than tetrahedra.
 pub fn read(path: &Path) -> Result<Mesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })?;
-    parse(&bytes, path)
+    parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of a legacy file; `path` is for messages.
