@@ -14,11 +14,35 @@ impl Finding<'_> {
     pub(crate) fn pairs(&mut self) {
         let count = self.objects.len();
         for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
-            if self.model.objects[a].is_searched() && self.model.objects[b].is_searched() {
+            if self.model.objects[a].is_searched() && self.model.objects[b].is_searched() && !self.apart(a, b)
+            {
                 self.nodes_against(a, b);
                 self.nodes_against(b, a);
             }
         }
+    }
+
+    /// Whether a plane across the line between the centres of two objects keeps them apart in the step.
+    fn apart(&mut self, a: usize, b: usize) -> bool {
+        let way = self.objects[b].rigid.pose.position - self.objects[a].rigid.pose.position;
+        let Some(along) = way.try_normalize() else { return false };
+        let edge = self.model.objects[a].body.edge.max(self.model.objects[b].body.edge);
+        let mut left = way.length() - MARGIN * edge;
+        for (at, direction) in [(a, along), (b, -along)] {
+            let (own, object) = (&self.objects[at], &self.model.objects[at]);
+            let (pose, cache, moment) = (own.rigid.pose, &mut self.caches[at], Ok(self.step));
+            let mut sight =
+                Sight::new(&object.body, Reading::Point, &own.response, &own.points, cache, moment);
+            // What the energies allow is often enough to tell.
+            let most = object.radius + sight.reach();
+            let far = if 2.2 * most < way.length() {
+                most
+            } else {
+                sight.support(pose.orientation.inverse() * direction)
+            };
+            left -= far + pose.way(&own.free.end.pose, object.radius) + own.surface_motion;
+        }
+        left > 0.0
     }
 
     /// The nodes of one object against the surface of another.
@@ -39,10 +63,6 @@ impl Finding<'_> {
         let cache = &mut self.caches[nodes_of];
         let sight =
             &mut Sight::new(&object.body, Reading::Point, &own.response, &own.points, cache, Ok(self.step));
-        if (pose.position - base_pose.position).length() > object.radius + sight.reach() + base.radius + grown
-        {
-            return;
-        }
         sight.begin_visit();
         let near = &mut *self.near;
         near.clear();

@@ -305,6 +305,25 @@ impl<'a> Sight<'a> {
         Found { triangle, weights, position, distance: (p - position).length(), normal }
     }
 
+    /// How far the surface goes in a direction of unit length [m, body].
+    ///
+    /// # Real time
+    /// Costs the nodes that come near to that.
+    pub(crate) fn support(&mut self, direction: DVec3) -> f64 {
+        let farthest = core::cell::Cell::new(f64::NEG_INFINITY);
+        let beside = self.most_dent();
+        self.walk(
+            |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
+            |sight, triangle, _| {
+                for node in sight.body.recording.surface.triangles[triangle as usize] {
+                    let place = sight.smooth(node as usize).dot(direction) + beside;
+                    farthest.set(farthest.get().max(place));
+                }
+            },
+        );
+        farthest.get()
+    }
+
     /// Visit all triangles in spheres that `near` takes: (what its centre is, centre, radius) in the body frame, see
     /// [`crate::surface::SurfaceTree::walk`].
     pub(crate) fn walk(
