@@ -340,3 +340,31 @@ fn contacts_without_room_are_told_of_and_the_run_goes_on() {
     let text = workplace.succeed(&arguments);
     assert!(text.contains(" at once: raise most_contact_points above 4\n"), "{text}");
 }
+
+#[test]
+fn contacts_that_can_not_be_solved_are_told_of_and_the_run_goes_on() {
+    let workplace = workplace();
+    let finger = "[[device]]\nname = \"finger\"\nmode = \"touch\"\npath = { file = \"jump.csv\" }\ntip_radius = 0.005\n\
+                  patch_radius = 0.16\n";
+    workplace.write("scene.toml", format!("{}{finger}", object("[0.0, 0.0, 0.0]")));
+    // A path in millimetres, or nearly: in its sixth step a finger without coupling goes 10 m down through the cube.
+    workplace.write(
+        "jump.csv",
+        "t,x,y,z\n0,0.02,0.07,0.01\n0.005,0.02,0.07,0.01\n0.006,0.02,-10,0.01\n0.02,0.02,-10,0.01\n",
+    );
+    let arguments = ["run", "scene.toml", "--csv", "steps.csv"];
+    let summary = workplace.json(&[&arguments[..], &["--json"]].concat());
+    assert_eq!(
+        (&summary["solver"]["unsolved_steps"], &summary["steps"]),
+        (&1.into(), &20.into()),
+        "{summary}"
+    );
+    // The contact gets no force in that step, and the cube stays as it was.
+    let table = Table::parse(&workplace.text("steps.csv"));
+    assert!(table.numbers().all(f64::is_finite));
+    assert!(table.vectors("finger", ["fx", "fy", "fz"]).iter().all(|force| *force == DVec3::ZERO));
+    assert!(table.vectors("cube", ["px", "py", "pz"]).iter().all(|place| *place == DVec3::ZERO));
+    let text = workplace.succeed(&arguments);
+    let warning = "\n  warning      in 1 steps contacts could not be solved, and objects moved without them: use a shorter step\n";
+    assert!(text.contains(warning), "{text}");
+}
