@@ -165,16 +165,24 @@ impl Parts<'_> {
         square
     }
 
+    /// What all contacts of a device, with any object, add up to.
+    pub(super) fn sum_on_devices(&mut self) {
+        self.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
+        for contact in self.contacts.iter() {
+            if let Other::Device(device) = contact.other {
+                self.devices[device].force += contact.force;
+            }
+        }
+    }
+
     /// The step without contact force: sound whatever the hands ask for.
     pub(super) fn let_go(&mut self, bodies: &[u32], members: &[u32]) {
-        // Whatever went wrong, nothing of it stays: sums are made anew, since they may not be numbers.
+        // Whatever went wrong, nothing of it stays.
         for &member in members {
-            self.contacts[member as usize].force = DVec3::ZERO;
-        }
-        for &member in members {
-            if let Other::Device(device) = self.contacts[member as usize].other {
-                let its = self.contacts.iter().filter(|c| c.other == Other::Device(device));
-                self.devices[device].force = its.map(|c| c.force).sum();
+            let contact = &mut self.contacts[member as usize];
+            contact.force = DVec3::ZERO;
+            if let Other::Device(device) = contact.other {
+                self.devices[device].force = DVec3::ZERO;
             }
         }
         for &body in bodies {

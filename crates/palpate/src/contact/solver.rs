@@ -68,6 +68,7 @@ impl Solver {
     /// Costs sweeps × contacts × contact points of an object.
     pub(crate) fn solve(&mut self, parts: &mut Parts, status: &mut StepStatus) {
         self.group_objects(parts);
+        parts.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
         for first in 0..self.group.len() {
             let Self { group, bodies, members, .. } = self;
             if group[first] as usize != first {
@@ -85,6 +86,7 @@ impl Solver {
                 self.solve_group(parts, status);
             }
         }
+        parts.sum_on_devices();
     }
 
     /// Objects that touch each other, or that one elastic coupling pulls at, are solved together.
