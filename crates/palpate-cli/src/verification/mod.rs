@@ -3,7 +3,6 @@
 //! Each check compares a number with an analytic value, an identity, or an independent solution, and states the error,
 //! what is allowed, and, where meshes or steps are refined, the observed order of convergence.
 
-mod adversarial;
 mod bounce;
 mod compliance;
 mod drop;
@@ -16,7 +15,6 @@ mod lift;
 mod motion;
 mod pinch;
 mod press;
-mod random;
 mod scene;
 mod spheres;
 mod stack;
@@ -178,11 +176,6 @@ pub const CASES: &[Case] = &[
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",
         run: grip::fingers_hold,
-    },
-    Case {
-        name: "adversarial",
-        about: "a million steps of random hands on five bodies: no energy comes out, and nothing gets stuck",
-        run: adversarial::adversarial,
     },
 ];
 
