@@ -5,7 +5,7 @@
 //! surface between the nodes.
 
 use super::meeting::{Approach, MARGIN, meeting};
-use super::search::Sight;
+use super::sight::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedList, WantedOther};
 use super::{Against, Contact, Law, known_contacts};
 use crate::obstacle::Obstacle;

@@ -1,6 +1,7 @@
 //! A point against the deformed surface of an object: a node of another one, a corner of an obstacle.
 
-use super::search::{Search, Sight};
+use super::search::Search;
+use super::sight::Sight;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
 

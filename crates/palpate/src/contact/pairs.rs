@@ -1,7 +1,7 @@
 //! Elastic objects against one another: the surface nodes of each against the surface of the other.
 
 use super::meeting::{Approach, MARGIN, meeting};
-use super::search::Sight;
+use super::sight::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedOther};
 use super::{Against, Law, Other};
 use crate::response::{Place, Reading};

@@ -10,7 +10,7 @@
 //! (Phong projection; Kobbelt et al. 1998, Proc. SIGGRAPH, 105), which moves continuously with p. A node's normal is
 //! the mean of the triangles around it, on its side of a crease: over a crease the tip rolls about the edge itself.
 
-use super::search::{Found, Sight};
+use super::sight::{Found, Sight};
 use crate::surface::{area_normal, at_weights};
 use glam::DVec3;
 

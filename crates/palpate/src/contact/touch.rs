@@ -14,7 +14,8 @@
 //! ```
 
 use super::projection::stand;
-use super::search::{Found, MOST_FACES, ONE_FACE, Search, Sight};
+use super::search::{ONE_FACE, Search};
+use super::sight::{Found, MOST_FACES, Sight};
 use super::wanted::{Finding, Key, Wanted, WantedOther};
 use super::{Against, Contact, Law, known_contacts};
 use crate::response::{Place, Reading};

@@ -1,6 +1,7 @@
 //! Which contacts a step has: those that were found, matched with those of the last step.
 
-use super::search::{NodeCache, Search, Vicinity};
+use super::search::{Search, Vicinity};
+use super::sight::NodeCache;
 use super::{Contact, Law, Other};
 use crate::response::{Place, Responding};
 use crate::scene::Model;

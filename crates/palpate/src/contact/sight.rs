@@ -1,0 +1,330 @@
+//! The moving, deformed surface of an object as it is at a moment: where its nodes and triangles are, without passing over
+//! the surface.
+
+use crate::contact::ContactPoints;
+use crate::response::{Acting, Body, Place, Reading, ResponseState};
+use crate::surface::{Centre, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Faces of one object that a tip can meet at once.
+pub(crate) const MOST_FACES: usize = 4;
+
+/// A triangle near a point, body frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Found {
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f64; 3],
+    /// Its nearest point [m], and how far that is [m].
+    pub(crate) position: DVec3,
+    pub(crate) distance: f64,
+    /// Outward normal of the deformed triangle.
+    pub(crate) normal: DVec3,
+}
+
+/// Where the nodes of an object are, found once per moment; buffers of the object.
+#[derive(Debug, Clone)]
+pub(crate) struct NodeCache {
+    positions: Vec<DVec3>,
+    stamps: Vec<u64>,
+    now: u64,
+    /// At the end of the step without contact force.
+    free: Vec<DVec3>,
+    free_stamps: Vec<u64>,
+    /// The same with dents: all of them, or some.
+    whole: Vec<DVec3>,
+    whole_stamps: Vec<u64>,
+    whole_now: u64,
+    some_dents: bool,
+    moment: Option<(u64, Reading)>,
+    /// Which nodes a walk has come to.
+    visits: Vec<u32>,
+    visit: u32,
+}
+
+impl NodeCache {
+    pub(crate) fn new(nodes: usize) -> Self {
+        Self {
+            positions: vec![DVec3::ZERO; nodes],
+            stamps: vec![0; nodes],
+            now: 0,
+            free: vec![DVec3::ZERO; nodes],
+            free_stamps: vec![0; nodes],
+            whole: vec![DVec3::ZERO; nodes],
+            whole_stamps: vec![0; nodes],
+            whole_now: 0,
+            some_dents: false,
+            moment: None,
+            visits: vec![0; nodes],
+            visit: 0,
+        }
+    }
+
+    /// Begin a moment, with or without all dents. What is known of the same one stays; says whether it is another.
+    fn begin(&mut self, moment: Option<(u64, Reading)>) -> bool {
+        let same = moment.is_some() && self.moment == moment;
+        if !same {
+            self.now += 1;
+            self.moment = moment;
+        }
+        if !same || self.some_dents {
+            self.whole_now += 1;
+            self.some_dents = false;
+        }
+        !same
+    }
+
+    /// Take over where contact points are that are nodes.
+    fn take_nodes(&mut self, points: &ContactPoints) {
+        for point in points.points.iter().filter(|point| point.place.reading == Reading::Point) {
+            let Some(node) = point.node else { continue };
+            let by_modes = point.placed.displacement - point.placed.residual;
+            self.positions[node] = point.rest + by_modes;
+            self.free[node] = point.rest + point.free - point.placed.sag;
+            (self.stamps[node], self.free_stamps[node]) = (self.now, self.now);
+        }
+    }
+}
+
+/// A surface at a moment, as a reading sees it; body frame.
+pub(crate) struct Sight<'a> {
+    pub(crate) body: &'a Body,
+    reading: Reading,
+    /// Modal coordinates.
+    pub(super) q: &'a [f64],
+    /// The same at the end of the step without contact force.
+    free: &'a [f64],
+    /// Forces of the last step with their places.
+    acting: &'a [Acting],
+    /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does, by so
+    /// much [m] where a reading's dents have no shape.
+    own: [Option<(Place, DVec3)>; MOST_FACES],
+    flat: f64,
+    cache: &'a mut NodeCache,
+    visit: Visit,
+}
+
+impl<'a> Sight<'a> {
+    /// The surface at the start of step number `step`, or at another moment with modal coordinates `q`.
+    pub(crate) fn new(
+        body: &'a Body,
+        reading: Reading,
+        state: &'a ResponseState,
+        points: &ContactPoints,
+        cache: &'a mut NodeCache,
+        moment: Result<u64, &'a [f64]>,
+    ) -> Self {
+        let (q, key) = match moment {
+            Ok(step) => (state.coordinates(), Some((step, reading))),
+            Err(q) => (q, None),
+        };
+        if cache.begin(key) && reading == Reading::Point && moment.is_ok() {
+            cache.take_nodes(points);
+        }
+        // No place goes farther by the residual compliance than where the forces act, or hardly.
+        let same = points.points.iter().filter(|p| p.place.reading == reading);
+        let beside = same.map(|p| p.placed.residual.length()).fold(0.0, f64::max);
+        let visit = Visit {
+            modal: body.norms(q),
+            residual: libm::sqrt(2.0 * state.residual_energy()),
+            most_residual: 2.0 * beside,
+            slope: body.dent_slope(reading),
+        };
+        let free = state.free_coordinates();
+        Self {
+            body,
+            reading,
+            q,
+            free,
+            acting: state.acting(),
+            own: [None; MOST_FACES],
+            flat: 0.0,
+            cache,
+            visit,
+        }
+    }
+
+    /// Leave out the own dents of places within a distance [m]: a tip that presses is not beside itself.
+    pub(crate) fn without_dents(&mut self, own: [Option<Place>; MOST_FACES], flat: f64) {
+        if own.iter().any(Option::is_some) {
+            let dent = |place: Place| {
+                let its = |other: &&Acting| self.reading == Reading::Point && other.place == place;
+                let other = self.acting.iter().find(its);
+                (place, other.map_or(DVec3::ZERO, |o| self.body.residual(&place, &place) * o.force))
+            };
+            (self.own, self.flat) = (own.map(|place| place.map(dent)), flat);
+            self.cache.whole_now += 1;
+            self.cache.some_dents = true;
+        }
+    }
+
+    /// How far any node can be from its place at rest [m].
+    pub(crate) fn reach(&self) -> f64 {
+        self.body.bounds(self.reading).reach(&self.visit)
+    }
+
+    fn rest(&self, node: usize) -> DVec3 {
+        self.body.recording.surface.positions[node]
+    }
+
+    /// The most [m] that a dent moves any node.
+    pub(crate) fn most_dent(&self) -> f64 {
+        self.visit.most_residual
+    }
+
+    /// Forget which nodes were come to.
+    pub(crate) fn begin_visit(&mut self) {
+        self.cache.visit = self.cache.visit.wrapping_add(1);
+    }
+
+    /// Whether a node is come to for the first time.
+    pub(crate) fn first_visit(&mut self, node: usize) -> bool {
+        core::mem::replace(&mut self.cache.visits[node], self.cache.visit) != self.cache.visit
+    }
+
+    /// Let spheres hold also what the step without contact force does.
+    pub(crate) fn widen(&mut self) {
+        let free = self.body.norms(self.free);
+        self.visit.modal = core::array::from_fn(|band| self.visit.modal[band].max(free[band]));
+    }
+
+    /// A node's place by the modes at the end of the step without contact force.
+    pub(crate) fn free_node(&mut self, node: usize) -> DVec3 {
+        if self.cache.free_stamps[node] != self.cache.now {
+            self.cache.free_stamps[node] = self.cache.now;
+            self.cache.free[node] = self.rest(node) + self.displacement(node, self.free);
+        }
+        self.cache.free[node]
+    }
+
+    fn displacement(&self, node: usize, q: &[f64]) -> DVec3 {
+        self.body.displacement(self.reading, node, q.len(), q)
+    }
+
+    /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
+    pub(crate) fn deformation(&mut self, found: &Found) -> f64 {
+        let corners = self.body.recording.surface.triangles[found.triangle as usize];
+        let mut most = 0.0_f64;
+        for node in corners {
+            most = most.max((self.free_node(node as usize) - self.smooth(node as usize)).length());
+        }
+        most
+    }
+
+    /// A node's place by the modes.
+    pub(crate) fn smooth(&mut self, node: usize) -> DVec3 {
+        if self.cache.stamps[node] != self.cache.now {
+            self.cache.stamps[node] = self.cache.now;
+            self.cache.positions[node] = self.rest(node) + self.displacement(node, self.q);
+        }
+        self.cache.positions[node]
+    }
+
+    /// A node's place.
+    pub(crate) fn node(&mut self, node: usize) -> DVec3 {
+        if self.cache.whole_stamps[node] == self.cache.whole_now {
+            return self.cache.whole[node];
+        }
+        let smooth = self.smooth(node);
+        let place = self.with_dents(node, smooth);
+        (self.cache.whole[node], self.cache.whole_stamps[node]) = (place, self.cache.whole_now);
+        place
+    }
+
+    fn with_dents(&self, node: usize, smooth: DVec3) -> DVec3 {
+        let mut place = smooth;
+        for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
+            let own = self.own.iter().flatten().find(|(own, _)| *own == other.place);
+            let flat = if own.is_some() { self.flat } else { 0.0 };
+            // A dent that a point leaves has no shape between the nodes.
+            let beside = self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
+            place += match own.filter(|_| beside) {
+                Some((_, dent)) => *dent,
+                None => self.body.dent(node, other, flat),
+            };
+        }
+        place
+    }
+
+    /// Where a sphere's centre is: with dents where they have a shape, else they count for its radius.
+    fn centre(&mut self, node: usize) -> DVec3 {
+        match self.reading {
+            Reading::Point => self.smooth(node),
+            Reading::Patch(_) => self.node(node),
+        }
+    }
+
+    /// Where a sphere's centre is by the low modes; none where it is known by all of them.
+    fn low_centre(&self, node: usize) -> Option<DVec3> {
+        if self.cache.stamps[node] == self.cache.now {
+            return None;
+        }
+        let smooth = self.low(node);
+        Some(match self.reading {
+            Reading::Point => smooth,
+            Reading::Patch(_) => self.with_dents(node, smooth),
+        })
+    }
+
+    /// A node's place by the low modes.
+    pub(crate) fn low(&self, node: usize) -> DVec3 {
+        self.low_place(node, self.q)
+    }
+
+    /// The same at the end of the step without contact force.
+    pub(crate) fn free_low(&self, node: usize) -> DVec3 {
+        self.low_place(node, self.free)
+    }
+
+    fn low_place(&self, node: usize, q: &[f64]) -> DVec3 {
+        self.rest(node) + self.body.displacement(self.reading, node, low_modes(q.len()), q)
+    }
+
+    /// Where the corners of a triangle are.
+    pub(crate) fn corners(&mut self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        [self.node(a), self.node(b), self.node(c)]
+    }
+
+    /// The nearest point of a triangle.
+    pub(crate) fn nearest_on(&mut self, triangle: u32, p: DVec3) -> Found {
+        let corners = self.corners(triangle);
+        let weights = nearest_on_triangle(corners, p);
+        let position = at_weights(corners, weights);
+        let normal = area_normal(corners).normalize_or_zero();
+        Found { triangle, weights, position, distance: (p - position).length(), normal }
+    }
+
+    /// How far the surface goes in a direction of unit length [m, body].
+    ///
+    /// # Real time
+    /// Costs the nodes that come near to that.
+    pub(crate) fn support(&mut self, direction: DVec3) -> f64 {
+        let farthest = core::cell::Cell::new(f64::NEG_INFINITY);
+        let beside = self.most_dent();
+        self.walk(
+            |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
+            |sight, triangle, _| {
+                for node in sight.body.recording.surface.triangles[triangle as usize] {
+                    let place = sight.smooth(node as usize).dot(direction) + beside;
+                    farthest.set(farthest.get().max(place));
+                }
+            },
+        );
+        farthest.get()
+    }
+
+    /// Visit all triangles in spheres that `near` takes: (what its centre is, centre, radius) in the body frame, see
+    /// [`crate::surface::SurfaceTree::walk`].
+    pub(crate) fn walk(
+        &mut self,
+        near: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
+        found: impl FnMut(&mut Self, u32, f64),
+    ) {
+        let body = self.body;
+        let visit = self.visit;
+        let places = (Self::rest, Self::low_centre, Self::centre);
+        body.tree.walk((body.bounds(self.reading), &visit), self, places, near, found);
+    }
+}
