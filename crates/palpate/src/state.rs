@@ -119,7 +119,8 @@ pub struct StepStatus {
     /// Held directions that repeat others and got no force.
     pub dependent_rows: u32,
     /// Objects, or groups of them, whose contacts could not be solved, or whose turn could not be found, because a hand
-    /// or a body moves too far in a step; they moved freely in this step.
+    /// or a body moves too far in a step. Their contacts gave a part of the force in this step, or none; those of groups
+    /// with nothing but held points gave none.
     pub unsolved_objects: u32,
     /// Contacts for which an object had no room.
     pub dropped_contacts: u32,

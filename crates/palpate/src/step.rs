@@ -200,15 +200,17 @@ fn solve(model: &Model, state: &mut State) {
         let mut status = output.status;
         workspace.solver.solve(&mut parts, &mut status);
         let taken: f64 = parts.contacts.iter().map(Contact::taken).sum();
-        if taken + paid >= 0.0 || attempt == 2 {
+        if taken + paid >= -parts.rounding() || attempt == 2 {
             output.status = status;
             return;
         }
         for contact in parts.contacts.iter_mut().filter(|contact| contact.law != Law::Held) {
-            contact.least_gap = match attempt {
-                0 => contact.gap(contact.start).min(0.0),
-                _ => f64::NEG_INFINITY,
-            };
+            if attempt == 0 {
+                contact.least_gap = contact.gap(contact.start).min(0.0);
+            } else {
+                // None at all, also not what a sweep leaves as too little.
+                (contact.least_gap, contact.force) = (f64::NEG_INFINITY, DVec3::ZERO);
+            }
         }
     }
 }

@@ -351,3 +351,44 @@ fn a_body_with_fixed_nodes_is_touched_as_well() {
     }
     assert!(last > 0.0, "{last}");
 }
+
+#[test]
+fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
+    let body = block();
+    let side = half(&body, 0);
+    let parameters = ModelParameters { devices: vec![finger(0.02, 0.0, 0.5)], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let start = state.output().energy.stored();
+    let beside = DVec3::new(side + 0.021, 0.03, 0.02);
+    step(&model, &mut state, &touching(&[beside]));
+    // Four metres in a step, through the block.
+    let beyond = beside - DVec3::X * (40.0 * side);
+    let output = step(&model, &mut state, &touching(&[beyond]));
+    assert_eq!(output.status.unsolved_objects, 1, "otherwise this shows nothing: {:?}", output.status);
+    assert!(output.status.solver_residual_m > side);
+    let contact = output.contacts.first().expect("a contact");
+    assert!(contact.force.x < 0.0 && output.objects[0].twist.linear.x < 0.0, "pushed on: {contact:?}");
+    assert_eq!(output.devices[0].force_on_hand, -contact.force);
+    let e = &output.energy;
+    assert!(e.input > 0.0 && e.lost() >= 0.0 && open(output, start).abs() < 1e-9 * e.input, "{e:?}");
+    assert!(e.defect.abs() < 1e-9 * e.input, "{e:?}");
+    let after = step(&model, &mut state, &touching(&[beyond]));
+    assert_eq!((after.status.unsolved_objects, after.contacts.len()), (0, 0));
+}
+
+#[test]
+fn a_tip_much_larger_than_the_body_meets_its_front_alone() {
+    let body = block();
+    let (side, thick) = (half(&body, 0), 2.0 * half(&body, 1));
+    // Its centre is outside; behind its edge is the back of the block.
+    let tip = 4.0 * thick;
+    let parameters = ModelParameters { devices: vec![finger(tip, 0.0, 0.0)], ..ModelParameters::default() };
+    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let centre = DVec3::new(0.1 * side, 0.8 * thick, 0.0);
+    step(&model, &mut state, &touching(&[centre]));
+    let raised = step(&model, &mut state, &touching(&[centre + DVec3::Y * (0.05 * thick)]));
+    assert!(raised.contacts.is_empty(), "the back holds nothing: {:?}", raised.contacts);
+    let pressed = step(&model, &mut state, &touching(&[centre]));
+    assert!(!pressed.contacts.is_empty());
+    assert!(pressed.contacts.iter().all(|contact| contact.normal.y > 0.5), "{:?}", pressed.contacts);
+}

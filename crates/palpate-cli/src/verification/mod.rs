@@ -3,6 +3,7 @@
 //! Each check compares a number with an analytic value, an identity, or an independent solution, and states the error,
 //! what is allowed, and, where meshes or steps are refined, the observed order of convergence.
 
+mod adversarial;
 mod bounce;
 mod compliance;
 mod drop;
@@ -15,6 +16,7 @@ mod lift;
 mod motion;
 mod pinch;
 mod press;
+mod random;
 mod scene;
 mod spheres;
 mod stack;
@@ -176,6 +178,11 @@ pub const CASES: &[Case] = &[
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",
         run: grip::fingers_hold,
+    },
+    Case {
+        name: "adversarial",
+        about: "a million steps of random hands on five bodies: no energy comes out, and nothing gets stuck",
+        run: adversarial::adversarial,
     },
 ];
 

@@ -1,5 +1,6 @@
 //! Rigid motion, momentum and energy of the stepped scene.
 
+use super::random::Random;
 use super::{Check, recorded, undamped};
 use crate::Failure;
 use glam::{DMat3, DQuat, DVec3};
@@ -122,13 +123,8 @@ pub fn energy() -> Result<Vec<Check>, Failure> {
     let model = model(&recording, 1e-3, 3, spin, DVec3::new(0.0, -9.81, 0.0))?;
     let mut state = State::new(&model);
     let triangles = recording.surface.triangles.len() as u64;
-    let mut seed = 0x2545_f491_4f6c_dd1d_u64;
-    let mut random = || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        (seed >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut numbers = Random(0x2545_f491_4f6c_dd1d);
+    let mut random = || numbers.unit();
     let mut input = Input { devices: vec![DeviceInput::away(); 3], ..Input::default() };
     let start = state.output().energy.stored();
     let (mut gained, mut unexplained, mut backwards, mut moved) = (0.0_f64, 0.0_f64, 0.0_f64, 1e-9_f64);

@@ -33,7 +33,7 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         return stuck;
     }
     // Slips: with direction d, λ = b₀ / (W₀₀ + μ·W₀ₜ·d); d must be that of r_t.
-    let coupling = DVec2::new(W.x_axis.y, W.x_axis.z);
+    let coupling = DVec2::new(W.y_axis.x, W.z_axis.x);
     let guess = DVec2::new(before.y, before.z);
     let mut direction = if guess.length() > 0.1 * friction * before.x { guess } else { across };
     direction = direction.normalize_or(DVec2::X);

@@ -1,11 +1,14 @@
 //! What the solver works on: objects, devices and contacts within a step, and what a change of force does to them.
 
 use super::cone::{solve_contact, tangents};
-use super::{Contact, DeviceState, Other};
+use super::{Contact, DeviceState, Law, Other};
 use crate::motion::RigidStep;
 use crate::scene::{Model, RigidCompliance};
 use crate::state::ObjectState;
 use glam::{DMat3, DVec3};
+
+/// A length below this share of (distance from the origin + size) is round-off: a few roundings of x + R·(r + u).
+pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
 /// How an object moves rigidly with the forces, in linear terms about the last evaluation.
 #[derive(Debug, Clone, Copy)]
@@ -180,7 +183,7 @@ impl Parts<'_> {
         // Whatever went wrong, nothing of it stays.
         for &member in members {
             let contact = &mut self.contacts[member as usize];
-            contact.force = DVec3::ZERO;
+            (contact.force, contact.along) = (DVec3::ZERO, DVec3::ZERO);
             if let Other::Device(device) = contact.other {
                 self.devices[device].force = DVec3::ZERO;
             }
@@ -192,9 +195,61 @@ impl Parts<'_> {
         }
     }
 
-    /// What a contact's law is solved with, in linear terms. A guess that moves its sides by less than `enough` [m]
-    /// from where they were is noise.
-    pub(super) fn prepare(&mut self, at: usize, enough: f64) {
+    /// Take away what the search has left of forces on contacts that are apart: traces without which they stay so.
+    pub(super) fn drop_traces(&mut self, members: &[u32]) {
+        for at in members.iter().map(|&at| at as usize) {
+            let contact = self.contacts[at];
+            if contact.law == Law::Held || contact.force == DVec3::ZERO {
+                continue;
+            }
+            let closes = contact.force.length() * contact.compliance.x_axis.x;
+            if contact.gap(self.apart(&contact)) > contact.least_gap + closes {
+                self.add_force(at, -contact.force);
+            }
+        }
+    }
+
+    /// Go on with a share of all forces, from objects that have started.
+    pub(super) fn scale_forces(&mut self, members: &[u32], share: f64) {
+        for &member in members {
+            let Contact { object, slot, other, force, .. } = self.contacts[member as usize];
+            self.contacts[member as usize].force = force * share;
+            self.push(object, slot, force * share);
+            match other {
+                Other::Device(device) => self.devices[device].force += force * (share - 1.0),
+                Other::Object { number, slot } => self.push(number, slot, -force * share),
+                Other::Obstacle { .. } => {}
+            }
+        }
+    }
+
+    /// How far forces change an object over the step, in linear terms: the turn [rad], or the deformation as a share of
+    /// the radius.
+    pub(super) fn change(&self, at: usize) -> f64 {
+        let own = &self.objects[at];
+        let moved = |index: usize| (own.points.displaced(index) - own.points.points[index].free).length();
+        let most = (0..own.points.points.len()).map(moved).fold(0.0, larger);
+        larger(own.lift.moved[1].length(), most / self.model.objects[at].radius)
+    }
+
+    /// What roundings of places make of the contacts' work [J].
+    pub(crate) fn rounding(&self) -> f64 {
+        let of = |contact: &Contact| {
+            let at = contact.object;
+            let reach = self.objects[at].rigid.pose.position.length() + self.model.objects[at].radius;
+            ROUND_OFF * reach * contact.force.length()
+        };
+        self.contacts.iter().map(of).sum()
+    }
+
+    /// Work [J] that contacts take over the step under the forces that were evaluated last.
+    pub(super) fn taken(&self, members: &[u32]) -> f64 {
+        let contacts = members.iter().map(|&member| &self.contacts[member as usize]);
+        contacts.map(|contact| Contact { end: self.apart(contact), ..*contact }.taken()).sum()
+    }
+
+    /// What a contact's law is solved with, in linear terms.
+    pub(super) fn linearise(&mut self, at: usize) {
         let contact = self.contacts[at];
         let mut w = self.compliance(contact.object, contact.slot, contact.slot);
         match contact.other {
@@ -207,6 +262,12 @@ impl Parts<'_> {
         let compliance = axes.transpose() * w * axes;
         let contact = &mut self.contacts[at];
         (contact.axes, contact.compliance, contact.stiffness) = (axes, compliance, compliance.inverse());
+    }
+
+    /// A guess that moves a contact's sides by less than `enough` [m] from where they were is noise.
+    pub(super) fn drop_noise(&mut self, at: usize, enough: f64) {
+        let contact = &mut self.contacts[at];
+        let w = contact.compliance * contact.axes.transpose();
         let noise = |last: &DVec3| (w * (contact.force - *last)).length() < enough;
         if let Some(last) = contact.guessed_from.filter(noise) {
             contact.force = last;
@@ -292,6 +353,11 @@ impl ObjectState {
             point.end_arm = orientation * (point.rest + point.displacement);
         }
     }
+}
+
+/// The larger of two sizes; infinite when one is no number, which a maximum would pass over.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_finite() && b.is_finite() { a.max(b) } else { f64::INFINITY }
 }
 
 /// Rigid motion of an object over the step under its contact forces and weight.

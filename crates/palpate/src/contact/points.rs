@@ -199,8 +199,10 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn let_go(&mut self) {
         let n = 3 * self.points.len();
-        self.forces[..n].fill(0.0);
-        self.moved[..n].fill(0.0);
+        let [along_forces, along_moved] = &mut self.along;
+        for buffer in [&mut self.forces, &mut self.moved, along_forces, along_moved] {
+            buffer[..n].fill(0.0);
+        }
         for point in &mut self.points {
             (point.force, point.force_in_body) = (DVec3::ZERO, DVec3::ZERO);
         }

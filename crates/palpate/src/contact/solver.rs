@@ -13,6 +13,7 @@
 //! with the rotation that the forces cause, so that what is solved in the end are the equations of motion
 //! themselves and not their linear part.
 
+use super::parts::{ROUND_OFF, larger};
 use super::{Contact, HeldSystem, Law, Other, Parts};
 use crate::state::StepStatus;
 use alloc::vec;
@@ -26,9 +27,6 @@ const MAX_ITERATIONS: u32 = 40;
 /// Sweeps over all evaluations together: far more than contacts that can be solved need.
 const MAX_SWEEPS: u32 = 300;
 
-/// A miss below this share of (distance from the origin + size) is round-off: a few roundings of x + R·(r + u).
-const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
-
 /// A miss above this share of the reach is no solution: a hand or a body moves too far in a step.
 const UNSOLVED: f64 = 1e-9;
 
@@ -38,6 +36,19 @@ const FEW: usize = 24;
 const VISITS: u32 = 600;
 const CLOSE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
+
+/// A body that an evaluation turns by more than this [rad] answers its contacts differently.
+const TURNED: f64 = 0.01;
+
+/// A body that turns by more than this [rad, Cayley] under the forces of a step has lost its solution.
+const WHIRL: f64 = 4.0;
+
+/// Contacts that can't be met whole are met in part: with forces from so many sweeps that turn a body by at most this
+/// [rad] and deform it by this share of its radius; so many shares of them are tried, with so many evaluations each.
+const PART: f64 = 0.3;
+const PART_SWEEPS: u32 = 20;
+const PARTS: u32 = 4;
+const PART_EVALUATIONS: u32 = 20;
 
 /// Buffers of the solver.
 #[derive(Debug, Clone)]
@@ -62,7 +73,8 @@ impl Solver {
         }
     }
 
-    /// Find all forces. Objects whose contacts can't be solved move freely for the step.
+    /// Find all forces. Contacts that can't be solved are met in part, if that is sound; if not, or where points are only
+    /// held, their objects move freely for the step.
     ///
     /// # Real time
     /// Costs sweeps × contacts × contact points of an object.
@@ -125,7 +137,8 @@ impl Solver {
         }
         for &member in &self.members {
             if parts.contacts[member as usize].law != Law::Held {
-                parts.prepare(member as usize, self.accuracy(0, size));
+                parts.linearise(member as usize);
+                parts.drop_noise(member as usize, self.accuracy(0, size));
             }
             let contact = parts.contacts[member as usize];
             parts.apply(contact.object, contact.slot, contact.other, contact.force);
@@ -139,6 +152,9 @@ impl Solver {
         let (mut iterations, mut visits, mut sweeps) = (0, 0, 0);
         let solved = loop {
             let turned = self.evaluate(parts);
+            if turned > TURNED * size {
+                self.linearise_anew(parts);
+            }
             iterations += 1;
             let miss = larger(turned, self.sweep(parts, 0.1 * self.accuracy(visits, size)));
             visits += self.members.len() as u32;
@@ -148,7 +164,8 @@ impl Solver {
             // Done at round-off, or near it when no more digits are gained, or as near as contacts need.
             let stalled = miss > 0.5 * least && miss < 1e3 * tight;
             let enough = touching && miss < self.accuracy(visits, size);
-            let spent = iterations == MAX_ITERATIONS || sweeps >= MAX_SWEEPS && touching;
+            let hopeless = touching && (sweeps >= MAX_SWEEPS || self.whirls(parts));
+            let spent = iterations == MAX_ITERATIONS || hopeless;
             if miss <= tight || stalled || enough || spent || !miss.is_finite() {
                 status.iterations = status.iterations.max(iterations);
                 // Points that repeat others can't be met where their hands differ, and need not be.
@@ -175,9 +192,13 @@ impl Solver {
                 }
             }
         };
-        if !solved {
+        if solved {
+            parts.drop_traces(&self.members);
+        } else {
             status.unsolved_objects += 1;
-            parts.let_go(&self.bodies, &self.members);
+            if !(touching && self.solve_in_part(parts, tight)) {
+                parts.let_go(&self.bodies, &self.members);
+            }
         }
         self.evaluate(parts);
         for &object in &self.bodies {
@@ -187,6 +208,40 @@ impl Solver {
             let contact = parts.contacts[member as usize];
             parts.contacts[member as usize].end = parts.apart(&contact);
         }
+    }
+
+    /// Whether forces turn a body so far that nothing linear about it is of use.
+    fn whirls(&self, parts: &Parts) -> bool {
+        self.bodies.iter().any(|&at| parts.objects[at as usize].end.turn.length() > WHIRL)
+    }
+
+    /// What can't be met is met in part: the forces that linear terms about the free motion give, scaled down until the
+    /// equations of motion hold under them and contacts give no energy. Says whether such forces were found.
+    fn solve_in_part(&mut self, parts: &mut Parts, tight: f64) -> bool {
+        parts.let_go(&self.bodies, &self.members);
+        self.bodies.iter().for_each(|&at| parts.start(at as usize));
+        self.linearise_anew(parts);
+        let mut last = 0.0;
+        for _ in 0..PART_SWEEPS {
+            parts.remember(&self.bodies, &self.members);
+            let moved = self.sweep(parts, 0.0);
+            last = parts.accelerate(&self.bodies, &self.members, last);
+            if moved <= tight {
+                break;
+            }
+        }
+        let largest = self.bodies.iter().map(|&at| parts.change(at as usize)).fold(0.0, larger);
+        let mut share = (PART / largest).min(0.5);
+        for _ in 0..PARTS {
+            self.bodies.iter().for_each(|&at| parts.start(at as usize));
+            parts.scale_forces(&self.members, share);
+            let met = (0..PART_EVALUATIONS).any(|_| self.evaluate(parts) <= tight);
+            if met && parts.taken(&self.members) >= 0.0 {
+                return true;
+            }
+            share = 0.25;
+        }
+        false
     }
 
     /// A miss [m] that is small enough after so many visits.
@@ -201,6 +256,15 @@ impl Solver {
     /// Everything under the present forces, with the rotation of the last time. Gives how far that is off [m].
     fn evaluate(&self, parts: &mut Parts) -> f64 {
         self.bodies.iter().map(|&object| parts.evaluate(object as usize)).fold(0.0, larger)
+    }
+
+    /// The contacts' own W about the last evaluation.
+    fn linearise_anew(&mut self, parts: &mut Parts) {
+        for &member in &self.members {
+            if parts.contacts[member as usize].law != Law::Held {
+                parts.linearise(member as usize);
+            }
+        }
     }
 
     /// Factors of the held points' W, object by object. Gives the number of dependent rows.
@@ -243,9 +307,4 @@ impl Solver {
         }
         largest
     }
-}
-
-/// The larger of two sizes; infinite when one is no number, which a maximum would pass over.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_finite() && b.is_finite() { a.max(b) } else { f64::INFINITY }
 }

@@ -26,6 +26,9 @@ use glam::DVec3;
 /// A place is kept while the proxy is off its normal by less than this share of the contact's size.
 const ROLL: f64 = 1e-3;
 
+/// Faces whose normals have a cosine below this look in opposite directions.
+const OPPOSED: f64 = -0.5;
+
 /// The least radius of a tip, as a share of the mean edge: a point needs a side from which it comes.
 const LEAST_TIP: f64 = 1e-3;
 
@@ -181,9 +184,11 @@ impl Faces {
             return;
         }
         let standing = stand(sight, found, proxy, self.tip);
-        // Two nearest points of one smooth surface are one place.
+        // Two nearest points of one smooth surface are one place. And what the proxy is behind is the back of the wall
+        // whose front is met.
         let known = |m: &Meeting| m.normal_in_body.dot(standing.normal) > ONE_FACE;
-        if self.all().any(known) {
+        let back = |m: &Meeting| out < 0.0 && m.normal_in_body.dot(standing.normal) < OPPOSED;
+        if self.all().any(|m| known(m) || back(m)) {
             return;
         }
         self.meet[self.count] = Some(Meeting {

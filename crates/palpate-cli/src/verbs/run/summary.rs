@@ -215,7 +215,7 @@ impl Summary {
         }
         if self.unsolved_steps > 0 {
             out += &format!(
-                "  warning      in {} steps contacts could not be solved, and objects moved without them: use a shorter step\n",
+                "  warning      in {} steps contacts could not be solved, and gave a part of their force or none: use a shorter step\n",
                 self.unsolved_steps
             );
         }

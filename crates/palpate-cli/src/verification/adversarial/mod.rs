@@ -1,0 +1,118 @@
+//! Random hands against five bodies: whatever they do, no energy comes out, nothing becomes infinite, no proxy gets stuck, and
+//! no force is larger than its coupling gives. What can't be solved says so.
+//!
+//! With e the stretch of a coupling, device minus proxy, every step is held to
+//!
+//! ```text
+//! stored − stored at the start ≤ input        |f| ≤ k·|e⁺| + d·|e⁺ − e|/h
+//! ```
+//!
+//! and the force on a hand to what its contacts do to the objects, the input to the work of the hands.
+//!
+//! A force that is wrong by little is for the other cases to find.
+
+mod bodies;
+mod hands;
+mod way_out;
+mod witness;
+
+use super::Check;
+use super::random::Random;
+use super::scene::{G, floor};
+use crate::Failure;
+use glam::{DQuat, DVec3};
+use hands::{Hand, View};
+use palpate::{
+    Coupling, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
+    Recording, State, Twist, step,
+};
+use rayon::prelude::*;
+use std::sync::Arc;
+use witness::{Tally, Witness};
+
+/// A million steps: 5 bodies, with so many scenes of so many steps each.
+const SCENES: usize = 100;
+const STEPS: usize = 2000;
+
+const FRICTIONS: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// Random hands against every body.
+pub fn adversarial() -> Result<Vec<Check>, Failure> {
+    let bodies = bodies::bodies()?;
+    let play = |scene: usize| play(&bodies[scene / SCENES].1, scene / SCENES, scene % SCENES);
+    let tallies: Result<Vec<Tally>, Failure> = (0..bodies.len() * SCENES).into_par_iter().map(play).collect();
+    let tallies = tallies?;
+    let of_bodies = bodies.iter().zip(tallies.chunks(SCENES));
+    let checks = of_bodies.flat_map(|((name, _), tallies)| {
+        tallies.iter().cloned().fold(Tally::default(), Tally::join).checks(name)
+    });
+    Ok(checks.collect())
+}
+
+/// One scene from its start to its end.
+fn play(body: &Arc<Recording>, number: usize, scene: usize) -> Result<Tally, Failure> {
+    let mut random = Random::of(number as u64, scene as u64);
+    let model = random_model(body, &mut random)?;
+    let mut state = State::new(&model);
+    let mut hands: Vec<Hand> = model.parameters().devices.iter().map(|_| Hand::new()).collect();
+    let mut witness = Witness::new(&model, scene, state.output());
+    for number in 0..STEPS {
+        let poses: Vec<Pose> = state.output().objects.iter().map(|object| object.pose).collect();
+        let devices = hands.iter_mut().enumerate().map(|(device, hand)| {
+            let way_out = || way_out::way_out(&model, &state, device);
+            let view = View { poses: &poses, size: body.surface.radius(), step: number, way_out: &way_out };
+            hand.next(&mut random, &view)
+        });
+        let input = Input { devices: devices.collect(), ..Input::default() };
+        if !witness.look(&input, &hands, step(&model, &mut state, &input)) {
+            break;
+        }
+    }
+    Ok(witness.tally)
+}
+
+/// One to three devices, one object or two, with gravity or without, on a floor or not.
+fn random_model(body: &Arc<Recording>, random: &mut Random) -> Result<Model, Failure> {
+    let devices = (0..random.one_of([1, 2, 3])).map(|_| random_device(body, random)).collect();
+    let gravity = if random.chance(0.5) { DVec3::Y * -G } else { DVec3::ZERO };
+    let obstacles = if random.chance(0.5) { vec![random_floor(body, random)] } else { Vec::new() };
+    let objects = (0..if random.chance(0.1) { 2 } else { 1 }).map(|at| random_object(body, at, random));
+    let objects = objects.collect();
+    let step_s = random.one_of([2e-3, 1e-3, 2.5e-4]);
+    let parameters = ModelParameters { step_s, gravity, obstacles, devices, ..ModelParameters::default() };
+    Ok(Model::new(parameters, objects)?)
+}
+
+fn random_device(body: &Recording, random: &mut Random) -> DeviceParameters {
+    let edge = body.surface.mean_edge();
+    let coupling =
+        Coupling { stiffness: 10_f64.powf(random.within(1.0, 4.0)), damping: random.one_of([0.0, 0.5, 5.0]) };
+    DeviceParameters {
+        tip_radius: random.one_of([0.0, 0.003, 0.01, 0.03]),
+        patch_radius: random.one_of([0.0, 0.5, 1.5, 4.0]) * edge,
+        friction: random.one_of(FRICTIONS),
+        coupling: random.chance(0.6).then_some(coupling),
+    }
+}
+
+/// A floor that the lowest node is just above, or falls on.
+fn random_floor(body: &Recording, random: &mut Random) -> Obstacle {
+    let lowest = body.surface.positions.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+    let below = random.one_of([0.0, 1e-4, 0.05]);
+    let mut plane = floor(random.one_of(FRICTIONS));
+    plane.pose.position = DVec3::Y * (lowest - below);
+    plane
+}
+
+/// Every other one starts at rest, and the second above the first.
+fn random_object(body: &Arc<Recording>, at: u32, random: &mut Random) -> ModelObject {
+    let moving = if random.chance(0.5) { 1.0 } else { 0.0 };
+    let twist = Twist { linear: random.vector() * moving, angular: random.vector() * (5.0 * moving) };
+    let highest = body.surface.positions.iter().map(|p| p.y).fold(0.0, f64::max);
+    let position = DVec3::Y * (2.05 * highest * f64::from(at));
+    let orientation = DQuat::from_rotation_y(random.within(-1.0, 1.0) * f64::from(at));
+    let mut object =
+        ModelObject::new(body.clone(), ObjectStart { pose: Pose { position, orientation }, twist });
+    object.friction = random.one_of(FRICTIONS);
+    object
+}
