@@ -37,7 +37,8 @@ const UNSOLVED: f64 = 1e-9;
 /// A contact that penetrates is pushed out by this share a step, as far as losses pay for it.
 const RECOVERY: f64 = 0.1;
 
-/// Sums that are carried from step to step are made anew after so many, and in every step while there are few points.
+/// Sums that are carried from step to step are made anew over so many, a share in each, and all in every step while there
+/// are few points.
 const RENEWED: u64 = 64;
 const FEW: usize = 16;
 
@@ -149,8 +150,9 @@ fn prepare_contacts(model: &Model, state: &mut State) {
         let orientation = own.rigid.pose.orientation;
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
         own.points.predict_fresh(&mut responding);
-        if steps.is_multiple_of(RENEWED) || own.points.points.len() <= FEW {
-            own.points.renew();
+        match own.points.points.len() {
+            0..=FEW => own.points.renew(0, 1),
+            _ => own.points.renew(*steps % RENEWED, RENEWED),
         }
         for point in &mut own.points.points {
             point.start_arm = orientation * (point.rest + point.placed.displacement);

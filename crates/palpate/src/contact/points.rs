@@ -249,13 +249,14 @@ impl ContactPoints {
         }
     }
 
-    /// Sum C·g up anew, so that roundings don't add up.
+    /// Sum part number `part` of so many of C·g up anew, so that roundings don't add up.
     ///
     /// # Real time
-    /// Costs the square of the number of points.
-    pub(crate) fn renew(&mut self) {
+    /// Costs the square of the number of points, over the parts.
+    pub(crate) fn renew(&mut self, part: u64, of: u64) {
         let n = 3 * self.points.len();
-        for row in 0..n {
+        let from = |part: u64| n * part as usize / of as usize;
+        for row in from(part)..from(part + 1) {
             self.moved[row] = dot(&self.compliance[row * self.stride..][..n], &self.forces[..n]);
         }
     }
