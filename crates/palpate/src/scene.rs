@@ -158,9 +158,17 @@ impl Model {
             obstacle.check(at)?;
         }
         let objects = objects.into_iter().enumerate();
-        let objects: Result<_, _> =
+        let objects: Result<Vec<SceneObject>, _> =
             objects.map(|(at, object)| SceneObject::new(at, object, &parameters)).collect();
-        Ok(Self { parameters, objects: objects? })
+        let mut objects = objects?;
+        if parameters.touches_surfaces(objects.len()) {
+            for at in 0..objects.len() {
+                let (before, own) = objects.split_at_mut(at);
+                let known = before.iter().map(|object| (&object.body, &object.response));
+                own[0].response.know_nodes(&own[0].body, known);
+            }
+        }
+        Ok(Self { parameters, objects })
     }
 
     /// What holds for the whole scene.
@@ -178,6 +186,13 @@ impl Model {
         self.objects.get(grasp.object).is_some_and(|object| {
             object.body.recording.surface.holds(&grasp.point) && object.response.accepts(&grasp.point)
         })
+    }
+}
+
+impl ModelParameters {
+    /// Whether objects, so many, have something to lie on: obstacles, or one another.
+    fn touches_surfaces(&self, objects: usize) -> bool {
+        !self.obstacles.is_empty() || objects > 1
     }
 }
 
@@ -252,10 +267,10 @@ impl SceneObject {
         if !self.is_searched() {
             return devices;
         }
-        let surface = if parameters.obstacles.is_empty() && objects < 2 {
-            0
-        } else {
+        let surface = if parameters.touches_surfaces(objects) {
             self.body.recording.surface.positions.len().min(parameters.most_contact_points)
+        } else {
+            0
         };
         (1 + MOST_FACES) * devices + surface
     }

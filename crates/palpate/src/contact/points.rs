@@ -3,7 +3,7 @@
 //! C [m/N] in body axes, R_cc[0] of equation (9), depends on where the points are, not on time: it is computed when
 //! a point is new and kept while it lasts.
 
-use crate::response::{Place, Placed, Responding, dot};
+use crate::response::{Place, Placed, Reading, Responding, dot};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -32,6 +32,13 @@ pub(crate) struct ContactPoint {
     /// Arm from the centre of mass at the start and at the end of the step [m, world].
     pub(crate) start_arm: DVec3,
     pub(crate) end_arm: DVec3,
+}
+
+impl ContactPoint {
+    /// The node that it reads, if it is a node and no patch.
+    pub(crate) fn known_node(&self) -> Option<usize> {
+        self.node.filter(|_| self.place.reading == Reading::Point)
+    }
 }
 
 /// All contact points of one object; buffers are made once.

@@ -77,8 +77,8 @@ impl NodeCache {
 
     /// Take over where contact points are that are nodes.
     fn take_nodes(&mut self, points: &ContactPoints) {
-        for point in points.points.iter().filter(|point| point.place.reading == Reading::Point) {
-            let Some(node) = point.node else { continue };
+        for point in &points.points {
+            let Some(node) = point.known_node() else { continue };
             let by_modes = point.placed.displacement - point.placed.residual;
             self.positions[node] = point.rest + by_modes;
             self.free[node] = point.rest + point.free - point.placed.sag;

@@ -5,6 +5,7 @@ mod body;
 mod dot;
 mod fir;
 mod modal;
+mod nodes;
 mod oscillator;
 mod patch_field;
 
@@ -22,6 +23,7 @@ use alloc::sync::Arc;
 use fir::{Fir, FirState};
 use glam::{DMat3, DVec3};
 use modal::{ModalState, SampledModes};
+use nodes::NodeCompliance;
 
 /// Which form of its response an object uses.
 #[derive(Debug, Clone, Default)]
@@ -85,6 +87,19 @@ impl Response {
             Self::Modal(_) => true,
             Self::Fir(fir) => fir.accepts(point),
         }
+    }
+
+    /// Know R[0] between all surface nodes before the first step, if there are not too many; `others` are objects that may
+    /// know it already.
+    pub(crate) fn know_nodes<'r>(&mut self, body: &Body, others: impl Iterator<Item = (&'r Body, &'r Self)>) {
+        let Self::Modal(modes) = self else { return };
+        let same = others.filter(|(other, _)| Arc::ptr_eq(&other.recording, &body.recording));
+        let known = |response: &Self| match response {
+            Self::Modal(modes) => modes.nodes.clone(),
+            Self::Fir(_) => None,
+        };
+        let same = same.filter_map(|(_, response)| known(response)).next();
+        modes.nodes = same.or_else(|| NodeCompliance::new(body, modes).map(Arc::new));
     }
 
     /// The state at rest, with room for so many contact points.

@@ -5,9 +5,11 @@
 
 use super::dot::{dot3, dot9};
 use super::oscillator::{HeldOscillator, Oscillation};
+use super::nodes::NodeCompliance;
 use super::{Acting, Body, Place, Placed};
 use crate::contact::ContactPoint;
 use crate::recording::{ModalBasis, Recording};
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -19,6 +21,8 @@ const FLUSH_BELOW: f64 = 1e-150;
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
     oscillators: Vec<HeldOscillator>,
+    /// R[0] between nodes, where it is known.
+    pub(super) nodes: Option<Arc<NodeCompliance>>,
 }
 
 /// State of one object in modal form.
@@ -68,12 +72,23 @@ impl ModalState {
 impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
-        Self { oscillators: pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect() }
+        let oscillators = pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect();
+        Self { oscillators, nodes: None }
     }
 
     /// Number of modes.
     pub(crate) fn len(&self) -> usize {
         self.oscillators.len()
+    }
+
+    /// Three rows times B.
+    pub(super) fn weigh(&self, rows: &[f64], weighted: &mut [f64]) {
+        let m = self.len().max(1);
+        for (weighted, row) in weighted.chunks_exact_mut(m).zip(rows.chunks_exact(m)) {
+            for ((w, phi), oscillator) in weighted.iter_mut().zip(row).zip(&self.oscillators) {
+                *w = oscillator.b * phi;
+            }
+        }
     }
 
     /// Let a slot stand for a place; gives where the place is now and the part of it that the residual compliance and
@@ -106,7 +121,7 @@ impl SampledModes {
     /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
     ///
     /// # Real time
-    /// Costs modes × points.
+    /// Costs modes × points; between nodes that are known beforehand, points.
     pub(crate) fn compliance(
         &self,
         body: &Body,
@@ -118,12 +133,18 @@ impl SampledModes {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        for (weighted, own) in weighted.chunks_exact_mut(m.max(1)).zip(of(slot).chunks_exact(m.max(1))) {
-            for ((w, phi), oscillator) in weighted.iter_mut().zip(own).zip(&self.oscillators) {
-                *w = oscillator.b * phi;
-            }
-        }
+        let own = points.iter().find(|point| point.slot == slot).and_then(|point| point.known_node());
+        let known = self.nodes.as_ref().zip(own);
+        let mut weighed = false;
         for (at, point) in points.iter().enumerate() {
+            if let (Some((nodes, own)), Some(node)) = (known, point.known_node()) {
+                give(at, nodes.between(own, node));
+                continue;
+            }
+            if !weighed {
+                self.weigh(of(slot), weighted);
+                weighed = true;
+            }
             give(at, dot9(weighted, of(point.slot)) + body.residual(place, &point.place));
         }
     }
