@@ -4,8 +4,8 @@
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
 use super::dot::{dot3, dot9};
-use super::oscillator::{HeldOscillator, Oscillation};
 use super::nodes::NodeCompliance;
+use super::oscillator::{HeldOscillator, Oscillation};
 use super::{Acting, Body, Place, Placed};
 use crate::contact::ContactPoint;
 use crate::recording::{ModalBasis, Recording};
