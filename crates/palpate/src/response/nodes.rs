@@ -49,3 +49,40 @@ impl NodeCompliance {
         if a >= b { of(a, b) } else { of(b, a).transpose() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Place, Responding, Response, ResponseForm};
+    use super::*;
+    use crate::contact::ContactPoints;
+    use crate::recording::Recording;
+    use crate::surface::SurfacePoint;
+    use alloc::sync::Arc;
+    use glam::DVec3;
+
+    #[test]
+    fn what_is_looked_up_is_what_modes_and_residual_compliance_give() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let body = Body::new(recording.clone(), &[]);
+        let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
+        let mut looked_up = computed.clone();
+        looked_up.know_nodes(&body, core::iter::empty());
+        let blocks = |response: &Response| {
+            let mut state = response.at_rest(4);
+            let mut points = ContactPoints::new(4);
+            let mut responding =
+                Responding { response, body: &body, state: &mut state, gravity: DVec3::ZERO };
+            let between = SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] };
+            for point in [body.node_point(7), between, body.node_point(2), body.node_point(11)] {
+                points.add(&mut responding, Place { point, reading: Reading::Point }).expect("room");
+            }
+            (0..16).map(|k| points.block(k / 4, k % 4)).collect::<Vec<_>>()
+        };
+        for (a, b) in blocks(&computed).iter().zip(blocks(&looked_up)) {
+            assert!(a.abs_diff_eq(b, 1e-14 * a.x_axis.length()), "{a} {b}");
+        }
+        let of = |response: &Response| matches!(response, Response::Modal(modes) if modes.nodes.is_some());
+        assert!(of(&looked_up) && !of(&computed));
+    }
+}
