@@ -267,6 +267,11 @@ impl State {
 }
 
 impl ObjectState {
+    /// How far from the origin the object goes [m]: the scale of round-off of its places.
+    pub(crate) fn reach(&self, object: &SceneObject) -> f64 {
+        self.rigid.pose.position.length() + object.radius
+    }
+
     fn new(object: &SceneObject, model: &Model) -> Self {
         let parameters = &model.parameters;
         let capacity = object.capacity(parameters, model.objects.len());

@@ -227,8 +227,7 @@ fn advance(model: &Model, state: &mut State) {
     let mut unsolved = 0;
     for (at, own) in objects.iter_mut().enumerate() {
         let object = &model.objects[at];
-        let reach = own.rigid.pose.position.length() + object.radius;
-        unsolved += u32::from(own.end.miss * object.radius > UNSOLVED * reach);
+        unsolved += u32::from(own.end.miss * object.radius > UNSOLVED * own.reach(object));
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
         own.ledger.dissipated += responding.advance(&mut own.points.points);
         own.pushed = 0.0;

@@ -51,14 +51,14 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         let moved = b - *W * force;
         let slip = DVec2::new(moved.y, moved.z);
         // How slip and its part across the direction change as the direction turns.
-        let across = direction.perp();
-        let lambda_turns = -lambda * friction * coupling.dot(across) / denominator;
-        let tangent_turns = (direction * lambda_turns + across * lambda) * friction;
+        let aside = direction.perp();
+        let lambda_turns = -lambda * friction * coupling.dot(aside) / denominator;
+        let tangent_turns = (direction * lambda_turns + aside * lambda) * friction;
         let turns = *W * DVec3::new(lambda_turns, tangent_turns.x, tangent_turns.y);
         let slip_turns = -DVec2::new(turns.y, turns.z);
-        let turn = -direction.perp_dot(slip) / (across.perp_dot(slip) + direction.perp_dot(slip_turns));
+        let turn = -direction.perp_dot(slip) / (aside.perp_dot(slip) + direction.perp_dot(slip_turns));
         let next = if direction.dot(slip) > 0.0 && turn.abs() < NEAR {
-            (direction + across * turn).normalize()
+            (direction + aside * turn).normalize()
         } else {
             (tangent + slip * step).normalize_or(direction)
         };

@@ -214,12 +214,10 @@ impl Parts<'_> {
         for &member in members {
             let Contact { object, slot, other, force, .. } = self.contacts[member as usize];
             self.contacts[member as usize].force = force * share;
-            self.push(object, slot, force * share);
-            match other {
-                Other::Device(device) => self.devices[device].force += force * (share - 1.0),
-                Other::Object { number, slot } => self.push(number, slot, -force * share),
-                Other::Obstacle { .. } => {}
+            if let Other::Device(device) = other {
+                self.devices[device].force -= force;
             }
+            self.apply(object, slot, other, force * share);
         }
     }
 
@@ -235,17 +233,20 @@ impl Parts<'_> {
     /// What roundings of places make of the contacts' work [J].
     pub(crate) fn rounding(&self) -> f64 {
         let of = |contact: &Contact| {
-            let at = contact.object;
-            let reach = self.objects[at].rigid.pose.position.length() + self.model.objects[at].radius;
+            let reach = self.objects[contact.object].reach(&self.model.objects[contact.object]);
             ROUND_OFF * reach * contact.force.length()
         };
         self.contacts.iter().map(of).sum()
     }
 
-    /// Work [J] that contacts take over the step under the forces that were evaluated last.
-    pub(super) fn taken(&self, members: &[u32]) -> f64 {
-        let contacts = members.iter().map(|&member| &self.contacts[member as usize]);
-        contacts.map(|contact| Contact { end: self.apart(contact), ..*contact }.taken()).sum()
+    /// Where the sides of contacts end up under the forces that were evaluated last. Gives the work [J] that they take.
+    pub(super) fn end(&mut self, members: &[u32]) -> f64 {
+        let mut taken = 0.0;
+        for at in members.iter().map(|&at| at as usize) {
+            self.contacts[at].end = self.apart(&self.contacts[at]);
+            taken += self.contacts[at].taken();
+        }
+        taken
     }
 
     /// What a contact's law is solved with, in linear terms.

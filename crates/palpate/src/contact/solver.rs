@@ -132,12 +132,12 @@ impl Solver {
             let radius = parts.model.objects[at].radius;
             parts.objects[at].points.least_move = if many { 0.03 * CLOSE * radius } else { 0.0 };
             parts.start(at);
-            reach = reach.max(parts.objects[at].rigid.pose.position.length() + radius);
+            reach = reach.max(parts.objects[at].reach(&parts.model.objects[at]));
             size = size.min(radius);
         }
+        self.linearise(parts);
         for &member in &self.members {
             if parts.contacts[member as usize].law != Law::Held {
-                parts.linearise(member as usize);
                 parts.drop_noise(member as usize, self.accuracy(0, size));
             }
             let contact = parts.contacts[member as usize];
@@ -153,7 +153,7 @@ impl Solver {
         let solved = loop {
             let turned = self.evaluate(parts);
             if turned > TURNED * size {
-                self.linearise_anew(parts);
+                self.linearise(parts);
             }
             iterations += 1;
             let miss = larger(turned, self.sweep(parts, 0.1 * self.accuracy(visits, size)));
@@ -204,10 +204,7 @@ impl Solver {
         for &object in &self.bodies {
             parts.finish(object as usize);
         }
-        for &member in &self.members {
-            let contact = parts.contacts[member as usize];
-            parts.contacts[member as usize].end = parts.apart(&contact);
-        }
+        parts.end(&self.members);
     }
 
     /// Whether forces turn a body so far that nothing linear about it is of use.
@@ -220,7 +217,7 @@ impl Solver {
     fn solve_in_part(&mut self, parts: &mut Parts, tight: f64) -> bool {
         parts.let_go(&self.bodies, &self.members);
         self.bodies.iter().for_each(|&at| parts.start(at as usize));
-        self.linearise_anew(parts);
+        self.linearise(parts);
         let mut last = 0.0;
         for _ in 0..PART_SWEEPS {
             parts.remember(&self.bodies, &self.members);
@@ -236,7 +233,7 @@ impl Solver {
             self.bodies.iter().for_each(|&at| parts.start(at as usize));
             parts.scale_forces(&self.members, share);
             let met = (0..PART_EVALUATIONS).any(|_| self.evaluate(parts) <= tight);
-            if met && parts.taken(&self.members) >= 0.0 {
+            if met && parts.end(&self.members) >= 0.0 {
                 return true;
             }
             share = 0.25;
@@ -259,7 +256,7 @@ impl Solver {
     }
 
     /// The contacts' own W about the last evaluation.
-    fn linearise_anew(&mut self, parts: &mut Parts) {
+    fn linearise(&self, parts: &mut Parts) {
         for &member in &self.members {
             if parts.contacts[member as usize].law != Law::Held {
                 parts.linearise(member as usize);

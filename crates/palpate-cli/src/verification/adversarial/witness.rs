@@ -267,7 +267,13 @@ impl Tally {
         };
         let unsolved = self.unsolved.count as f64 / self.steps as f64;
         vec![
-            none(&format!("of {} steps, with numbers not finite", self.steps), &self.unfinite),
+            none(
+                &format!(
+                    "of {} steps, {} of them in touch, with numbers not finite",
+                    self.steps, self.touching
+                ),
+                &self.unfinite,
+            ),
             share("energy beyond what was put in, share", &self.gained, ROUND_OFF),
             // Where many contacts are solved loosely, the turn of their body is off by as much.
             share("energy that no term explains, share", &self.unexplained, LOOSE),
