@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::spatial::Pose;
 use crate::surface::{
-    Bands, Bounds, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle,
+    Bands, Bounds, Still, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle,
 };
 use alloc::format;
 use alloc::sync::Arc;
@@ -125,8 +125,7 @@ impl ObstacleMesh {
         let place = |n: usize| self.surface.positions[n];
         self.tree.walk(
             (&self.bounds, &Visit::STILL),
-            &mut (),
-            (|_, n| place(n), |_, _| None, |_, n| place(n)),
+            &mut Still(&self.surface),
             |_, _, centre, radius| near(centre, radius),
             |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
         );

@@ -287,13 +287,13 @@ impl SceneObject {
         &self,
         parameters: &ModelParameters,
         start: &RigidState,
-        force: DVec3,
-        torque: DVec3,
+        (force, torque): (DVec3, DVec3),
+        nearly: Option<&RigidStep>,
     ) -> RigidStep {
         match &self.inertia {
             Some(inertia) => {
                 let force = force + parameters.gravity * inertia.mass;
-                inertia.advance(parameters.motion, start, parameters.step_s, force, torque)
+                inertia.advance(parameters.motion, start, parameters.step_s, (force, torque), nearly)
             }
             None => RigidStep { end: *start, turn: DVec3::ZERO, miss: 0.0 },
         }

@@ -226,7 +226,7 @@ impl State {
             workspace: Workspace {
                 solver: Solver::new(model.objects.len(), devices, contacts),
                 search: Search::new(),
-                caches: model.objects.iter().map(|o| NodeCache::new(nodes(o))).collect(),
+                caches: model.objects.iter().map(|o| NodeCache::new(&o.body)).collect(),
                 vicinities: (0..devices)
                     .flat_map(|_| model.objects.iter().map(|o| Vicinity::new(o.response.modes())))
                     .collect(),
@@ -275,6 +275,7 @@ impl ObjectState {
     fn new(object: &SceneObject, model: &Model) -> Self {
         let parameters = &model.parameters;
         let capacity = object.capacity(parameters, model.objects.len());
+        let nodes = object.body.recording.surface.positions.len();
         let twist = object.start.twist;
         let pose = object.start.pose;
         let angular_momentum = object
@@ -284,7 +285,7 @@ impl ObjectState {
         let still = RigidStep { end: rigid, turn: DVec3::ZERO, miss: 0.0 };
         let mut state = Self {
             rigid,
-            response: object.response.at_rest(capacity),
+            response: object.response.at_rest(nodes, capacity),
             points: ContactPoints::new(capacity),
             free: still,
             end: still,

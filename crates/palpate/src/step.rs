@@ -66,7 +66,7 @@ fn predict(model: &Model, state: &mut State) {
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
         responding.predict();
         own.points.predict(&mut responding);
-        own.free = object.advance_rigid(&model.parameters, &own.rigid, DVec3::ZERO, DVec3::ZERO);
+        own.free = object.advance_rigid(&model.parameters, &own.rigid, (DVec3::ZERO, DVec3::ZERO), None);
         own.surface_motion = object.body.way(own.response.coordinates(), own.response.free_coordinates());
     }
 }

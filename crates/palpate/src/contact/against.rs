@@ -241,7 +241,8 @@ impl Encounter<'_> {
                 let feature = first + corner;
                 let key =
                     Key { other: Against::Obstacle(self.number), object: self.at, feature: feature as u64 };
-                let known = contacts.binary_search_by(|c| c.key.cmp(&key)).is_ok();
+                let known = contacts.binary_search_by(|c| c.key.cmp(&key)).ok();
+                let known = known.map(|at| self.own.points.of(contacts[at].slot).place.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(place));
                 let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
                 let approach = Approach { point, way, known, edge: self.body.edge };

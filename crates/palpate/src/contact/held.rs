@@ -5,6 +5,7 @@
 //! would be. A row that depends on the rows before it (two hands on one point) is left out: its
 //! force is zero.
 
+use super::parts::larger;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -64,13 +65,16 @@ impl HeldSystem {
         dependent
     }
 
-    /// f = W⁻¹·ρ, with `residual` giving ρ [m] of a point; see [`Self::force`].
+    /// f = W⁻¹·ρ, with `residual` giving ρ [m] of a point; see [`Self::force`]. Gives the largest ρ.
     ///
     /// # Real time
-    pub(crate) fn solve(&mut self, residual: impl Fn(usize) -> DVec3) {
+    pub(crate) fn solve(&mut self, residual: impl Fn(usize) -> DVec3) -> f64 {
         let n = self.extent;
+        let mut largest = 0.0;
         for point in 0..n / 3 {
-            residual(point).write_to_slice(&mut self.solution[3 * point..]);
+            let rho = residual(point);
+            largest = larger(largest, rho.length());
+            rho.write_to_slice(&mut self.solution[3 * point..]);
         }
         for j in 0..n {
             let dot: f64 = self.factor[j * n..j * n + j].iter().zip(&self.solution).map(|(x, y)| x * y).sum();
@@ -83,6 +87,7 @@ impl HeldSystem {
                 self.solution[k] -= self.factor[j * n + k] * x;
             }
         }
+        largest
     }
 
     /// The last solution's force [N] of a point.
@@ -106,7 +111,7 @@ mod tests {
         let mut system = HeldSystem::new(2);
         assert_eq!(system.factorise(2, blocks(false)), 0);
         let rho = [DVec3::new(1.0, -2.0, 0.3), DVec3::new(0.1, 0.7, -0.9)];
-        system.solve(|i| rho[i]);
+        assert_eq!(system.solve(|i| rho[i]), rho[0].length());
         let f = [system.force(0), system.force(1)];
         for (i, wanted) in rho.into_iter().enumerate() {
             let back: DVec3 = (0..2).map(|j| blocks(false)(i.max(j), i.min(j)) * f[j]).sum();

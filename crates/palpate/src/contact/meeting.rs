@@ -9,6 +9,9 @@ use glam::DVec3;
 /// is small beside it.
 pub(crate) const MARGIN: f64 = 2e-3;
 
+/// What would meet within so many times the way of a step is taken in.
+pub(crate) const SPARE: f64 = 1.5;
+
 /// A point deeper inside than this share of the mean edge, and not in contact before, has come there some other way.
 const DEEPEST: f64 = 0.5;
 
@@ -19,10 +22,18 @@ pub(crate) struct Approach {
     pub(crate) point: DVec3,
     /// How far it and the surface go relative to each other in the step [m], the surface's deformation apart.
     pub(crate) way: f64,
-    /// Whether it was in contact.
-    pub(crate) known: bool,
+    /// The triangle that it was in contact with.
+    pub(crate) known: Option<u32>,
     /// The mean edge [m] that its distances are measured by.
     pub(crate) edge: f64,
+}
+
+impl Approach {
+    /// How far from the point the surface can be for them to meet [m].
+    pub(crate) fn reach(&self) -> f64 {
+        let Self { way, known, edge, .. } = *self;
+        MARGIN * edge + 2.0 * way + if known.is_some() { edge } else { DEEPEST * edge }
+    }
 }
 
 /// The place and the outward normal [body] where a point meets a surface in the step, if it does.
@@ -34,15 +45,14 @@ pub(crate) fn meeting(
     approach: &Approach,
 ) -> Option<(SurfacePoint, DVec3)> {
     let Approach { point, way, known, edge } = *approach;
-    let near = MARGIN * edge;
-    let reach = near + 2.0 * way + if known { edge } else { DEEPEST * edge };
-    search.near(sight, point, reach);
+    let (near, reach) = (MARGIN * edge, approach.reach());
+    search.closest(sight, point, reach, known);
     let nearest = search.found.first().copied()?;
     let inside = search.is_inside(point);
     let gap = if inside { -nearest.distance } else { nearest.distance };
     // From outside, what can close in the step; from inside, what was in contact or has just come in.
-    let closes = gap < near + 1.5 * (way + sight.deformation(&nearest));
-    if !closes || gap < -DEEPEST * edge && !known {
+    let closes = gap < near + SPARE * (way + sight.deformation(&nearest));
+    if !closes || gap < -DEEPEST * edge && known.is_none() {
         return None;
     }
     // Over an edge from outside the direction is the way to it, on a face the face's.

@@ -368,5 +368,5 @@ fn advance_rigid(model: &Model, at: usize, own: &ObjectState) -> RigidStep {
         force += point.force;
         torque += ((point.start_arm + point.end_arm) * 0.5).cross(point.force);
     }
-    model.objects[at].advance_rigid(&model.parameters, &own.rigid, force, torque)
+    model.objects[at].advance_rigid(&model.parameters, &own.rigid, (force, torque), Some(&own.end))
 }

@@ -13,6 +13,9 @@ const MOST_FOUND: usize = 192;
 const SPARE_EDGE: f64 = 0.15;
 const SPARE_REACH: f64 = 0.05;
 
+/// Places that are less than this [m] apart are one.
+const SAME: f64 = 1e-9;
+
 /// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
 pub(super) const ONE_FACE: f64 = 0.85;
 
@@ -86,6 +89,32 @@ impl Search {
         self.sort();
     }
 
+    /// Find the triangles that hold the nearest point of the surface, if it is within a reach [m] of a body point. One that
+    /// was nearest a moment ago saves looking far.
+    ///
+    /// # Real time
+    /// Costs the triangles that come near to that.
+    pub(crate) fn closest(&mut self, sight: &mut Sight, p: DVec3, reach: f64, known: Option<u32>) {
+        let found = &mut self.found;
+        found.clear();
+        let first = known.map_or(f64::INFINITY, |triangle| sight.nearest_on(triangle, p).distance + SAME);
+        let least = core::cell::Cell::new(reach.min(first));
+        sight.walk(
+            |_, _, centre, radius| (p - centre).length() - radius < least.get(),
+            |sight, triangle, _| {
+                let one = sight.nearest_on(triangle, p);
+                if one.distance < least.get() {
+                    least.set(least.get().min(one.distance + SAME));
+                    found.retain(|other| other.distance < least.get());
+                    if found.len() < MOST_FOUND {
+                        found.push(one);
+                    }
+                }
+            },
+        );
+        self.sort();
+    }
+
     /// As [`Self::near`], by the vicinity where that is enough.
     ///
     /// # Real time
@@ -136,7 +165,7 @@ impl Search {
     /// Whether a point is inside, by the directions of the nearest triangles that were found.
     pub(crate) fn is_inside(&self, p: DVec3) -> bool {
         let Some(nearest) = self.found.first() else { return false };
-        let same = self.found.iter().filter(|f| (f.position - nearest.position).length_squared() < 1e-18);
+        let same = self.found.iter().filter(|f| (f.position - nearest.position).length() < SAME);
         same.map(|f| f.normal).sum::<DVec3>().dot(p - nearest.position) < 0.0
     }
 
@@ -182,8 +211,8 @@ mod tests {
         let radius = 2.0 * recording.surface.mean_edge();
         let body = Body::new(recording.clone(), &[radius]);
         let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
-        let (state, points) = (response.at_rest(1), ContactPoints::new(1));
-        let mut cache = NodeCache::new(recording.surface.positions.len());
+        let (state, points) = (response.at_rest(recording.surface.positions.len(), 1), ContactPoints::new(1));
+        let mut cache = NodeCache::new(&body);
         let mut search = Search::new();
         let (mut vicinity, omegas) =
             (Vicinity::new(recording.modes.len()), &recording.modes.angular_frequencies);

@@ -2,8 +2,8 @@
 //! the surface.
 
 use crate::contact::ContactPoints;
-use crate::response::{Acting, Body, Place, Reading, ResponseState};
-use crate::surface::{Centre, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
+use crate::response::{Acting, Body, NodalForces, Place, Reading, ResponseState};
+use crate::surface::{Centre, Moving, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -38,13 +38,16 @@ pub(crate) struct NodeCache {
     whole_now: u64,
     some_dents: bool,
     moment: Option<(u64, Reading)>,
+    /// Radii of the tree's spheres about where their centres are by the modes [m], as far as they are known.
+    tight: Vec<(f64, u64)>,
     /// Which nodes a walk has come to.
     visits: Vec<u32>,
     visit: u32,
 }
 
 impl NodeCache {
-    pub(crate) fn new(nodes: usize) -> Self {
+    pub(crate) fn new(body: &Body) -> Self {
+        let nodes = body.recording.surface.positions.len();
         Self {
             positions: vec![DVec3::ZERO; nodes],
             stamps: vec![0; nodes],
@@ -56,6 +59,7 @@ impl NodeCache {
             whole_now: 0,
             some_dents: false,
             moment: None,
+            tight: vec![(0.0, 0); body.tree.spheres()],
             visits: vec![0; nodes],
             visit: 0,
         }
@@ -97,10 +101,13 @@ pub(crate) struct Sight<'a> {
     free: &'a [f64],
     /// Forces of the last step with their places.
     acting: &'a [Acting],
+    nodal: Option<&'a NodalForces>,
     /// Places whose own dents do not count: around them, within a distance, the surface goes as the place does, by so
     /// much [m] where a reading's dents have no shape.
     own: [Option<(Place, DVec3)>; MOST_FACES],
     flat: f64,
+    /// Whether spheres hold what the step without contact force does, too.
+    widened: bool,
     cache: &'a mut NodeCache,
     visit: Visit,
 }
@@ -138,8 +145,10 @@ impl<'a> Sight<'a> {
             q,
             free,
             acting: state.acting(),
+            nodal: state.nodal(),
             own: [None; MOST_FACES],
             flat: 0.0,
+            widened: false,
             cache,
             visit,
         }
@@ -168,6 +177,10 @@ impl<'a> Sight<'a> {
         self.body.recording.surface.positions[node]
     }
 
+    fn is_known(&self, node: usize) -> bool {
+        self.cache.stamps[node] == self.cache.now
+    }
+
     /// The most [m] that a dent moves any node.
     pub(crate) fn most_dent(&self) -> f64 {
         self.visit.most_residual
@@ -185,6 +198,7 @@ impl<'a> Sight<'a> {
 
     /// Let spheres hold also what the step without contact force does.
     pub(crate) fn widen(&mut self) {
+        self.widened = true;
         let free = self.body.norms(self.free);
         self.visit.modal = core::array::from_fn(|band| self.visit.modal[band].max(free[band]));
     }
@@ -214,7 +228,7 @@ impl<'a> Sight<'a> {
 
     /// A node's place by the modes.
     pub(crate) fn smooth(&mut self, node: usize) -> DVec3 {
-        if self.cache.stamps[node] != self.cache.now {
+        if !self.is_known(node) {
             self.cache.stamps[node] = self.cache.now;
             self.cache.positions[node] = self.rest(node) + self.displacement(node, self.q);
         }
@@ -233,38 +247,26 @@ impl<'a> Sight<'a> {
     }
 
     fn with_dents(&self, node: usize, smooth: DVec3) -> DVec3 {
+        let acting = self.acting.iter().filter(|other| other.place.reading == self.reading);
+        let own = || self.own.iter().flatten();
+        if self.reading != Reading::Point {
+            let flat =
+                |other: &Acting| if own().any(|(own, _)| *own == other.place) { self.flat } else { 0.0 };
+            return smooth + acting.map(|other| self.body.dent(node, other, flat(other))).sum::<DVec3>();
+        }
         let mut place = smooth;
-        for other in self.acting.iter().filter(|other| other.place.reading == self.reading) {
-            let own = self.own.iter().flatten().find(|(own, _)| *own == other.place);
-            let flat = if own.is_some() { self.flat } else { 0.0 };
-            // A dent that a point leaves has no shape between the nodes.
-            let beside = self.reading == Reading::Point && (self.rest(node) - other.rest).length() < flat;
-            place += match own.filter(|_| beside) {
-                Some((_, dent)) => *dent,
-                None => self.body.dent(node, other, flat),
-            };
+        if let Some(nodal) = self.nodal {
+            place += nodal.dent(&self.body.recording.residual, node);
+        }
+        // A dent that a point leaves has no shape between the nodes: those beside it go as it does.
+        for (own, dent) in own() {
+            let beside =
+                |other: &&Acting| other.place == *own && (self.rest(node) - other.rest).length() < self.flat;
+            if let Some(other) = acting.clone().find(beside) {
+                place += *dent - self.body.dent(node, other, 0.0);
+            }
         }
         place
-    }
-
-    /// Where a sphere's centre is: with dents where they have a shape, else they count for its radius.
-    fn centre(&mut self, node: usize) -> DVec3 {
-        match self.reading {
-            Reading::Point => self.smooth(node),
-            Reading::Patch(_) => self.node(node),
-        }
-    }
-
-    /// Where a sphere's centre is by the low modes; none where it is known by all of them.
-    fn low_centre(&self, node: usize) -> Option<DVec3> {
-        if self.cache.stamps[node] == self.cache.now {
-            return None;
-        }
-        let smooth = self.low(node);
-        Some(match self.reading {
-            Reading::Point => smooth,
-            Reading::Patch(_) => self.with_dents(node, smooth),
-        })
     }
 
     /// A node's place by the low modes.
@@ -296,12 +298,12 @@ impl<'a> Sight<'a> {
         Found { triangle, weights, position, distance: (p - position).length(), normal }
     }
 
-    /// How far the surface goes in a direction of unit length [m, body].
+    /// How far the surface goes in a direction of unit length [m, body], or `least` if it does not go so far.
     ///
     /// # Real time
     /// Costs the nodes that come near to that.
-    pub(crate) fn support(&mut self, direction: DVec3) -> f64 {
-        let farthest = core::cell::Cell::new(f64::NEG_INFINITY);
+    pub(crate) fn support(&mut self, direction: DVec3, least: f64) -> f64 {
+        let farthest = core::cell::Cell::new(least);
         let beside = self.most_dent();
         self.walk(
             |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
@@ -315,6 +317,19 @@ impl<'a> Sight<'a> {
         farthest.get()
     }
 
+    /// Whether anything of the surface may be within a reach [m] of a body point.
+    ///
+    /// # Real time
+    /// Costs less than to look what it is.
+    pub(crate) fn may_reach(&mut self, p: DVec3, reach: f64) -> bool {
+        let reached = core::cell::Cell::new(false);
+        self.walk(
+            |_, _, centre, radius| !reached.get() && (p - centre).length() - radius < reach,
+            |_, _, _| reached.set(true),
+        );
+        reached.get()
+    }
+
     /// Visit all triangles in spheres that `near` takes: (what its centre is, centre, radius) in the body frame, see
     /// [`crate::surface::SurfaceTree::walk`].
     pub(crate) fn walk(
@@ -324,7 +339,50 @@ impl<'a> Sight<'a> {
     ) {
         let body = self.body;
         let visit = self.visit;
-        let places = (Self::rest, Self::low_centre, Self::centre);
-        body.tree.walk((body.bounds(self.reading), &visit), self, places, near, found);
+        body.tree.walk((body.bounds(self.reading), &visit), self, near, found);
+    }
+}
+
+impl Moving for Sight<'_> {
+    fn rest(&self, node: usize) -> DVec3 {
+        Sight::rest(self, node)
+    }
+
+    fn low(&self, node: usize) -> Option<DVec3> {
+        if self.is_known(node) {
+            return None;
+        }
+        let smooth = Sight::low(self, node);
+        Some(match self.reading {
+            Reading::Point => smooth,
+            Reading::Patch(_) => self.with_dents(node, smooth),
+        })
+    }
+
+    /// With dents where they have a shape, else they count for a sphere's radius.
+    fn moved(&mut self, node: usize) -> DVec3 {
+        match self.reading {
+            Reading::Point => self.smooth(node),
+            Reading::Patch(_) => self.node(node),
+        }
+    }
+
+    /// Patches are looked at by few: what their dents do is not kept.
+    fn known(&self, node: usize) -> Option<DVec3> {
+        let known = self.reading == Reading::Point && !self.widened && self.is_known(node);
+        known.then(|| self.cache.positions[node])
+    }
+
+    fn corners_of(&self, triangle: u32) -> [usize; 3] {
+        self.body.recording.surface.triangles[triangle as usize].map(|node| node as usize)
+    }
+
+    fn tight(&self, sphere: usize) -> Option<f64> {
+        let (radius, stamp) = self.cache.tight[sphere];
+        (self.reading == Reading::Point && !self.widened && stamp == self.cache.now).then_some(radius)
+    }
+
+    fn set_tight(&mut self, sphere: usize, radius: f64) {
+        self.cache.tight[sphere] = (radius, self.cache.now);
     }
 }

@@ -30,12 +30,16 @@ const MAX_SWEEPS: u32 = 300;
 /// A miss above this share of the reach is no solution: a hand or a body moves too far in a step.
 const UNSOLVED: f64 = 1e-9;
 
-/// Few contacts are solved to round-off. Many need not be better than [`CLOSE`], and after so many visits than
-/// [`LOOSE`], as shares of the object's size: a face at rest on the floor is close at once, one that hits it gets loose.
+/// Few contacts are solved to round-off. Many need not be better than [`CLOSE`], after so many visits than [`LOOSE`], and
+/// after very many than [`ROUGH`], as shares of the object's size: a face at rest on the floor is close at once, one that
+/// hits it gets loose, and two faces that hit each other, whose contacts repeat one another, are left rough.
 const FEW: usize = 24;
 const VISITS: u32 = 600;
+const MANY_VISITS: u32 = 6000;
+const MOST_VISITS: u32 = 12_000;
 const CLOSE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
+const ROUGH: f64 = 1e-4;
 
 /// A body that an evaluation turns by more than this [rad] answers its contacts differently.
 const TURNED: f64 = 0.01;
@@ -164,12 +168,14 @@ impl Solver {
             // Done at round-off, or near it when no more digits are gained, or as near as contacts need.
             let stalled = miss > 0.5 * least && miss < 1e3 * tight;
             let enough = touching && miss < self.accuracy(visits, size);
-            let hopeless = touching && (sweeps >= MAX_SWEEPS || self.whirls(parts));
+            let worn = sweeps >= MAX_SWEEPS || visits >= MOST_VISITS;
+            let hopeless = touching && (worn || self.whirls(parts));
             let spent = iterations == MAX_ITERATIONS || hopeless;
             if miss <= tight || stalled || enough || spent || !miss.is_finite() {
                 status.iterations = status.iterations.max(iterations);
                 // Points that repeat others can't be met where their hands differ, and need not be.
-                let allowed = if touching { LOOSE * size } else { UNSOLVED * reach };
+                let allowed =
+                    if touching { self.accuracy(visits, size).max(LOOSE * size) } else { UNSOLVED * reach };
                 if miss <= allowed || dependent > 0 && miss <= first_miss {
                     status.solver_residual_m = status.solver_residual_m.max(miss);
                     break true;
@@ -181,7 +187,8 @@ impl Solver {
             least = least.min(miss);
             let goal = tight.max(0.02 * miss);
             let mut last = 0.0;
-            while sweeps < MAX_SWEEPS {
+            // Held points alone are solved by the one sweep.
+            while touching && sweeps < MAX_SWEEPS && visits < MOST_VISITS {
                 sweeps += 1;
                 parts.remember(&self.bodies, &self.members);
                 let moved = self.sweep(parts, 0.1 * goal);
@@ -243,10 +250,11 @@ impl Solver {
 
     /// A miss [m] that is small enough after so many visits.
     fn accuracy(&self, visits: u32, size: f64) -> f64 {
-        match (self.members.len() <= FEW, visits > VISITS) {
-            (true, false) => 0.0,
-            (false, false) => CLOSE * size,
-            (_, true) => LOOSE * size,
+        size * match visits {
+            0..=VISITS if self.members.len() <= FEW => 0.0,
+            0..=VISITS => CLOSE,
+            0..=MANY_VISITS => LOOSE,
+            _ => ROUGH,
         }
     }
 
@@ -289,9 +297,7 @@ impl Solver {
         let mut largest = 0.0_f64;
         let Self { system, held, members, .. } = self;
         if !held.is_empty() {
-            let apart = |point: usize| parts.apart(&parts.contacts[held[point] as usize]);
-            largest = (0..held.len()).map(|point| apart(point).length()).fold(0.0, larger);
-            system.solve(apart);
+            largest = system.solve(|point| parts.apart(&parts.contacts[held[point] as usize]));
             for (at, &contact) in held.iter().enumerate() {
                 parts.add_force(contact as usize, system.force(at));
             }

@@ -218,7 +218,7 @@ impl Body {
     }
 
     /// Residual compliance from a place to the surface node itself [m/N]. Costs a patch's nodes: for pictures.
-    pub(crate) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
+    pub(super) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
         let mut sum = DMat3::ZERO;
         for (corner, weight) in self.recording.surface.corners(&place.point) {
             if weight == 0.0 {

@@ -4,6 +4,7 @@
 mod body;
 mod dot;
 mod fir;
+mod loads;
 mod modal;
 mod nodes;
 mod oscillator;
@@ -11,6 +12,7 @@ mod patch_field;
 
 pub(crate) use body::{Acting, Body, Place, Placed, Reading};
 pub(crate) use dot::dot;
+pub(crate) use loads::NodalForces;
 pub use oscillator::{HeldOscillator, Oscillation};
 
 use crate::contact::ContactPoint;
@@ -102,10 +104,10 @@ impl Response {
         modes.nodes = same.or_else(|| NodeCompliance::new(body, modes).map(Arc::new));
     }
 
-    /// The state at rest, with room for so many contact points.
-    pub(crate) fn at_rest(&self, capacity: usize) -> ResponseState {
+    /// The state at rest of a body with so many surface nodes, with room for so many contact points.
+    pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), capacity)),
+            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), nodes, capacity)),
             Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
         }
     }
@@ -235,6 +237,14 @@ impl ResponseState {
         match self {
             Self::Modal(state) => &state.acting,
             Self::Fir(_) => &[],
+        }
+    }
+
+    /// Those of them that act at points, as forces on nodes; none where a table is used.
+    pub(crate) fn nodal(&self) -> Option<&NodalForces> {
+        match self {
+            Self::Modal(state) => Some(&state.nodal),
+            Self::Fir(_) => None,
         }
     }
 

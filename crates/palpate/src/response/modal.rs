@@ -4,9 +4,10 @@
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
 use super::dot::{dot3, dot9};
+use super::loads::NodalForces;
 use super::nodes::NodeCompliance;
 use super::oscillator::{HeldOscillator, Oscillation};
-use super::{Acting, Body, Place, Placed};
+use super::{Acting, Body, Place, Placed, Reading};
 use crate::contact::ContactPoint;
 use crate::recording::{ModalBasis, Recording};
 use alloc::sync::Arc;
@@ -40,12 +41,14 @@ pub(crate) struct ModalState {
     weighted: Vec<f64>,
     /// Forces [N, body] of the last step with their places, for the residual compliance.
     pub(super) acting: Vec<Acting>,
+    /// Those that act at points, by nodes.
+    pub(super) nodal: NodalForces,
     /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
     pub(super) residual_energy: f64,
 }
 
 impl ModalState {
-    pub(crate) fn new(modes: usize, capacity: usize) -> Self {
+    pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
         Self {
             modes: vec![Oscillation::default(); modes],
             q: vec![0.0; modes],
@@ -54,12 +57,20 @@ impl ModalState {
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
             acting: Vec::with_capacity(capacity),
+            nodal: NodalForces::new(nodes, capacity),
             residual_energy: 0.0,
         }
     }
 
     /// Displacement of a place by the residual compliance under the forces of the last step [m, body].
-    fn residual_displacement(&self, body: &Body, place: &Place) -> DVec3 {
+    fn residual_displacement(&mut self, body: &Body, place: &Place) -> DVec3 {
+        if place.reading == Reading::Point {
+            let corners = body.recording.surface.corners(&place.point).into_iter();
+            let used = corners.filter(|(_, weight)| *weight != 0.0);
+            return used
+                .map(|(node, weight)| self.nodal.find_dent(&body.recording.residual, node) * weight)
+                .sum();
+        }
         self.acting.iter().map(|other| body.residual(place, &other.place) * other.force).sum()
     }
 
@@ -121,7 +132,7 @@ impl SampledModes {
     /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
     ///
     /// # Real time
-    /// Costs modes × points; between nodes that are known beforehand, points.
+    /// Costs modes × points; points where what nodes do to one another is known.
     pub(crate) fn compliance(
         &self,
         body: &Body,
@@ -133,12 +144,13 @@ impl SampledModes {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        let own = points.iter().find(|point| point.slot == slot).and_then(|point| point.known_node());
-        let known = self.nodes.as_ref().zip(own);
+        let surface = &body.recording.surface;
+        let known = self.nodes.as_ref().filter(|_| place.reading == Reading::Point);
+        let own = surface.corners(&place.point);
         let mut weighed = false;
         for (at, point) in points.iter().enumerate() {
-            if let (Some((nodes, own)), Some(node)) = (known, point.known_node()) {
-                give(at, nodes.between(own, node));
+            if let Some(nodes) = known.filter(|_| point.place.reading == Reading::Point) {
+                give(at, nodes.between(&own, &surface.corners(&point.place.point)));
                 continue;
             }
             if !weighed {
@@ -204,14 +216,22 @@ impl SampledModes {
         // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
         let (mut work, mut energy) = (0.0, 0.0);
         state.acting.clear();
+        state.nodal.clear();
         for point in acting.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let residual = point.displacement - dot3(rows, &state.q);
             work += point.force_in_body.dot(residual - point.placed.residual);
             energy += 0.5 * point.force_in_body.dot(residual - point.placed.sag);
             point.placed.residual = residual;
+            if let Some(node) = point.known_node() {
+                state.nodal.know(node, residual - point.placed.sag);
+            }
             if point.force_in_body != DVec3::ZERO {
                 state.acting.push(body.acting(point.place, point.force_in_body));
+                if point.place.reading == Reading::Point {
+                    let corners = body.recording.surface.corners(&point.place.point);
+                    state.nodal.add(corners, point.force_in_body);
+                }
             }
         }
         let dissipated = dissipated + work - (energy - state.residual_energy);
@@ -249,7 +269,9 @@ impl SampledModes {
             if let Some(response) = &recording.gravity {
                 *u += response.residual_displacement(node, gravity);
             }
-            for Acting { place, force, .. } in &state.acting {
+            *u += state.nodal.dent(&recording.residual, node);
+            let by_patches = state.acting.iter().filter(|acting| acting.place.reading != Reading::Point);
+            for Acting { place, force, .. } in by_patches {
                 *u += body.residual_of_node(node, place) * *force;
             }
         }

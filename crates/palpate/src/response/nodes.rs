@@ -10,6 +10,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DMat3;
 
+/// A place by its surface nodes and their weights.
+type Corners = [(usize, f64); 3];
+
 /// Up to so many surface nodes all pairs are kept, 36 bytes times the square of their number.
 const MOST_NODES: usize = 1024;
 
@@ -41,10 +44,20 @@ impl NodeCompliance {
         Some(Self { blocks })
     }
 
-    /// Displacement of `a` per force on `b`.
+    /// Displacement at a place per force at another, both by the weights of surface nodes.
     ///
     /// # Real time
-    pub(super) fn between(&self, a: usize, b: usize) -> DMat3 {
+    pub(super) fn between(&self, a: &Corners, b: &Corners) -> DMat3 {
+        let mut sum = DMat3::ZERO;
+        for &(a, of_a) in a.iter().filter(|corner| corner.1 != 0.0) {
+            for &(b, of_b) in b.iter().filter(|corner| corner.1 != 0.0) {
+                sum += self.of_nodes(a, b) * (of_a * of_b);
+            }
+        }
+        sum
+    }
+
+    fn of_nodes(&self, a: usize, b: usize) -> DMat3 {
         let of = |row: usize, column: usize| self.blocks[row * (row + 1) / 2 + column];
         if a >= b { of(a, b) } else { of(b, a).transpose() }
     }
@@ -69,7 +82,7 @@ mod tests {
         let mut looked_up = computed.clone();
         looked_up.know_nodes(&body, core::iter::empty());
         let blocks = |response: &Response| {
-            let mut state = response.at_rest(4);
+            let mut state = response.at_rest(recording.surface.positions.len(), 4);
             let mut points = ContactPoints::new(4);
             let mut responding =
                 Responding { response, body: &body, state: &mut state, gravity: DVec3::ZERO };

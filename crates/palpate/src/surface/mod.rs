@@ -10,7 +10,7 @@ mod tree;
 mod triangle;
 
 pub(crate) use patch::{PatchWeights, triangles_around};
-pub(crate) use tree::{Bands, Bounds, Centre, SurfaceTree, Visit, band, low_modes};
+pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, band, low_modes};
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 
 use alloc::vec::Vec;

@@ -25,6 +25,10 @@ const LEAF: usize = 4;
 pub(crate) const BANDS: usize = 8;
 const LOW: usize = 5;
 
+/// More than the stack of a walk needs for any tree of 2³¹ triangles, and what marks a sphere whose inside was walked.
+const DEEPEST: usize = 128;
+const DONE: u32 = 1 << 31;
+
 /// A sphere is much smaller than another that is so many times as large.
 const MUCH: f64 = 1.3;
 
@@ -137,6 +141,52 @@ pub(crate) enum Centre {
     Moved(usize),
 }
 
+/// A surface that a walk goes over, as it is at a moment: its nodes, and the spheres of its tree about where their
+/// centres are, dents apart, as far as walks have found them out.
+pub(crate) trait Moving {
+    fn rest(&self, node: usize) -> DVec3;
+    /// Where the low modes move a node; none where it is known by all of them.
+    fn low(&self, node: usize) -> Option<DVec3>;
+    fn moved(&mut self, node: usize) -> DVec3;
+    /// The same if it is known already.
+    fn known(&self, node: usize) -> Option<DVec3>;
+    fn corners_of(&self, triangle: u32) -> [usize; 3];
+    fn tight(&self, sphere: usize) -> Option<f64>;
+    fn set_tight(&mut self, sphere: usize, radius: f64);
+}
+
+/// A surface that is rigid.
+pub(crate) struct Still<'a>(pub(crate) &'a Surface);
+
+impl Moving for Still<'_> {
+    fn rest(&self, node: usize) -> DVec3 {
+        self.0.positions[node]
+    }
+
+    fn low(&self, _: usize) -> Option<DVec3> {
+        None
+    }
+
+    fn moved(&mut self, node: usize) -> DVec3 {
+        self.rest(node)
+    }
+
+    fn known(&self, _: usize) -> Option<DVec3> {
+        None
+    }
+
+    fn corners_of(&self, triangle: u32) -> [usize; 3] {
+        self.0.triangles[triangle as usize].map(|node| node as usize)
+    }
+
+    /// As small as they are from the beginning.
+    fn tight(&self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn set_tight(&mut self, _: usize, _: f64) {}
+}
+
 /// The larger of each pair, rounded up.
 fn widen(of: &mut [f32; BANDS], by: impl Fn(usize) -> f64) {
     for (at, of) in of.iter_mut().enumerate() {
@@ -231,59 +281,106 @@ impl SurfaceTree {
         self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
     }
 
+    /// Spheres of the tree.
+    pub(crate) fn spheres(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Walk through the tree: a sphere (what its centre is, centre, radius) is entered where `near` says so, first about
     /// the rest position of a surface node, then about where the low modes move it, then about where it is, and the
     /// triangles of the leaves that are reached are given to `found`, with how far their nodes are from where the low
-    /// modes move them at most. `places` tells these places, the second only where the third is not known; all in one
-    /// frame.
+    /// modes move them at most. All in one frame.
     ///
     /// # Real time
-    pub(crate) fn walk<C>(
+    pub(crate) fn walk<S: Moving>(
         &self,
         (bounds, visit): (&Bounds, &Visit),
-        context: &mut C,
-        places: (
-            impl Fn(&C, usize) -> DVec3,
-            impl Fn(&C, usize) -> Option<DVec3>,
-            impl Fn(&mut C, usize) -> DVec3,
-        ),
-        near: impl Fn(&mut C, Centre, DVec3, f64) -> bool,
-        mut found: impl FnMut(&mut C, u32, f64),
+        surface: &mut S,
+        near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+        mut found: impl FnMut(&mut S, u32, f64),
     ) {
-        let (rest, low, moved) = places;
-        // Deeper than any tree of 2³² triangles.
-        let mut stack = [0_u32; 64];
+        let mut stack = [0_u32; DEEPEST];
         let mut depth = usize::from(!self.nodes.is_empty());
         while depth > 0 {
             depth -= 1;
-            let at = stack[depth] as usize;
+            let (at, done) = ((stack[depth] & !DONE) as usize, stack[depth] & DONE != 0);
             let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
-            let c = node.centre as usize;
-            let at_rest = rest(context, c);
-            if !near(context, Centre::Rest, at_rest, node.radius + visit.reach(spread)) {
+            if done {
+                self.tighten(at, surface);
                 continue;
             }
-            let within = node.radius + visit.apart(spread, node.radius);
-            let nearly = node.radius + visit.beside_low(spread, node.radius);
-            let low = low(context, c);
-            if low.is_some_and(|centre| !near(context, Centre::Low(c), centre, nearly)) {
+            let tight = surface.tight(at);
+            if !Self::enter(node, spread, visit, tight, surface, &near) {
                 continue;
-            }
-            // The sphere about where it is costs all modes: only where that is much smaller.
-            if low.is_none() || nearly > MUCH * within {
-                let centre = moved(context, c);
-                if !near(context, Centre::Moved(c), centre, within) {
-                    continue;
-                }
             }
             if node.second == 0 {
                 let high = visit.sum(&spread.modal, LOW..BANDS) + visit.dent(spread);
-                self.triangles_of(node).for_each(|triangle| found(context, triangle, high));
-            } else {
+                self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
+            }
+            if tight.is_none() {
+                stack[depth] = at as u32 | DONE;
+                depth += 1;
+            }
+            if node.second != 0 {
                 stack[depth] = node.second;
                 stack[depth + 1] = at as u32 + 1;
                 depth += 2;
             }
+        }
+    }
+
+    /// Whether a sphere is entered.
+    fn enter<S: Moving>(
+        node: &TreeNode,
+        spread: &Spread,
+        visit: &Visit,
+        tight: Option<f64>,
+        surface: &mut S,
+        near: &impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+    ) -> bool {
+        let c = node.centre as usize;
+        if let Some(radius) = tight {
+            let centre = surface.moved(c);
+            return near(surface, Centre::Moved(c), centre, radius + visit.dent_apart(spread, node.radius));
+        }
+        let at_rest = surface.rest(c);
+        if !near(surface, Centre::Rest, at_rest, node.radius + visit.reach(spread)) {
+            return false;
+        }
+        let within = node.radius + visit.apart(spread, node.radius);
+        let nearly = node.radius + visit.beside_low(spread, node.radius);
+        let low = surface.low(c);
+        if low.is_some_and(|centre| !near(surface, Centre::Low(c), centre, nearly)) {
+            return false;
+        }
+        // The sphere about where it is costs all modes: only where that is much smaller.
+        if low.is_some() && nearly <= MUCH * within {
+            return true;
+        }
+        let centre = surface.moved(c);
+        near(surface, Centre::Moved(c), centre, within)
+    }
+
+    /// What a walk has found out of a sphere's nodes makes it as small as it is.
+    fn tighten<S: Moving>(&self, at: usize, surface: &mut S) {
+        let node = &self.nodes[at];
+        let Some(centre) = surface.known(node.centre as usize) else { return };
+        let mut radius = 0.0_f64;
+        let mut hold = |place: Option<DVec3>, around: Option<f64>| {
+            let far = place.zip(around).map(|(place, around)| (place - centre).length() + around);
+            radius = radius.max(far?);
+            Some(())
+        };
+        let all = match node.second {
+            0 => self.triangles_of(node).try_for_each(|t| {
+                surface.corners_of(t).into_iter().try_for_each(|i| hold(surface.known(i), Some(0.0)))
+            }),
+            second => [at + 1, second as usize].into_iter().try_for_each(|child| {
+                hold(surface.known(self.nodes[child].centre as usize), surface.tight(child))
+            }),
+        };
+        if all.is_some() {
+            surface.set_tight(at, radius);
         }
     }
 }
