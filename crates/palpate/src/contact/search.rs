@@ -13,6 +13,9 @@ const MOST_FOUND: usize = 192;
 const SPARE_EDGE: f64 = 0.15;
 const SPARE_REACH: f64 = 0.05;
 
+/// A vicinity of which this share is used up will be found anew soon.
+const EARLY: f64 = 0.9;
+
 /// Places that are less than this [m] apart are one.
 const SAME: f64 = 1e-9;
 
@@ -55,11 +58,18 @@ impl Vicinity {
 #[derive(Debug, Clone)]
 pub(crate) struct Search {
     pub(crate) found: Vec<Found>,
+    /// Whether a vicinity was found anew in this step.
+    renewed: bool,
 }
 
 impl Search {
     pub(crate) fn new() -> Self {
-        Self { found: Vec::with_capacity(MOST_FOUND) }
+        Self { found: Vec::with_capacity(MOST_FOUND), renewed: false }
+    }
+
+    /// Begin a step.
+    pub(crate) fn begin(&mut self) {
+        self.renewed = false;
     }
 
     /// Find the triangles within a reach [m] of a body point.
@@ -120,13 +130,16 @@ impl Search {
     /// # Real time
     pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {
         let gone = if vicinity.reach > 0.0 { vicinity.gone(sight, p) } else { f64::INFINITY };
-        if gone + reach < vicinity.reach {
+        // One that will be needed soon is found early, so that those of several fingers don't fall into one step.
+        let soon = gone + reach > EARLY * vicinity.reach && !self.renewed;
+        if gone + reach < vicinity.reach && !soon {
             self.found.clear();
             let can = vicinity.triangles.iter().take_while(|(_, distance)| *distance < reach + gone);
             self.found.extend(can.map(|&(triangle, _)| sight.nearest_on(triangle, p)));
             self.sort();
             return;
         }
+        self.renewed = true;
         let wide = reach + SPARE_EDGE * sight.body.edge + SPARE_REACH * reach;
         self.near(sight, p, wide);
         vicinity.triangles.clear();
@@ -242,6 +255,20 @@ mod tests {
                 assert_eq!(got, all, "case {case}");
             }
             found += search.found.len();
+
+            // What the searches before have found out about spheres loses nothing.
+            for other in 0..4 {
+                let p = DVec3::new(angle(1.3), angle(1.6), angle(1.9)) * (0.03 * f64::from(other + 1));
+                let least = (0..recording.surface.triangles.len() as u32)
+                    .map(|t| sight.nearest_on(t, p).distance)
+                    .fold(f64::INFINITY, f64::min);
+                assert!(sight.may_reach(p, least * 1.001 + 1e-12), "case {case}");
+                let known = (other > 1).then_some(0);
+                search.closest(&mut sight, p, f64::INFINITY, known);
+                assert_eq!(search.found[0].distance, least, "case {case}");
+                search.closest(&mut sight, p, least, known);
+                assert!(search.found.is_empty(), "case {case}");
+            }
 
             // By the vicinity, a little later.
             let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&q));

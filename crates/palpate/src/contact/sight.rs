@@ -40,6 +40,8 @@ pub(crate) struct NodeCache {
     moment: Option<(u64, Reading)>,
     /// Radii of the tree's spheres about where their centres are by the modes [m], as far as they are known.
     tight: Vec<(f64, u64)>,
+    /// Modal coordinates, now and at the end of the step without contact force, in single precision for patches.
+    single: [Vec<f32>; 2],
     /// Which nodes a walk has come to.
     visits: Vec<u32>,
     visit: u32,
@@ -59,6 +61,7 @@ impl NodeCache {
             whole_now: 0,
             some_dents: false,
             moment: None,
+            single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
             tight: vec![(0.0, 0); body.tree.spheres()],
             visits: vec![0; nodes],
             visit: 0,
@@ -77,6 +80,12 @@ impl NodeCache {
             self.some_dents = false;
         }
         !same
+    }
+
+    fn take_single(&mut self, moments: [&[f64]; 2]) {
+        for (single, q) in self.single.iter_mut().zip(moments) {
+            single.iter_mut().zip(q).for_each(|(single, q)| *single = *q as f32);
+        }
     }
 
     /// Take over where contact points are that are nodes.
@@ -126,8 +135,13 @@ impl<'a> Sight<'a> {
             Ok(step) => (state.coordinates(), Some((step, reading))),
             Err(q) => (q, None),
         };
-        if cache.begin(key) && reading == Reading::Point && moment.is_ok() {
-            cache.take_nodes(points);
+        let free = state.free_coordinates();
+        if cache.begin(key) {
+            match reading {
+                Reading::Point if moment.is_ok() => cache.take_nodes(points),
+                Reading::Point => {}
+                Reading::Patch(_) => cache.take_single([q, free]),
+            }
         }
         // No place goes farther by the residual compliance than where the forces act, or hardly.
         let same = points.points.iter().filter(|p| p.place.reading == reading);
@@ -138,7 +152,6 @@ impl<'a> Sight<'a> {
             most_residual: 2.0 * beside,
             slope: body.dent_slope(reading),
         };
-        let free = state.free_coordinates();
         Self {
             body,
             reading,
@@ -207,13 +220,13 @@ impl<'a> Sight<'a> {
     pub(crate) fn free_node(&mut self, node: usize) -> DVec3 {
         if self.cache.free_stamps[node] != self.cache.now {
             self.cache.free_stamps[node] = self.cache.now;
-            self.cache.free[node] = self.rest(node) + self.displacement(node, self.free);
+            self.cache.free[node] = self.rest(node) + self.displacement(node, self.free, 1);
         }
         self.cache.free[node]
     }
 
-    fn displacement(&self, node: usize, q: &[f64]) -> DVec3 {
-        self.body.displacement(self.reading, node, q.len(), q)
+    fn displacement(&self, node: usize, q: &[f64], moment: usize) -> DVec3 {
+        self.body.displacement(self.reading, node, q, &self.cache.single[moment][..q.len()])
     }
 
     /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
@@ -230,7 +243,7 @@ impl<'a> Sight<'a> {
     pub(crate) fn smooth(&mut self, node: usize) -> DVec3 {
         if !self.is_known(node) {
             self.cache.stamps[node] = self.cache.now;
-            self.cache.positions[node] = self.rest(node) + self.displacement(node, self.q);
+            self.cache.positions[node] = self.rest(node) + self.displacement(node, self.q, 0);
         }
         self.cache.positions[node]
     }
@@ -271,16 +284,16 @@ impl<'a> Sight<'a> {
 
     /// A node's place by the low modes.
     pub(crate) fn low(&self, node: usize) -> DVec3 {
-        self.low_place(node, self.q)
+        self.low_place(node, self.q, 0)
     }
 
     /// The same at the end of the step without contact force.
     pub(crate) fn free_low(&self, node: usize) -> DVec3 {
-        self.low_place(node, self.free)
+        self.low_place(node, self.free, 1)
     }
 
-    fn low_place(&self, node: usize, q: &[f64]) -> DVec3 {
-        self.rest(node) + self.body.displacement(self.reading, node, low_modes(q.len()), q)
+    fn low_place(&self, node: usize, q: &[f64], moment: usize) -> DVec3 {
+        self.rest(node) + self.displacement(node, &q[..low_modes(q.len())], moment)
     }
 
     /// Where the corners of a triangle are.

@@ -250,11 +250,12 @@ impl Solver {
 
     /// A miss [m] that is small enough after so many visits.
     fn accuracy(&self, visits: u32, size: f64) -> f64 {
+        let few = self.members.len() <= FEW;
         size * match visits {
-            0..=VISITS if self.members.len() <= FEW => 0.0,
-            0..=VISITS => CLOSE,
-            0..=MANY_VISITS => LOOSE,
-            _ => ROUGH,
+            visits if visits > MANY_VISITS => ROUGH,
+            visits if visits > VISITS => LOOSE,
+            _ if few => 0.0,
+            _ => CLOSE,
         }
     }
 

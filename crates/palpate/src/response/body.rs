@@ -1,6 +1,6 @@
 //! A body as contacts see it: its recording, how displacement is read on it, and the tree over its surface.
 
-use super::dot::dot;
+use super::dot::{dot3, dot3_single};
 use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
 use crate::surface::{Bands, Bounds, SurfacePoint, SurfaceTree, Visit, band, triangles_around};
@@ -138,14 +138,16 @@ impl Body {
         }
     }
 
-    /// What the first few modes, or all, do to a surface node [m, body], as a reading sees it.
+    /// What the first few modes, or all, do to a surface node [m, body], as a reading sees it: for patches, which are kept
+    /// and read in single precision, by `single`.
     ///
     /// # Real time
-    pub(crate) fn displacement(&self, reading: Reading, node: usize, first: usize, q: &[f64]) -> DVec3 {
+    pub(crate) fn displacement(&self, reading: Reading, node: usize, q: &[f64], single: &[f32]) -> DVec3 {
         let (m, shapes) = (self.recording.modes.len(), &self.recording.modes.mode_shapes);
+        let own = 3 * m * node..3 * m * (node + 1);
         match self.patch(reading) {
-            None => rows_times(&shapes[3 * m * node..3 * m * (node + 1)], first, q),
-            Some(patch) => rows_times(&patch.rows[3 * m * node..3 * m * (node + 1)], first, q),
+            None => dot3(&shapes[own], q),
+            Some(patch) => dot3_single(&patch.rows[own], single),
         }
     }
 
@@ -235,10 +237,4 @@ impl Body {
         }
         sum
     }
-}
-
-/// Three rows times the first few of q.
-fn rows_times<X: Copy + Into<f64>>(rows: &[X], first: usize, q: &[f64]) -> DVec3 {
-    let (m, q) = (rows.len() / 3, &q[..first]);
-    DVec3::new(dot(&rows[..m], q), dot(&rows[m..2 * m], q), dot(&rows[2 * m..], q))
 }

@@ -6,7 +6,8 @@ use glam::{DMat3, DVec3};
 /// Running sums per product.
 const LANES: usize = 8;
 
-/// The same where nine products run side by side.
+/// The same in single precision, and where nine products run side by side.
+const SINGLE: usize = 16;
 const NINE: usize = 2;
 
 /// Σ a·b over the shorter length; a in either precision.
@@ -24,6 +25,31 @@ pub(crate) fn dot<X: Copy + Into<f64>>(a: &[X], b: &[f64]) -> f64 {
         }
     }
     rest + ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+}
+
+/// Σ a·b over the shorter length in single precision, which is twice as fast.
+///
+/// # Real time
+fn dot_single(a: &[f32], b: &[f32]) -> f32 {
+    let n = a.len().min(b.len());
+    let ((heads, rest_a), (tails, rest_b)) = (a[..n].as_chunks::<SINGLE>(), b[..n].as_chunks::<SINGLE>());
+    let mut sums = [0.0; SINGLE];
+    for (x, y) in heads.iter().zip(tails) {
+        for lane in 0..SINGLE {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    let rest: f32 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f32>() + rest
+}
+
+/// Three rows, one after the other, times the first few of q, in single precision.
+///
+/// # Real time
+pub(super) fn dot3_single(rows: &[f32], q: &[f32]) -> DVec3 {
+    let m = rows.len() / 3;
+    let part = |axis: usize| f64::from(dot_single(&rows[axis * m..(axis + 1) * m], q));
+    DVec3::new(part(0), part(1), part(2))
 }
 
 /// Three rows, one after the other, times q.
@@ -75,6 +101,8 @@ mod tests {
             let plain: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
             // All terms are multiples of an eighth below 2⁵³: the sums are exact.
             assert_eq!(dot(&a, &b), plain);
+            let single = |of: &[f64]| of.iter().map(|&x| x as f32).collect::<Vec<_>>();
+            assert_eq!(f64::from(dot_single(&single(&a), &single(&b))), plain);
         }
     }
 
