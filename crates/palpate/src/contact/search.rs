@@ -13,8 +13,8 @@ const MOST_FOUND: usize = 192;
 const SPARE_EDGE: f64 = 0.15;
 const SPARE_REACH: f64 = 0.05;
 
-/// A vicinity of which this share is used up will be found anew soon.
-const EARLY: f64 = 0.9;
+/// A vicinity of whose spare this share is used up will be needed anew soon.
+const EARLY: f64 = 0.6;
 
 /// Places that are less than this [m] apart are one.
 const SAME: f64 = 1e-9;
@@ -131,8 +131,9 @@ impl Search {
     pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {
         let gone = if vicinity.reach > 0.0 { vicinity.gone(sight, p) } else { f64::INFINITY };
         // One that will be needed soon is found early, so that those of several fingers don't fall into one step.
-        let soon = gone + reach > EARLY * vicinity.reach && !self.renewed;
-        if gone + reach < vicinity.reach && !soon {
+        let spare = vicinity.reach - reach;
+        let soon = gone > EARLY * spare && !self.renewed;
+        if gone < spare && !soon {
             self.found.clear();
             let can = vicinity.triangles.iter().take_while(|(_, distance)| *distance < reach + gone);
             self.found.extend(can.map(|&(triangle, _)| sight.nearest_on(triangle, p)));

@@ -178,6 +178,8 @@ impl Solver {
                     if touching { self.accuracy(visits, size).max(LOOSE * size) } else { UNSOLVED * reach };
                 if miss <= allowed || dependent > 0 && miss <= first_miss {
                     status.solver_residual_m = status.solver_residual_m.max(miss);
+                    // Rough is better than nothing, but not solved.
+                    status.unsolved_objects += u32::from(touching && miss > LOOSE * size);
                     break true;
                 }
                 status.solver_residual_m =
@@ -252,7 +254,7 @@ impl Solver {
     fn accuracy(&self, visits: u32, size: f64) -> f64 {
         let few = self.members.len() <= FEW;
         size * match visits {
-            visits if visits > MANY_VISITS => ROUGH,
+            visits if visits > MANY_VISITS && !few => ROUGH,
             visits if visits > VISITS => LOOSE,
             _ if few => 0.0,
             _ => CLOSE,

@@ -67,11 +67,14 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
     };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(0.0))])?;
     let mut state = State::new(&model);
+    // A free cube that is stroked from both sides with little friction slips away in the end.
+    let steps = if sliding { steps.min(4000) } else { steps };
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps + 200 {
         let t = number as f64 * 1e-3;
         let press = 0.004 * (t / 0.1).min(1.0) - 0.0005;
-        let sway = 0.01 * (std::f64::consts::TAU * 2.0 * t).sin();
+        // As far as friction holds the cube for long.
+        let sway = 0.006 * (std::f64::consts::TAU * 2.0 * t).sin();
         // Shaken together, or each the other way.
         let hand = |side: f64| {
             let across = if sliding { side * sway } else { sway };
