@@ -35,8 +35,8 @@ const UNSOLVED: f64 = 1e-9;
 /// hits it gets loose, and two faces that hit each other, whose contacts repeat one another, are left rough.
 const FEW: usize = 24;
 const VISITS: u32 = 600;
-const MANY_VISITS: u32 = 6000;
-const MOST_VISITS: u32 = 12_000;
+const MANY_VISITS: u32 = 20_000;
+const MOST_VISITS: u32 = 40_000;
 const CLOSE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
 const ROUGH: f64 = 1e-4;
