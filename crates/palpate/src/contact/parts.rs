@@ -249,6 +249,13 @@ impl Parts<'_> {
         taken
     }
 
+    /// The largest gap [m] at the end of contacts that push all the same.
+    pub(super) fn pushing_apart(&self, members: &[u32]) -> f64 {
+        let contacts = members.iter().map(|&at| &self.contacts[at as usize]);
+        let pushing = contacts.filter(|contact| contact.law != Law::Held && contact.force != DVec3::ZERO);
+        pushing.map(|contact| contact.gap(contact.end)).fold(0.0, f64::max)
+    }
+
     /// What a contact's law is solved with, in linear terms.
     pub(super) fn linearise(&mut self, at: usize) {
         let contact = self.contacts[at];

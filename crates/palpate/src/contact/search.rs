@@ -136,7 +136,7 @@ impl Search {
         self.sort();
     }
 
-    /// As [`Self::near`], by the vicinity where that is enough.
+    /// As [`Self::near`], by the vicinity where that is enough; of many triangles only the nearest of each face.
     ///
     /// # Real time
     pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {

@@ -160,7 +160,7 @@ impl Solver {
                 self.linearise(parts);
             }
             iterations += 1;
-            let miss = larger(turned, self.sweep(parts, 0.1 * self.accuracy(visits, size)));
+            let miss = larger(turned, self.sweep(parts, 0.1 * self.accuracy(visits, size).min(LOOSE * size)));
             visits += self.members.len() as u32;
             if iterations == 1 {
                 first_miss = miss;
@@ -179,7 +179,8 @@ impl Solver {
                 if miss <= allowed || dependent > 0 && miss <= first_miss {
                     status.solver_residual_m = status.solver_residual_m.max(miss);
                     // Rough is better than nothing, but not solved.
-                    status.unsolved_objects += u32::from(touching && miss > LOOSE * size);
+                    let rough = self.accuracy(visits, size) > LOOSE * size;
+                    status.unsolved_objects += u32::from(touching && (rough || miss > LOOSE * size));
                     break true;
                 }
                 status.solver_residual_m =
@@ -214,6 +215,9 @@ impl Solver {
             parts.finish(object as usize);
         }
         parts.end(&self.members);
+        // What the last sweep has moved comes on top of the miss that it saw.
+        let apart = parts.pushing_apart(&self.members);
+        status.unsolved_objects += u32::from(solved && touching && apart > 1.9 * LOOSE * size);
     }
 
     /// Whether forces turn a body so far that nothing linear about it is of use.
