@@ -381,9 +381,12 @@ impl Moving for Sight<'_> {
     }
 
     /// Patches are looked at by few: what their dents do is not kept.
+    fn keeps(&self) -> bool {
+        self.reading == Reading::Point && !self.widened
+    }
+
     fn known(&self, node: usize) -> Option<DVec3> {
-        let known = self.reading == Reading::Point && !self.widened && self.is_known(node);
-        known.then(|| self.cache.positions[node])
+        self.is_known(node).then(|| self.cache.positions[node])
     }
 
     fn corners_of(&self, triangle: u32) -> [usize; 3] {
@@ -392,7 +395,7 @@ impl Moving for Sight<'_> {
 
     fn tight(&self, sphere: usize) -> Option<f64> {
         let (radius, stamp) = self.cache.tight[sphere];
-        (self.reading == Reading::Point && !self.widened && stamp == self.cache.now).then_some(radius)
+        (self.keeps() && stamp == self.cache.now).then_some(radius)
     }
 
     fn set_tight(&mut self, sphere: usize, radius: f64) {

@@ -154,6 +154,7 @@ impl Solver {
         let tight = ROUND_OFF * reach;
         let (mut least, mut first_miss) = (f64::INFINITY, f64::INFINITY);
         let (mut iterations, mut visits, mut sweeps) = (0, 0, 0);
+        let mut rough = false;
         let solved = loop {
             let turned = self.evaluate(parts);
             if turned > TURNED * size {
@@ -174,13 +175,12 @@ impl Solver {
             if miss <= tight || stalled || enough || spent || !miss.is_finite() {
                 status.iterations = status.iterations.max(iterations);
                 // Points that repeat others can't be met where their hands differ, and need not be.
-                let allowed =
-                    if touching { self.accuracy(visits, size).max(LOOSE * size) } else { UNSOLVED * reach };
+                let loose = self.accuracy(visits, size).max(LOOSE * size);
+                let allowed = if touching { loose } else { UNSOLVED * reach };
                 if miss <= allowed || dependent > 0 && miss <= first_miss {
                     status.solver_residual_m = status.solver_residual_m.max(miss);
                     // Rough is better than nothing, but not solved.
-                    let rough = self.accuracy(visits, size) > LOOSE * size;
-                    status.unsolved_objects += u32::from(touching && (rough || miss > LOOSE * size));
+                    rough = touching && (loose > LOOSE * size || miss > LOOSE * size);
                     break true;
                 }
                 status.solver_residual_m =
@@ -216,8 +216,8 @@ impl Solver {
         }
         parts.end(&self.members);
         // What the last sweep has moved comes on top of the miss that it saw.
-        let apart = parts.pushing_apart(&self.members);
-        status.unsolved_objects += u32::from(solved && touching && apart > 1.9 * LOOSE * size);
+        rough |= solved && touching && parts.pushing_apart(&self.members) > 1.9 * LOOSE * size;
+        status.unsolved_objects += u32::from(rough);
     }
 
     /// Whether forces turn a body so far that nothing linear about it is of use.

@@ -148,11 +148,13 @@ pub(crate) trait Moving {
     /// Where the low modes move a node; none where it is known by all of them.
     fn low(&self, node: usize) -> Option<DVec3>;
     fn moved(&mut self, node: usize) -> DVec3;
-    /// The same if it is known already.
+    /// Whether what walks find out of spheres is kept: the three below mean something.
+    fn keeps(&self) -> bool;
+    /// Where a node is, if it is known already.
     fn known(&self, node: usize) -> Option<DVec3>;
-    fn corners_of(&self, triangle: u32) -> [usize; 3];
     fn tight(&self, sphere: usize) -> Option<f64>;
     fn set_tight(&mut self, sphere: usize, radius: f64);
+    fn corners_of(&self, triangle: u32) -> [usize; 3];
 }
 
 /// A surface that is rigid.
@@ -171,6 +173,11 @@ impl Moving for Still<'_> {
         self.rest(node)
     }
 
+    /// Its spheres are as small as they are from the beginning.
+    fn keeps(&self) -> bool {
+        false
+    }
+
     fn known(&self, _: usize) -> Option<DVec3> {
         None
     }
@@ -179,7 +186,6 @@ impl Moving for Still<'_> {
         self.0.triangles[triangle as usize].map(|node| node as usize)
     }
 
-    /// As small as they are from the beginning.
     fn tight(&self, _: usize) -> Option<f64> {
         None
     }
@@ -317,7 +323,7 @@ impl SurfaceTree {
                 let high = visit.sum(&spread.modal, LOW..BANDS) + visit.dent(spread);
                 self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
             }
-            if tight.is_none() {
+            if tight.is_none() && surface.keeps() {
                 stack[depth] = at as u32 | DONE;
                 depth += 1;
             }
