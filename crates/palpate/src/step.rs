@@ -64,8 +64,10 @@ fn predict(model: &Model, state: &mut State) {
     for (at, own) in state.objects.iter_mut().enumerate() {
         let object = &model.objects[at];
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
-        responding.predict();
-        own.points.predict(&mut responding);
+        // A step predicts the next one, if gravity and step size stay.
+        if !responding.predict() {
+            own.points.predict(&mut responding);
+        }
         own.free = object.advance_rigid(&model.parameters, &own.rigid, (DVec3::ZERO, DVec3::ZERO), None);
         own.surface_motion = object.body.way(own.response.coordinates(), own.response.free_coordinates());
     }
@@ -229,14 +231,12 @@ fn advance(model: &Model, state: &mut State) {
     for (at, own) in objects.iter_mut().enumerate() {
         let object = &model.objects[at];
         unsolved += u32::from(own.end.miss * object.radius > UNSOLVED * own.reach(object));
+        let pushed = own.points.points.iter().map(|point| (point.displacement - point.free).length());
+        own.pushed = pushed.fold(0.0, f64::max);
+        own.rigid = own.end.end;
         let mut responding = Responding::new(model, at, &own.rigid, &mut own.response);
         own.ledger.dissipated += responding.advance(&mut own.points.points);
-        own.pushed = 0.0;
-        for point in &mut own.points.points {
-            point.placed.displacement = point.displacement;
-            own.pushed = own.pushed.max((point.displacement - point.free).length());
-        }
-        own.rigid = own.end.end;
+        own.points.points.iter_mut().for_each(|point| point.placed.displacement = point.displacement);
         own.weigh(object, model.parameters.gravity);
         own.ledger.defect =
             own.ledger.stored() - own.stored_at_start - (own.ledger.input - own.ledger.lost());

@@ -274,7 +274,6 @@ impl ContactPoints {
     pub(crate) fn predict(&mut self, responding: &mut Responding) {
         for point in &mut self.points {
             point.free = responding.free(point.slot, &point.placed);
-            point.fresh = false;
         }
     }
 
@@ -284,6 +283,7 @@ impl ContactPoints {
     pub(crate) fn predict_fresh(&mut self, responding: &mut Responding) {
         for point in self.points.iter_mut().filter(|point| point.fresh) {
             point.free = responding.free(point.slot, &point.placed);
+            point.fresh = false;
         }
     }
 }

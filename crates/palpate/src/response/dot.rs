@@ -15,15 +15,14 @@ const NINE: usize = 2;
 /// # Real time
 pub(crate) fn dot<X: Copy + Into<f64>>(a: &[X], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
-    let (a, b) = (&a[..n], &b[..n]);
+    let ((heads, rest_a), (tails, rest_b)) = (a[..n].as_chunks::<LANES>(), b[..n].as_chunks::<LANES>());
     let mut sums = [0.0; LANES];
-    let (heads, tails) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = heads.remainder().iter().zip(tails.remainder()).map(|(&x, y)| x.into() * y).sum();
-    for (x, y) in heads.zip(tails) {
+    for (x, y) in heads.iter().zip(tails) {
         for lane in 0..LANES {
             sums[lane] += x[lane].into() * y[lane];
         }
     }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(&x, y)| x.into() * y).sum();
     rest + ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
@@ -55,9 +54,34 @@ pub(super) fn dot3_single(rows: &[f32], q: &[f32]) -> DVec3 {
 /// Three rows, one after the other, times q.
 ///
 /// # Real time
-pub(crate) fn dot3<X: Copy + Into<f64>>(rows: &[X], q: &[f64]) -> DVec3 {
-    let m = rows.len() / 3;
-    DVec3::new(dot(&rows[..m], q), dot(&rows[m..2 * m], q), dot(&rows[2 * m..], q))
+pub(crate) fn dot3(rows: &[f64], q: &[f64]) -> DVec3 {
+    dots(rows, [q])[0]
+}
+
+/// Three rows, one after the other, times each of several q, in one pass.
+///
+/// # Real time
+pub(super) fn dots<const N: usize>(rows: &[f64], several: [&[f64]; N]) -> [DVec3; N] {
+    let m = several.iter().fold(rows.len() / 3, |m, q| m.min(q.len()));
+    let row = chunks(rows, rows.len() / 3);
+    let tails = several.map(|q| q.as_chunks::<NINE>().0);
+    let mut sums = [[[0.0; NINE]; 3]; N];
+    for k in 0..m / NINE {
+        let row = row.map(|row| row[k]);
+        for (sums, q) in sums.iter_mut().zip(tails) {
+            for (sums, x) in sums.iter_mut().zip(&row) {
+                (0..NINE).for_each(|lane| sums[lane] += x[lane] * q[k][lane]);
+            }
+        }
+    }
+    let (length, rest) = (rows.len() / 3, m / NINE * NINE);
+    core::array::from_fn(|of| {
+        let part = |axis: usize| {
+            let tail = (rest..m).map(|k| rows[axis * length + k] * several[of][k]);
+            sums[of][axis].into_iter().chain(tail).sum()
+        };
+        DVec3::new(part(0), part(1), part(2))
+    })
 }
 
 /// Three rows of m in chunks, without what is left of each.

@@ -171,12 +171,15 @@ impl<'a> Responding<'a> {
         }
     }
 
-    /// Prepare the step: what happens without contact force.
+    /// Prepare the step: what happens without contact force. Says whether the last step has done so, for its points too.
     ///
     /// # Real time
-    pub(crate) fn predict(&mut self) {
-        if let (Response::Modal(modes), ResponseState::Modal(state)) = (self.response, &mut *self.state) {
-            modes.predict(&self.body.recording, state, self.gravity);
+    pub(crate) fn predict(&mut self) -> bool {
+        match (self.response, &mut *self.state) {
+            (Response::Modal(modes), ResponseState::Modal(state)) => {
+                modes.predict(&self.body.recording, state, self.gravity)
+            }
+            _ => false,
         }
     }
 
@@ -191,12 +194,14 @@ impl<'a> Responding<'a> {
         }
     }
 
-    /// Hold forces over the step; gives the energy [J] that is known to be lost in it.
+    /// Hold forces over the step, with gravity at its end; gives the energy [J] that is known to be lost in it.
     ///
     /// # Real time
     pub(crate) fn advance(&mut self, acting: &mut [ContactPoint]) -> f64 {
         match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => modes.advance(self.body, state, acting),
+            (Response::Modal(modes), ResponseState::Modal(state)) => {
+                modes.advance(self.body, state, acting, self.gravity)
+            }
             (Response::Fir(fir), ResponseState::Fir(state)) => {
                 state.advance(fir, acting);
                 0.0

@@ -3,7 +3,7 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
-use super::dot::{dot3, dot9};
+use super::dot::{dot3, dot9, dots};
 use super::loads::NodalForces;
 use super::nodes::NodeCompliance;
 use super::oscillator::{HeldOscillator, Oscillation};
@@ -21,6 +21,7 @@ const FLUSH_BELOW: f64 = 1e-150;
 /// All modes of one object at one step size.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
+    step_s: f64,
     oscillators: Vec<HeldOscillator>,
     /// R[0] between nodes, where it is known.
     pub(super) nodes: Option<Arc<NodeCompliance>>,
@@ -33,6 +34,8 @@ pub(crate) struct ModalState {
     /// q now and at the end of the step without new force.
     pub(super) q: Vec<f64>,
     pub(super) free: Vec<f64>,
+    /// With which gravity [m/s², body] and step [s] the latter was found.
+    predicted: Option<(DVec3, f64)>,
     /// Modal forces of the step [N/√kg].
     forces: Vec<f64>,
     /// Three rows J·Φ per contact point, by its slot.
@@ -53,6 +56,7 @@ impl ModalState {
             modes: vec![Oscillation::default(); modes],
             q: vec![0.0; modes],
             free: vec![0.0; modes],
+            predicted: None,
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
@@ -84,7 +88,7 @@ impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect();
-        Self { oscillators, nodes: None }
+        Self { step_s, oscillators, nodes: None }
     }
 
     /// Number of modes.
@@ -161,11 +165,16 @@ impl SampledModes {
         }
     }
 
-    /// Modal coordinates at the end of the step if no contact force acts.
+    /// Modal coordinates at the end of the step if no contact force acts. Says whether they were known already.
     ///
     /// # Real time
-    pub(crate) fn predict(&self, recording: &Recording, state: &mut ModalState, gravity: DVec3) {
+    pub(crate) fn predict(&self, recording: &Recording, state: &mut ModalState, gravity: DVec3) -> bool {
         let m = self.len();
+        let predicted = Some((gravity, self.step_s));
+        if state.predicted == predicted {
+            return true;
+        }
+        state.predicted = predicted;
         state.forces.fill(0.0);
         if let Some(response) = &recording.gravity {
             for (axis, a) in gravity.to_array().into_iter().enumerate() {
@@ -178,6 +187,7 @@ impl SampledModes {
         for (((oscillator, &mode), &p), free) in pairs.zip(&mut state.free) {
             *free = oscillator.advance(mode, p).q;
         }
+        false
     }
 
     /// Displacement of a slot's place at the end of the step if no contact force acts, the residual compliance's
@@ -188,10 +198,17 @@ impl SampledModes {
         dot3(state.rows(slot), &state.free)
     }
 
-    /// Hold forces over the step that was predicted; gives the energy [J] that is lost in it.
+    /// Hold forces over the step that was predicted, and predict the next one with its gravity, so that a pass over the
+    /// points serves both; gives the energy [J] that is lost.
     ///
     /// # Real time
-    pub(crate) fn advance(&self, body: &Body, state: &mut ModalState, acting: &mut [ContactPoint]) -> f64 {
+    pub(crate) fn advance(
+        &self,
+        body: &Body,
+        state: &mut ModalState,
+        acting: &mut [ContactPoint],
+        next_gravity: DVec3,
+    ) -> f64 {
         let m = self.len();
         // p = Φᵀ·Jᵀ·g.
         for point in acting.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
@@ -212,6 +229,8 @@ impl SampledModes {
             *mode = if quiet { Oscillation::default() } else { next };
             *q = mode.q;
         }
+        state.predicted = None;
+        self.predict(&body.recording, state, next_gravity);
 
         // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
         let (mut work, mut energy) = (0.0, 0.0);
@@ -219,7 +238,9 @@ impl SampledModes {
         state.nodal.clear();
         for point in acting.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
-            let residual = point.displacement - dot3(rows, &state.q);
+            let [modal, free] = dots(rows, [&state.q, &state.free]);
+            point.free = free + point.placed.sag;
+            let residual = point.displacement - modal;
             work += point.force_in_body.dot(residual - point.placed.residual);
             energy += 0.5 * point.force_in_body.dot(residual - point.placed.sag);
             point.placed.residual = residual;
