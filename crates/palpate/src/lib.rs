@@ -26,6 +26,7 @@
 extern crate alloc;
 
 mod contact;
+mod deformation;
 mod energy;
 mod error;
 mod motion;
@@ -39,6 +40,7 @@ mod step;
 mod surface;
 
 pub use contact::{Against, Grasp};
+pub use deformation::Deformation;
 pub use energy::EnergyLedger;
 pub use error::Error;
 pub use motion::MotionRule;

@@ -4,6 +4,7 @@ use crate::contact::{
     Against, Contact, ContactPoints, DeviceState, Grasp, Lift, NodeCache, Search, Solver, Vicinity,
     WantedList,
 };
+use crate::deformation::Deformation;
 use crate::energy::EnergyLedger;
 use crate::motion::{RigidState, RigidStep};
 use crate::response::{Oscillation, ResponseState};
@@ -258,11 +259,13 @@ impl State {
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, object: usize, out: &mut [DVec3]) {
-        let SceneObject { body, response, .. } = &model.objects[object];
-        assert_eq!(out.len(), body.recording.surface.positions.len(), "one entry per surface node");
-        let state = &self.objects[object];
-        let gravity = model.objects[object].gravity_in_body(model.parameters.gravity, &state.rigid.pose);
-        state.response.surface_displacement(response, body, gravity, out);
+        self.deformation(object).surface_displacement(model, out);
+    }
+
+    /// What deforms an object at the end of the last step: a copy that can go elsewhere.
+    pub fn deformation(&self, object: usize) -> Deformation {
+        let own = &self.objects[object];
+        Deformation { object, pose: own.rigid.pose, deformed: own.response.deformed() }
     }
 }
 

@@ -26,6 +26,15 @@ impl NodalForces {
         }
     }
 
+    /// The nodes where a force acts, with it [N, body], and the most that there can be.
+    pub(super) fn loaded(&self) -> &[(u32, DVec3)] {
+        &self.loaded
+    }
+
+    pub(super) fn capacity(&self) -> usize {
+        self.loaded.capacity()
+    }
+
     pub(super) fn clear(&mut self) {
         self.loaded.drain(..).for_each(|(node, _)| self.at[node as usize] = 0);
         self.known.drain(..).for_each(|node| self.dents[node as usize] = None);

@@ -4,6 +4,7 @@
 mod body;
 mod dot;
 mod fir;
+mod history;
 mod loads;
 mod modal;
 mod nodes;
@@ -21,10 +22,12 @@ use crate::motion::RigidState;
 use crate::recording::{ImpulseResponse, Recording};
 use crate::scene::Model;
 use crate::surface::SurfacePoint;
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use fir::{Fir, FirState};
 use glam::{DMat3, DVec3};
-use modal::{ModalState, SampledModes};
+use history::ForceHistory;
+use modal::{ModalDeformation, ModalState, SampledModes};
 use nodes::NodeCompliance;
 
 /// Which form of its response an object uses.
@@ -202,8 +205,8 @@ impl<'a> Responding<'a> {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
                 modes.advance(self.body, state, acting, self.gravity)
             }
-            (Response::Fir(fir), ResponseState::Fir(state)) => {
-                state.advance(fir, acting);
+            (Response::Fir(_), ResponseState::Fir(state)) => {
+                state.advance(acting);
                 0.0
             }
             _ => 0.0,
@@ -284,6 +287,35 @@ impl ResponseState {
         }
     }
 
+    /// What deforms the object now.
+    pub(crate) fn deformed(&self) -> Deformed {
+        match self {
+            Self::Modal(state) => Deformed::Modal(ModalDeformation::new(state)),
+            Self::Fir(state) => Deformed::Fir(Box::new(state.history.clone())),
+        }
+    }
+}
+
+/// What deforms an object: all that its surface takes; buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) enum Deformed {
+    Modal(ModalDeformation),
+    Fir(Box<ForceHistory>),
+}
+
+impl Deformed {
+    /// Take over what deforms the same object now.
+    ///
+    /// # Real time
+    /// Costs modes and contacts; for a table the forces of the last T steps.
+    pub(crate) fn copy_from(&mut self, state: &ResponseState) {
+        match (self, state) {
+            (Self::Modal(own), ResponseState::Modal(state)) => own.copy_from(state),
+            (Self::Fir(own), ResponseState::Fir(state)) => own.copy_from(&state.history),
+            _ => {}
+        }
+    }
+
     /// Displacement of every surface node [m, body].
     pub(crate) fn surface_displacement(
         &self,
@@ -293,10 +325,10 @@ impl ResponseState {
         out: &mut [DVec3],
     ) {
         match (response, self) {
-            (Response::Modal(modes), Self::Modal(state)) => {
-                modes.surface_displacement(body, state, gravity, out);
+            (Response::Modal(modes), Self::Modal(deformed)) => {
+                modes.surface_displacement(body, deformed, gravity, out);
             }
-            (Response::Fir(fir), Self::Fir(state)) => state.surface_displacement(fir, gravity, out),
+            (Response::Fir(fir), Self::Fir(history)) => history.surface_displacement(fir, gravity, out),
             _ => {}
         }
     }

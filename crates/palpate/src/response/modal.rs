@@ -3,7 +3,7 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
-use super::dot::{dot3, dot9, dots};
+use super::dot::{dot, dot3, dot9, dots};
 use super::loads::NodalForces;
 use super::nodes::NodeCompliance;
 use super::oscillator::{HeldOscillator, Oscillation};
@@ -277,24 +277,54 @@ impl SampledModes {
     pub(crate) fn surface_displacement(
         &self,
         body: &Body,
-        state: &ModalState,
+        deformed: &ModalDeformation,
         gravity: DVec3,
         out: &mut [DVec3],
     ) {
         let recording = &body.recording;
         for (node, u) in out.iter_mut().enumerate() {
-            let part = |axis: usize| -> f64 {
-                recording.modes.row(node, axis).iter().zip(&state.modes).map(|(phi, mode)| phi * mode.q).sum()
-            };
-            *u = DVec3::new(part(0), part(1), part(2));
+            let row = |axis: usize| recording.modes.row(node, axis);
+            *u = DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
             if let Some(response) = &recording.gravity {
                 *u += response.residual_displacement(node, gravity);
             }
-            *u += state.nodal.dent(&recording.residual, node);
-            let by_patches = state.acting.iter().filter(|acting| acting.place.reading != Reading::Point);
-            for Acting { place, force, .. } in by_patches {
+            let dent =
+                |&(other, force): &(u32, DVec3)| recording.residual.block(node, other as usize) * force;
+            *u += deformed.loaded.iter().map(dent).sum::<DVec3>();
+            for Acting { place, force, .. } in &deformed.patches {
                 *u += body.residual_of_node(node, place) * *force;
             }
         }
+    }
+}
+
+/// What deforms an object in modal form; buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) struct ModalDeformation {
+    q: Vec<f64>,
+    /// Forces [N, body] on nodes, and on patches.
+    loaded: Vec<(u32, DVec3)>,
+    patches: Vec<Acting>,
+}
+
+impl ModalDeformation {
+    pub(super) fn new(state: &ModalState) -> Self {
+        let mut new = Self {
+            q: state.q.clone(),
+            loaded: Vec::with_capacity(state.nodal.capacity()),
+            patches: Vec::with_capacity(state.acting.capacity()),
+        };
+        new.copy_from(state);
+        new
+    }
+
+    /// # Real time
+    pub(super) fn copy_from(&mut self, state: &ModalState) {
+        self.q.copy_from_slice(&state.q);
+        self.loaded.clear();
+        self.loaded.extend_from_slice(state.nodal.loaded());
+        self.patches.clear();
+        let patches = state.acting.iter().filter(|acting| acting.place.reading != Reading::Point);
+        self.patches.extend(patches.copied());
     }
 }

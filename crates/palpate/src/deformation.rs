@@ -1,0 +1,64 @@
+//! What the picture of an object takes, so that it can be made beside the force (paper, section 3.2).
+
+use crate::response::Deformed;
+use crate::scene::{Model, SceneObject};
+use crate::spatial::Pose;
+use crate::state::State;
+use glam::DVec3;
+
+/// Where an object is and what deforms it, at the end of a step: a few hundred numbers, which another thread can make the
+/// whole surface of, at its own pace. A table's is longer: the forces of the last T steps.
+///
+/// ```no_run
+/// # fn main() -> Result<(), palpate::Error> {
+/// # let (model, mut state): (palpate::Model, palpate::State) = unimplemented!();
+/// # let nodes = 0;
+/// let mut deformation = state.deformation(0); // once: allocates
+/// // … steps …
+/// deformation.copy_from(&state); // beside the steps: does not
+/// let mut displacement = vec![glam::DVec3::ZERO; nodes];
+/// deformation.surface_displacement(&model, &mut displacement);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone)]
+pub struct Deformation {
+    pub(crate) object: usize,
+    pub(crate) pose: Pose,
+    pub(crate) deformed: Deformed,
+}
+
+impl Deformation {
+    /// The object's place in the model.
+    pub fn object(&self) -> usize {
+        self.object
+    }
+
+    /// Where it is.
+    pub fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// Take over the same object as it is now.
+    ///
+    /// # Real time
+    /// No allocation. Costs modes and contacts; with a table the forces of the last T steps.
+    pub fn copy_from(&mut self, state: &State) {
+        let own = &state.objects[self.object];
+        self.pose = own.rigid.pose;
+        self.deformed.copy_from(&own.response);
+    }
+
+    /// Elastic displacement [m, body] of every surface node. Costs nodes × modes, with a table nodes × forces of the last T
+    /// steps.
+    ///
+    /// # Panics
+    /// When `out` does not have one entry per surface node.
+    pub fn surface_displacement(&self, model: &Model, out: &mut [DVec3]) {
+        let object: &SceneObject = &model.objects[self.object];
+        let SceneObject { body, response, .. } = object;
+        assert_eq!(out.len(), body.recording.surface.positions.len(), "one entry per surface node");
+        let gravity = object.gravity_in_body(model.parameters.gravity, &self.pose);
+        self.deformed.surface_displacement(response, body, gravity, out);
+    }
+}
