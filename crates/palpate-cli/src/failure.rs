@@ -39,3 +39,9 @@ impl From<palpate_fem::mesh::MeshError> for Failure {
         Self(error.to_string())
     }
 }
+
+impl From<palpate_haptics::Error> for Failure {
+    fn from(error: palpate_haptics::Error) -> Self {
+        Self(error.to_string())
+    }
+}

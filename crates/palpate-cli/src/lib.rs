@@ -6,7 +6,6 @@
 mod csv;
 mod dense;
 mod failure;
-mod path;
 mod plot;
 mod progress;
 mod report;
@@ -41,6 +40,7 @@ enum Verb {
     Record(Box<verbs::record::Arguments>),
     Inspect(verbs::inspect::Arguments),
     Run(verbs::run::Arguments),
+    Replay(verbs::replay::Arguments),
     Reproduce(verbs::reproduce::Arguments),
     Verify(verbs::verify::Arguments),
     Bench(verbs::bench::Arguments),
@@ -63,6 +63,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Record(arguments) => verbs::record::record(&arguments),
         Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
         Verb::Run(arguments) => verbs::run::run(&arguments),
+        Verb::Replay(arguments) => verbs::replay::replay(&arguments),
         Verb::Reproduce(arguments) => verbs::reproduce::reproduce(&arguments),
         Verb::Verify(arguments) => verbs::verify::verify(&arguments),
         Verb::Bench(arguments) => verbs::bench::bench(&arguments),

@@ -2,9 +2,10 @@
 
 use crate::Failure;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Files that have not taken their names yet.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -15,10 +16,23 @@ fn note(temporary: &Path) {
     }
 }
 
+/// What an interrupt sets where work can end in good order.
+static STOP: AtomicBool = AtomicBool::new(false);
+static STOPPABLE: AtomicBool = AtomicBool::new(false);
+
+/// Let the first interrupt (Ctrl-C) set a flag from now on; a second one ends the process.
+pub fn stop_on_interrupt() -> &'static AtomicBool {
+    STOPPABLE.store(true, Ordering::Relaxed);
+    &STOP
+}
+
 /// Let an interrupt (Ctrl-C) remove the files that are not finished, and end the process with status 130.
 pub fn remove_unfinished_on_interrupt() {
     // Without a handler an interrupt leaves a hidden file behind, nothing worse.
     let _ = ctrlc::set_handler(|| {
+        if STOPPABLE.load(Ordering::Relaxed) && !STOP.swap(true, Ordering::Relaxed) {
+            return;
+        }
         if let Ok(unfinished) = UNFINISHED.lock() {
             unfinished.iter().for_each(|path| drop(std::fs::remove_file(path)));
         }
@@ -58,6 +72,22 @@ impl WholeFile {
             writer.into_inner().map_err(|e| failed(e.into_error()))?.sync_all().map_err(failed)?;
         }
         std::fs::rename(&self.temporary, &self.path).map_err(failed)
+    }
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.writer.as_mut().map_or(Ok(0), |writer| writer.write(bytes))
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.writer.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.writer.as_mut().map_or(Ok(0), |writer| writer.seek(to))
     }
 }
 

@@ -44,7 +44,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate", &[]),
     ("palpate-fem", &["palpate"]),
     ("palpate-store", &["palpate"]),
-    ("palpate-cli", &["palpate", "palpate-fem", "palpate-store"]),
+    ("palpate-haptics", &["palpate"]),
+    ("palpate-cli", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics"]),
     ("xtask", &[]),
 ];
 
@@ -128,7 +129,7 @@ fn the_runtime_has_no_standard_library_thread_clock_or_unsafe_code() {
 #[test]
 fn re_exports_stand_in_lib_rs_and_in_the_doors_of_rooms_only() {
     let mut files = Vec::new();
-    for name in ["palpate", "palpate-fem", "palpate-store", "palpate-cli"] {
+    for name in ["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-cli"] {
         sources(&root().join("crates").join(name).join("src"), &mut files);
     }
     for path in files {

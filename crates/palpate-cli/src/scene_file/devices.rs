@@ -1,12 +1,13 @@
 //! `[[device]]`: hands that hold a point, and tips that touch.
 
 use super::SceneDevice;
-use super::entries::{AttachEntry, CouplingEntry, DeviceEntry};
+use super::entries::{AttachEntry, CouplingEntry, DeviceEntry, SimulatedEntry};
 use super::place::{Quantity, Source};
 use crate::Failure;
-use crate::path::{Columns, MotionPath};
 use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
+use palpate_haptics::Columns;
+use palpate_haptics::device::{Hand, Traits};
 
 /// How far from the surface a point to hold may be, as a share of the object's diagonal.
 const OFF_SURFACE: f64 = 0.05;
@@ -60,15 +61,32 @@ pub(super) fn read_device(
         }
         None => DeviceMode::Touch,
     };
-    let file = &device.path.file;
-    let path = match MotionPath::read(&source.relative(file.get_ref()), Columns::Position) {
-        Ok(path) => path,
-        Err(failure) => return source.fail(file.span(), failure),
-    };
-    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path };
+    let path = source.motion_path(&device.path.file, Columns::Position)?;
+    let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
+    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated };
     remarks.extend(far_start(&device, objects));
     remarks.extend(small_patches(&device, objects, object_names));
     Ok(device)
+}
+
+/// A simulated device and the hand that holds it, by their names.
+fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), Failure> {
+    let (device, grip) = (entry.device.get_ref(), entry.grip.as_ref().map_or("firm", |grip| grip.get_ref()));
+    let Some(traits) = Traits::named(device) else {
+        let known = Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
+        return source.fail(entry.device.span(), format!("device is {device:?}, expected one of {known}"));
+    };
+    let hand = match grip {
+        "firm" => Hand::FIRM,
+        "light" => Hand::LIGHT,
+        "fingertip" => Hand::FINGERTIP,
+        other => {
+            let place = entry.grip.as_ref().map_or(0..0, toml::Spanned::span);
+            return source
+                .fail(place, format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\""));
+        }
+    };
+    Ok((traits, hand))
 }
 
 fn read_coupling(source: &Source, entry: &CouplingEntry) -> Result<Coupling, Failure> {

@@ -104,6 +104,14 @@ pub(super) struct DeviceEntry {
     pub patch_radius: Option<Spanned<f64>>,
     pub friction: Option<Spanned<f64>>,
     pub coupling: Option<CouplingEntry>,
+    pub simulated: Option<SimulatedEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulatedEntry {
+    pub device: Spanned<String>,
+    pub grip: Option<Spanned<String>>,
 }
 
 #[derive(Deserialize)]

@@ -7,21 +7,24 @@ mod obstacles;
 mod place;
 
 use crate::Failure;
-use crate::path::MotionPath;
 use entries::SceneFile;
 use glam::DVec3;
 use palpate::{
     DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, MotionRule, Pose, RigidCompliance,
 };
+use palpate_haptics::MotionPath;
+use palpate_haptics::device::{Hand, Traits};
+pub use place::Carried;
 use place::Source;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A scene that is ready to run.
 pub struct Scene {
     /// Objects and rules.
-    pub model: Model,
+    pub model: Arc<Model>,
     /// Names of the objects, in the model's order.
     pub object_names: Vec<String>,
     /// What each device does, in the model's order.
@@ -42,11 +45,14 @@ pub struct SceneDevice {
     pub mode: DeviceMode,
     /// What it is.
     pub parameters: DeviceParameters,
-    /// Where it is over time.
+    /// Where it is over time; with a simulated hand, where that wants to be.
     pub path: MotionPath,
+    /// The device and the hand that follow the path as far as forces let them.
+    pub simulated: Option<(Traits, Hand)>,
 }
 
 /// A plane or an obstacle.
+#[derive(Clone)]
 pub struct SceneObstacle {
     /// Its name.
     pub name: String,
@@ -83,14 +89,20 @@ impl Scene {
 
 /// Read a scene file, its recordings, meshes and paths.
 pub fn read(path: &Path) -> Result<Scene, Failure> {
-    let bytes = std::fs::read(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+    read_carried(path, &Carried::new())
+}
+
+/// The same where files are carried along, and lie elsewhere than the scene says.
+pub fn read_carried(path: &Path, carried: &Carried) -> Result<Scene, Failure> {
+    let place = carried.get(path).map_or(path, PathBuf::as_path);
+    let bytes = std::fs::read(place).map_err(|e| Failure::file("read the scene", path, &e))?;
     let Ok(text) = String::from_utf8(bytes) else {
         return Err(Failure(format!(
             "{}: it is not a text file; a scene is TOML (docs/scene.md)",
             path.display()
         )));
     };
-    let source = Source { path, text: &text };
+    let source = Source { path, text: &text, carried };
     let file: SceneFile = toml::from_str(&text).map_err(|e| {
         // Types in the user's words.
         let what = e
@@ -134,7 +146,7 @@ pub fn read(path: &Path) -> Result<Scene, Failure> {
     remarks.extend(objects::doubtful_recordings(&objects, &object_names));
     let nothing_meets: Vec<String> = objects::tables_that_meet_nothing(&objects, &object_names).collect();
     let inputs = inputs(&source, &file);
-    let mut scene = Scene { model, object_names, devices, obstacles, remarks, inputs };
+    let mut scene = Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, inputs };
     if scene.has_touch() {
         scene.remarks.extend(nothing_meets);
     }
@@ -229,6 +241,6 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
     let files = recordings.chain(paths).chain(meshes).chain(moves);
     let mut inputs = vec![source.path.to_path_buf()];
-    inputs.extend(files.map(|file| source.relative(file.get_ref())));
+    inputs.extend(files.map(|file| source.beside(file.get_ref())));
     inputs
 }

@@ -3,10 +3,10 @@
 use super::SceneObstacle;
 use super::entries::{MeshEntry, Numbers, ObstacleEntry, PlaneEntry};
 use super::place::{Quantity, Source};
-use crate::path::{Columns, MotionPath, unit};
 use crate::{Failure, source as mesh_source};
 use glam::{DQuat, DVec3};
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
+use palpate_haptics::{Columns, orientation};
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -48,15 +48,13 @@ pub(super) fn read_obstacle(
     if let Some(position) = &obstacle.position {
         start.position = DVec3::from_array(position.get_ref().0);
     }
-    if let Some(orientation) = &obstacle.orientation {
-        let [w, x, y, z] = orientation.get_ref().0;
-        start.orientation = unit(w, x, y, z).or_else(|what| source.fail(orientation.span(), what))?;
+    if let Some(given) = &obstacle.orientation {
+        let [w, x, y, z] = given.get_ref().0;
+        start.orientation = orientation(w, x, y, z).or_else(|what| source.fail(given.span(), what))?;
     }
     let mut path = None;
     if let Some(entry) = &obstacle.path {
-        let file = &entry.file;
-        let read = MotionPath::read(&source.relative(file.get_ref()), Columns::Pose);
-        let read = read.or_else(|failure| source.fail(file.span(), failure))?;
+        let read = source.motion_path(&entry.file, Columns::Pose)?;
         if let (Some(orientation), true) = (&obstacle.orientation, read.turns()) {
             return source
                 .fail(orientation.span(), "the orientation is in the path: leave one of the two out");

@@ -2,15 +2,21 @@
 
 use super::LARGEST;
 use crate::Failure;
+use palpate_haptics::{Columns, MotionPath};
+use std::collections::HashMap;
 use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
+/// Where files of a scene lie that are not where the scene says: a log carries them along.
+pub type Carried = HashMap<PathBuf, PathBuf>;
+
 /// The scene's text with its place, for errors.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    pub carried: &'a Carried,
 }
 
 /// A number of the scene file, for errors.
@@ -43,9 +49,26 @@ impl Source<'_> {
         Err(Failure(format!("{}: line {line}: {what}", self.path.display())))
     }
 
-    /// A file beside the scene.
-    pub fn relative(&self, file: &Path) -> PathBuf {
+    /// A file beside the scene, by the name that the scene gives it.
+    pub fn beside(&self, file: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+
+    /// Where such a file lies.
+    pub fn relative(&self, file: &Path) -> PathBuf {
+        let named = self.beside(file);
+        self.carried.get(&named).cloned().unwrap_or(named)
+    }
+
+    /// A path beside the scene.
+    pub fn motion_path(&self, file: &Spanned<PathBuf>, columns: Columns) -> Result<MotionPath, Failure> {
+        let path = self.relative(file.get_ref());
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) => return self.fail(file.span(), Failure::file("read the path", &path, &e)),
+        };
+        let parsed = MotionPath::parse(&text, columns);
+        parsed.or_else(|what| self.fail(file.span(), format!("path {}: {what}", path.display())))
     }
 
     /// A number above 0.

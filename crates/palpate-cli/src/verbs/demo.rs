@@ -73,11 +73,14 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let options = run::Arguments {
         scene: scene_path.clone(),
         duration: Some(DURATION_S),
-        csv: Some(output.join("shake.csv")),
-        contacts: None,
-        vtu: Some(output.join("vtu")),
-        fps: 50.0,
-        json: false,
+        outputs: run::OutputArguments {
+            csv: Some(output.join("shake.csv")),
+            contacts: None,
+            vtu: Some(output.join("vtu")),
+            fps: 50.0,
+            json: false,
+        },
+        realtime: run::RealtimeArguments::default(),
     };
     let summary = simulate(&scene, &options)?;
     print(&format!(

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod demo;
 pub mod inspect;
 pub mod record;
+pub mod replay;
 pub mod reproduce;
 pub mod run;
 pub mod verify;

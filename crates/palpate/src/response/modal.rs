@@ -299,12 +299,23 @@ impl SampledModes {
 }
 
 /// What deforms an object in modal form; buffers are made once.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct ModalDeformation {
     q: Vec<f64>,
     /// Forces [N, body] on nodes, and on patches.
     loaded: Vec<(u32, DVec3)>,
     patches: Vec<Acting>,
+}
+
+impl Clone for ModalDeformation {
+    /// With as much room: copies are made of it without allocation.
+    fn clone(&self) -> Self {
+        let mut loaded = Vec::with_capacity(self.loaded.capacity());
+        loaded.extend_from_slice(&self.loaded);
+        let mut patches = Vec::with_capacity(self.patches.capacity());
+        patches.extend_from_slice(&self.patches);
+        Self { q: self.q.clone(), loaded, patches }
+    }
 }
 
 impl ModalDeformation {

@@ -1,22 +1,22 @@
-//! `palpate run`: a scene, headless, as fast as it goes.
+//! `palpate run`: a scene, headless, as fast as it goes or in real time.
 
+mod outputs;
+mod realtime;
 mod summary;
 
 use crate::Failure;
-use crate::csv::{ContactsCsv, StepsCsv};
 use crate::scene_file::{self, Scene, SceneDevice};
 use crate::verbs::{print, print_json};
-use crate::vtu::VtuSeries;
-use crate::whole_file::is_same_file;
 use clap::Args;
 use glam::DVec3;
 use indicatif::ProgressBar;
+pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
+pub use realtime::RealtimeArguments;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
-use summary::Summary;
-pub use summary::percentile_us;
+pub use summary::{Summary, percentile_us};
 
 /// Run a scene and write forces, contacts, motion and energies
 ///
@@ -50,28 +50,16 @@ pub struct Arguments {
     /// How long [s]; by default to the end of the longest path
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// Write every step: device positions, forces and proxies, object poses and velocities, energies
-    #[arg(long, value_name = "OUT.csv")]
-    pub csv: Option<PathBuf>,
-    /// Write every contact of every step: what touches what, where, with which force, gap and slip
-    #[arg(long, value_name = "OUT.csv")]
-    pub contacts: Option<PathBuf>,
-    /// Write the deformed surfaces for ParaView (VTU files and scene.pvd)
-    #[arg(long, value_name = "DIR")]
-    pub vtu: Option<PathBuf>,
-    /// Frames of --vtu per second of simulated time
-    #[arg(long, default_value_t = 50.0, value_name = "FPS", allow_negative_numbers = true)]
-    pub fps: f64,
-    /// One JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
+    /// What it should leave
+    #[command(flatten)]
+    pub outputs: OutputArguments,
+    /// In real time
+    #[command(flatten)]
+    pub realtime: RealtimeArguments,
 }
 
 /// Longest run [s] without a path to tell: long enough to see a fall.
 const DEFAULT_DURATION_S: f64 = 1.0;
-
-/// How often the deformation is looked at: seldom enough to cost nothing beside the steps.
-const LOOKS: usize = 100;
 
 /// Runs of more steps than this (a second of work) show a bar on a terminal.
 const PROGRESS_FROM: usize = 200_000;
@@ -83,36 +71,27 @@ const MOST_STEPS: f64 = 1e8;
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = scene_file::read(&arguments.scene)?;
     scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
+    if arguments.realtime.realtime {
+        return realtime::run(&scene, arguments);
+    }
+    arguments.realtime.refuse()?;
     let summary = simulate(&scene, arguments)?;
-    if arguments.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
+    if arguments.outputs.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
 }
 
 /// Run a scene to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
-    let step_s = scene.model.parameters().step_s;
-    let steps = count_steps(scene, arguments)?;
-    if !(arguments.fps.is_finite() && arguments.fps > 0.0) {
-        return Err(Failure(format!("--fps is {}, expected a positive number", arguments.fps)));
-    }
-    if let (Some(csv), Some(contacts)) = (&arguments.csv, &arguments.contacts)
-        && is_same_file(csv, contacts)
-    {
+    if let Some(device) = scene.devices.iter().find(|device| device.simulated.is_some()) {
         return Err(Failure(format!(
-            "cannot write {}: --csv and --contacts name the same file",
-            contacts.display()
+            "the device {:?} is held by a simulated hand, which lives in real time: add --realtime",
+            device.name
         )));
     }
+    let step_s = scene.model.parameters().step_s;
+    let steps = count_steps(scene, arguments)?;
     let mut state = State::new(&scene.model);
-    let mut csv = arguments.csv.as_deref().map(|path| StepsCsv::new(path, scene)).transpose()?;
-    let mut contacts = arguments.contacts.as_deref().map(|path| ContactsCsv::new(path, scene)).transpose()?;
-    let mut series =
-        arguments.vtu.as_deref().map(|dir| VtuSeries::new(dir, scene.object_names.clone())).transpose()?;
+    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, steps)?;
     let mut input = input_at(scene, 0.0);
-    let mut summary = Summary::new(scene, steps, state.output());
-    let look_every = (steps / LOOKS).max(1);
-    if let Some(series) = &mut series {
-        series.write_frame(&scene.model, &state)?;
-    }
     let bar = if std::io::stderr().is_terminal() && steps > PROGRESS_FROM {
         ProgressBar::new(steps as u64)
     } else {
@@ -128,33 +107,10 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         step(&scene.model, &mut state, &input);
         let took = before.elapsed();
         check_status(scene, &input, &state)?;
-        let output = state.output();
-        summary.take(output, took);
-        if let Some(csv) = &mut csv {
-            csv.write(&input, output)?;
-        }
-        if let Some(contacts) = &mut contacts {
-            contacts.write(scene, output)?;
-        }
-        if number % look_every == 0 {
-            summary.look(scene, &state);
-        }
-        if let Some(series) =
-            series.as_mut().filter(|series| time * arguments.fps >= series.frames() as f64 - 1e-9)
-        {
-            series.write_frame(&scene.model, &state)?;
-        }
+        outputs.take(scene, &input, &state, took)?;
     }
     bar.finish_and_clear();
-    if let Some(csv) = csv {
-        csv.finish()?;
-    }
-    if let Some(contacts) = contacts {
-        contacts.finish()?;
-    }
-    let index = series.map(VtuSeries::finish).transpose()?;
-    summary.finish(state.output(), index);
-    Ok(summary)
+    outputs.finish(&state)
 }
 
 /// How many steps: as many as asked for, or to the end of the longest path.

@@ -1,10 +1,10 @@
 //! The path of a device or an obstacle: poses over time, linear between rows, constant before and after.
 
-use crate::Failure;
-use crate::scene_file::LARGEST;
 use glam::{DQuat, DVec3};
 use palpate::Pose;
-use std::path::Path;
+
+/// Times [s] and lengths [m] beyond this are no path's.
+const LARGEST: f64 = 1e6;
 
 /// What a path file may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,13 +26,11 @@ const POSITION: [&str; 4] = ["t", "x", "y", "z"];
 const POSE: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
 
 impl MotionPath {
-    /// Read a CSV file with such columns; a header line and lines that start with # are passed over.
-    pub fn read(path: &Path, columns: Columns) -> Result<Self, Failure> {
-        let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the path", path, &e))?;
-        Self::parse(&text, columns).map_err(|what| Failure(format!("path {}: {what}", path.display())))
-    }
-
-    fn parse(text: &str, columns: Columns) -> Result<Self, String> {
+    /// From CSV text with such columns; a header line and lines that start with # are passed over.
+    ///
+    /// # Errors
+    /// What is wrong, by the line.
+    pub fn parse(text: &str, columns: Columns) -> Result<Self, String> {
         let mut rows: Vec<(f64, Pose)> = Vec::new();
         // How many columns all rows have: those of the first.
         let mut width = None;
@@ -84,7 +82,7 @@ impl MotionPath {
                 return Err(format!("{place}: time {t} s does not come after {last} s"));
             }
             let orientation = match numbers[4..] {
-                [w, x, y, z] => unit(w, x, y, z).map_err(|what| format!("{place}: {what}"))?,
+                [w, x, y, z] => orientation(w, x, y, z).map_err(|what| format!("{place}: {what}"))?,
                 _ => DQuat::IDENTITY,
             };
             rows.push((t, Pose { position: DVec3::new(numbers[1], numbers[2], numbers[3]), orientation }));
@@ -145,8 +143,11 @@ impl Columns {
     }
 }
 
-/// An orientation from a file.
-pub fn unit(w: f64, x: f64, y: f64, z: f64) -> Result<DQuat, String> {
+/// An orientation as a file gives it.
+///
+/// # Errors
+/// When it has not length 1, or nearly.
+pub fn orientation(w: f64, x: f64, y: f64, z: f64) -> Result<DQuat, String> {
     let orientation = DQuat::from_xyzw(x, y, z, w);
     let length = orientation.length();
     if !(0.99..=1.01).contains(&length) {

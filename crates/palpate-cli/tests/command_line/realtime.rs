@@ -1,0 +1,137 @@
+//! Runs in real time, their logs, and replays. No test here looks at how fast anything was.
+
+use crate::workplace::{Table, Workplace};
+
+/// Two fingers on the cube of `Workplace::with_scene`, which lies on a floor; the right one in a simulated hand.
+fn workplace() -> Workplace {
+    let workplace = Workplace::with_scene();
+    let finger = |name: &str, more: &str| {
+        format!(
+            "[[device]]\nname = \"{name}\"\nmode = \"touch\"\ntip_radius = 0.005\nfriction = 0.6\n\
+             coupling = {{ stiffness = 200.0, damping = 0.5 }}\npath = {{ file = \"{name}_finger.csv\" }}\n{more}"
+        )
+    };
+    let scene = [
+        "step = 0.002\ngravity = [0.0, 0.0, -9.81]\n".to_string(),
+        "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [0.0, 0.0, 0.0501]\n".to_string(),
+        "[[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 1.0]\n".to_string(),
+        finger("left", ""),
+        finger("right", "simulated = { device = \"touch\", grip = \"light\" }\n"),
+    ];
+    workplace.write("fingers.toml", scene.concat());
+    for (name, side) in [("left", -1.0), ("right", 1.0)] {
+        let path = format!("0,{},0,0.05\n0.2,{},0,0.05\n", side * 0.058, side * 0.053);
+        workplace.write(&format!("{name}_finger.csv"), path);
+    }
+    workplace
+}
+
+#[test]
+fn a_log_of_a_run_in_real_time_repeats_bit_for_bit_anywhere() {
+    let workplace = workplace();
+    let run = ["run", "fingers.toml", "--realtime", "--duration", "0.6", "--log", "run.mcap", "--json"];
+    let report = workplace.json(&run);
+    assert_eq!(report["steps"], 300);
+    assert_eq!(report["log"]["steps"], 300);
+    assert_eq!(report["force_process"]["cycles"], 300);
+    assert!(report["deformation_process"]["cycles"].as_u64() > Some(3), "{report:#}");
+    assert_eq!(
+        (&report["devices"][0]["kind"], &report["devices"][1]["kind"]),
+        (&"path".into(), &"touch".into())
+    );
+    assert!(report["devices"][1]["updates"].as_u64() > Some(100), "{report:#}");
+    assert!(report["granted"].as_str().is_some_and(|text| text.contains("memory")), "{report:#}");
+
+    // The log needs nothing else.
+    let elsewhere = Workplace::new();
+    elsewhere.write("run.mcap", workplace.read("run.mcap"));
+    let replay = ["replay", "run.mcap", "--csv", "steps.csv", "--contacts", "contacts.csv", "--json"];
+    let summary = elsewhere.json(&replay);
+    assert_eq!(
+        (&summary["replayed"]["steps"], &summary["replayed"]["identical"]),
+        (&300.into(), &true.into())
+    );
+    let steps = Table::parse(&elsewhere.text("steps.csv"));
+    assert_eq!(steps.len(), 300);
+    assert!(steps.column("left.fx").iter().any(|force| *force < -1e-3), "the left finger feels the cube");
+    assert!(elsewhere.text("contacts.csv").contains("cube,floor,"));
+    assert_eq!(elsewhere.files(), ["contacts.csv", "run.mcap", "steps.csv"], "and leaves nothing behind");
+    let text = elsewhere.succeed(&["replay", "run.mcap"]);
+    assert!(text.starts_with("300 steps replayed: every number came out again, bit for bit\n"), "{text}");
+
+    // Whatever byte of it is wrong, it says so or comes out the same, and never breaks.
+    let bytes = workplace.read("run.mcap");
+    for at in [40, bytes.len() / 3, bytes.len() / 2, bytes.len() - 30] {
+        let mut wrong = bytes.clone();
+        wrong[at] ^= 0x55;
+        elsewhere.write("wrong.mcap", wrong);
+        let code = elsewhere.palpate(&["replay", "wrong.mcap"]).status.code();
+        assert!(matches!(code, Some(0 | 1)), "byte {at}: {code:?}");
+    }
+    elsewhere.write("half.mcap", &bytes[..bytes.len() / 2]);
+    assert!(elsewhere.fail(&["replay", "half.mcap"]).starts_with("half.mcap: the log"));
+}
+
+#[test]
+fn the_paper_s_two_hands_run_in_real_time() {
+    let workplace = Workplace::with_scene();
+    let report = workplace.json(&[
+        "run",
+        "scene.toml",
+        "--realtime",
+        "--duration",
+        "0.2",
+        "--pictures",
+        "0",
+        "--json",
+    ]);
+    assert_eq!(report["steps"], 200);
+    assert_eq!(report["deformation_process"]["cycles"], 0);
+    assert!(report["devices"][0]["force_max_n"].as_f64() > Some(0.01), "{report:#}");
+    let text = workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05"]);
+    for part in ["50 steps at 1000 Hz", "force: compute", "overruns", "left         path, "] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn what_can_not_be_in_real_time_is_refused_in_words() {
+    let workplace = workplace();
+    let cases = [
+        (&["run", "scene.toml", "--log", "a.mcap"][..], "--log is of a run in real time: add --realtime"),
+        (&["run", "scene.toml", "--realtime", "--csv", "a.csv"], "--csv, --contacts and --vtu take time"),
+        (
+            &["run", "scene.toml", "--realtime", "--device-rate", "0"],
+            "a device is to be updated at 0 Hz, expected 50 to 5000",
+        ),
+        (&["run", "scene.toml", "--realtime", "--pictures", "-1"], "--pictures is -1, expected 0 to 1000"),
+        (&["run", "fingers.toml"], "the device \"right\" is held by a simulated hand"),
+        (
+            &["run", "scene.toml", "--realtime", "--log", "cube.palp"],
+            "cannot write cube.palp: it is one of the inputs",
+        ),
+        (&["replay", "none.mcap"], "cannot read the log none.mcap"),
+        (&["replay", "cube.palp"], "cube.palp: the log can't be read"),
+        (&["replay", "empty.mcap"], "empty.mcap: the log"),
+    ];
+    workplace.write("empty.mcap", "");
+    for (arguments, expected) in cases {
+        let error = workplace.fail(arguments);
+        assert!(error.starts_with(expected), "{arguments:?}: {error}");
+    }
+    let text = workplace.text("fingers.toml");
+    for (from, to, expected) in [
+        (
+            "\"touch\", grip",
+            "\"phantom\", grip",
+            "line 25: device is \"phantom\", expected one of \"touch\", \"omega.3\", \"inverse3\"",
+        ),
+        ("\"light\"", "\"iron\"", "line 25: grip is \"iron\", expected \"firm\", \"light\" or \"fingertip\""),
+        ("step = 0.002", "step = 0.02", "the step is 0.02 s: in real time it is 0.0002 s to 0.01 s"),
+    ] {
+        workplace.write("wrong.toml", text.replace(from, to));
+        let error = workplace.fail(&["run", "wrong.toml", "--realtime", "--duration", "0.1"]);
+        assert!(error.contains(expected), "{error}");
+    }
+    assert!(!workplace.path("a.mcap").exists());
+}

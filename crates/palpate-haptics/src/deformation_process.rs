@@ -1,0 +1,116 @@
+//! The deformation process (paper, section 3.2): whole surfaces for the eye, beside the force.
+
+use glam::DVec3;
+use palpate::{Deformation, Model, Pose, State};
+use std::sync::Arc;
+use triple_buffer::{Input, Output, triple_buffer};
+
+/// The surfaces of all objects at one moment.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// Simulated time [s].
+    pub time_s: f64,
+    /// The objects, in the model's order.
+    pub objects: Vec<FrameObject>,
+}
+
+/// The surface of an object at one moment.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameObject {
+    /// Where the object is.
+    pub pose: Option<Pose>,
+    /// Nodes [m, body], in single precision: for pictures.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals of the deformed surface at the nodes [body].
+    pub normals: Vec<[f32; 3]>,
+}
+
+/// What goes from the force process to the deformation process.
+#[derive(Debug, Clone)]
+struct Moment {
+    time_s: f64,
+    objects: Vec<Deformation>,
+}
+
+/// The force process's end: it leaves the newest state there.
+pub struct Showing {
+    moments: Input<Moment>,
+}
+
+/// The deformation process without its thread: what happens in a cycle.
+pub struct DeformationProcess {
+    model: Arc<Model>,
+    moments: Output<Moment>,
+    frame: Frame,
+    displacement: Vec<DVec3>,
+    sums: Vec<DVec3>,
+}
+
+impl Showing {
+    /// Leave the state for the deformation process.
+    ///
+    /// # Real time
+    /// No allocation. Costs modes and contacts.
+    pub fn show(&mut self, state: &State) {
+        let moment = self.moments.input_buffer_mut();
+        moment.time_s = state.output().time_s;
+        moment.objects.iter_mut().for_each(|object| object.copy_from(state));
+        self.moments.publish();
+    }
+}
+
+impl DeformationProcess {
+    /// Beside a scene's force process.
+    pub fn new(model: Arc<Model>, state: &State) -> (Showing, Self) {
+        let objects = (0..model.recordings().count()).map(|object| state.deformation(object)).collect();
+        let (input, output) = triple_buffer(&Moment { time_s: 0.0, objects });
+        let nodes: Vec<usize> = model.recordings().map(|r| r.surface.positions.len()).collect();
+        let most = nodes.iter().copied().max().unwrap_or(0);
+        let empty = |nodes| FrameObject {
+            pose: None,
+            positions: vec![[0.0; 3]; nodes],
+            normals: vec![[0.0; 3]; nodes],
+        };
+        let frame = Frame { time_s: 0.0, objects: nodes.into_iter().map(empty).collect() };
+        let process = Self {
+            model,
+            moments: output,
+            frame,
+            displacement: vec![DVec3::ZERO; most],
+            sums: vec![DVec3::ZERO; most],
+        };
+        (Showing { moments: input }, process)
+    }
+
+    /// Make the surfaces of the newest state; none when there is none newer.
+    pub fn cycle(&mut self) -> Option<&Frame> {
+        if !self.moments.update() {
+            return None;
+        }
+        let Moment { time_s, objects } = self.moments.output_buffer_mut();
+        self.frame.time_s = *time_s;
+        for ((deformation, frame), recording) in
+            objects.iter().zip(&mut self.frame.objects).zip(self.model.recordings())
+        {
+            let surface = &recording.surface;
+            let nodes = surface.positions.len();
+            let (places, sums) = (&mut self.displacement[..nodes], &mut self.sums[..nodes]);
+            deformation.surface_displacement(&self.model, places);
+            places.iter_mut().zip(&surface.positions).for_each(|(place, rest)| *place += *rest);
+            sums.fill(DVec3::ZERO);
+            for triangle in &surface.triangles {
+                let [a, b, c] = triangle.map(|node| places[node as usize]);
+                let normal = (b - a).cross(c - a);
+                triangle.iter().for_each(|&node| sums[node as usize] += normal);
+            }
+            frame.pose = Some(deformation.pose());
+            for (out, place) in frame.positions.iter_mut().zip(&*places) {
+                *out = place.as_vec3().to_array();
+            }
+            for (out, sum) in frame.normals.iter_mut().zip(&*sums) {
+                *out = sum.normalize_or_zero().as_vec3().to_array();
+            }
+        }
+        Some(&self.frame)
+    }
+}

@@ -1,0 +1,139 @@
+//! The haptic update (paper, section 3.2): the device side, at the device's own rate.
+
+use crate::device::{Device, Mount, Traits};
+use crate::passivity::PassivityController;
+use crate::port::{DevicePort, Motion};
+use crate::safety::{Safety, SafetyCounts};
+use glam::{DQuat, DVec3};
+
+/// One device's haptic update without its thread: what happens in a cycle.
+pub struct HapticUpdate {
+    device: Box<dyn Device>,
+    port: DevicePort,
+    mount: Mount,
+    safety: Safety,
+    passivity: Option<PassivityController>,
+    /// Wait for a button before force passes.
+    by_button: bool,
+    sequence: u64,
+    last: Option<(f64, DVec3)>,
+    /// The force that the device holds [N, world].
+    held: DVec3,
+    counts: UpdateCounts,
+}
+
+/// What happened to a device.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct UpdateCounts {
+    /// Updates.
+    pub updates: u64,
+    /// Readings and pushes that failed.
+    pub failed: u64,
+    /// What the safety met.
+    pub safety: SafetyCounts,
+    /// Updates in which the passivity controller changed the force.
+    pub passivity_acted: u64,
+    /// Most energy [J] that was missing at once.
+    pub passivity_worst_j: f64,
+    /// Largest force [N] that went to the device.
+    pub force_max_n: f64,
+    /// Work [J, world] on the hand since the start.
+    pub given_j: f64,
+}
+
+impl HapticUpdate {
+    /// For a device on a mount. Without a passivity controller the port's energy is not looked at. Force passes when the
+    /// safety is armed: at the first press of a button, or from the start.
+    pub fn new(
+        device: Box<dyn Device>,
+        port: DevicePort,
+        mount: Mount,
+        mut safety: Safety,
+        passivity: Option<PassivityController>,
+        by_button: bool,
+    ) -> Self {
+        safety.arm(!by_button);
+        Self {
+            device,
+            port,
+            mount,
+            safety,
+            passivity,
+            by_button,
+            sequence: 0,
+            last: None,
+            held: DVec3::ZERO,
+            counts: UpdateCounts::default(),
+        }
+    }
+
+    /// What its device is.
+    pub fn traits(&self) -> Traits {
+        self.device.traits()
+    }
+
+    /// What has happened.
+    pub fn counts(&self) -> UpdateCounts {
+        let mut counts = UpdateCounts { safety: self.safety.counts(), ..self.counts };
+        if let Some(passivity) = &self.passivity {
+            counts.passivity_acted = passivity.acted();
+            counts.passivity_worst_j = passivity.worst_j();
+        }
+        counts
+    }
+
+    /// Read the device, tell the force process, push the hand with the newest force as far as it is passive and safe.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call but those of the driver.
+    pub fn cycle(&mut self, now_s: f64) {
+        self.counts.updates += 1;
+        let effort = self.port.newest();
+        let age_s = if effort.sequence == 0 { f64::INFINITY } else { now_s - effort.time_s };
+        let Ok(reading) = self.device.read(now_s) else {
+            // Whatever it does with that, it is not pushed.
+            self.counts.failed += 1;
+            let dt = self.last.map_or(0.0, |(time, _)| now_s - time);
+            let force = self.safety.limit(effort.force, f64::INFINITY, 0.0, dt);
+            self.push(force, now_s);
+            return;
+        };
+        let position = self.mount.world_from_device(reading.position);
+        if position.is_finite() {
+            self.sequence += 1;
+            let orientation = reading.orientation.unwrap_or(DQuat::IDENTITY);
+            self.port.tell(Motion {
+                sequence: self.sequence,
+                time_s: now_s,
+                position,
+                orientation: self.mount.world_orientation(orientation),
+                buttons: reading.buttons,
+            });
+        }
+        if self.by_button && reading.buttons != 0 {
+            self.safety.arm(true);
+        }
+        let before = self.last.replace((now_s, position));
+        let (dt, moved) = before.map_or((0.0, DVec3::ZERO), |(time, last)| (now_s - time, position - last));
+        if moved.is_finite() {
+            self.counts.given_j += self.held.dot(moved);
+        }
+        let speed = if dt > 0.0 { moved.length() / dt / self.mount.scale } else { 0.0 };
+        let wanted = match &mut self.passivity {
+            Some(passivity) => passivity.control(self.sequence, position, &effort, dt),
+            None => effort.force,
+        };
+        let force = self.safety.limit(wanted, age_s, speed, dt);
+        self.push(force, now_s);
+    }
+
+    fn push(&mut self, force: DVec3, now_s: f64) {
+        if let Some(passivity) = &mut self.passivity {
+            passivity.hold(force);
+        }
+        self.held = force;
+        self.counts.force_max_n = self.counts.force_max_n.max(force.length());
+        let sent = self.device.push(self.mount.device_force(force), now_s);
+        self.counts.failed += u64::from(sent.is_err());
+    }
+}

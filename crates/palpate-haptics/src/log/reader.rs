@@ -1,0 +1,199 @@
+//! Reading a log.
+
+use super::messages::{EnergyMessage, Names, StepMessage};
+use crate::error::Error;
+use glam::DVec3;
+use mcap::Summary;
+use mcap::read::parse_record;
+use mcap::records::{Record, op::MESSAGE};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, Output, Pose};
+use std::collections::BTreeMap;
+
+/// A log in memory.
+pub struct Reader<'a> {
+    bytes: &'a [u8],
+    summary: Summary,
+}
+
+/// One step as it was logged.
+#[derive(Debug)]
+pub struct LoggedStep {
+    /// Its number, from 1.
+    pub step: u64,
+    message: StepMessage,
+}
+
+fn unreadable(error: impl std::fmt::Display) -> Error {
+    Error::Log(format!("the log can't be read: {error}"))
+}
+
+impl<'a> Reader<'a> {
+    /// Of the bytes of a log file.
+    ///
+    /// # Errors
+    /// When they are no MCAP file, or one that was not finished.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        let summary = Summary::read(bytes).map_err(unreadable)?;
+        let summary =
+            summary.ok_or_else(|| Error::Log("the log was not finished: it has no index".to_string()))?;
+        Ok(Self { bytes, summary })
+    }
+
+    /// The facts about the scene.
+    ///
+    /// # Errors
+    /// When there are none: it is no log of palpate's.
+    pub fn facts(&self) -> Result<BTreeMap<String, String>, Error> {
+        let index = self.summary.metadata_indexes.iter().find(|index| index.name == "palpate");
+        let index =
+            index.ok_or_else(|| Error::Log("it is an MCAP file, but no log of palpate's".to_string()))?;
+        mcap::read::metadata(self.bytes, index).map(|metadata| metadata.metadata).map_err(unreadable)
+    }
+
+    /// The files that the scene was read from, by their names.
+    ///
+    /// # Errors
+    /// When one can't be read.
+    pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let read = |index| mcap::read::attachment(self.bytes, index).map_err(unreadable);
+        let indexes = self.summary.attachment_indexes.iter();
+        indexes.map(|index| read(index).map(|a| (a.name, a.data.into_owned()))).collect()
+    }
+
+    /// How many steps it holds.
+    pub fn steps(&self) -> u64 {
+        let channel = self.summary.channels.iter().find(|(_, channel)| channel.topic == "/step");
+        let count =
+            |id: &u16| self.summary.stats.as_ref().and_then(|s| s.channel_message_counts.get(id).copied());
+        channel.and_then(|(id, _)| count(id)).unwrap_or(0)
+    }
+
+    /// The steps, in their order: each on its own is one, or why it can't be read.
+    pub fn each_step(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> + use<'a> {
+        // No length that a file states is longer than the file, or than a piece of ours.
+        let options = LinearReaderOptions::default()
+            .with_record_length_limit(self.bytes.len().max(1 << 20))
+            .with_validate_chunk_crcs(true);
+        let step =
+            self.summary.channels.iter().find(|(_, channel)| channel.topic == "/step").map(|(id, _)| *id);
+        Steps { bytes: self.bytes, reader: LinearReader::new_with_options(options), channel: step }
+    }
+}
+
+/// Reads steps piece by piece; after an error there are no more.
+struct Steps<'a> {
+    bytes: &'a [u8],
+    reader: LinearReader,
+    channel: Option<u16>,
+}
+
+impl Iterator for Steps<'_> {
+    type Item = Result<LoggedStep, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let channel = self.channel?;
+        let found = loop {
+            match self.reader.next_event()? {
+                Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                    let (now, later) = self.bytes.split_at(wanted.min(self.bytes.len()));
+                    self.reader.insert(now.len()).copy_from_slice(now);
+                    self.reader.notify_read(now.len());
+                    self.bytes = later;
+                }
+                Ok(LinearReadEvent::Record { opcode: MESSAGE, data }) => match parse_record(MESSAGE, data) {
+                    Ok(Record::Message { header, data }) if header.channel_id == channel => {
+                        break serde_json::from_slice(&data).map_err(unreadable);
+                    }
+                    Ok(_) => {}
+                    Err(error) => break Err(unreadable(error)),
+                },
+                Ok(LinearReadEvent::Record { .. }) => {}
+                Err(error) => break Err(unreadable(error)),
+            }
+        };
+        if found.is_err() {
+            self.channel = None;
+        }
+        Some(found.map(|message: StepMessage| LoggedStep { step: message.step, message }))
+    }
+}
+
+impl LoggedStep {
+    /// What the step was given; `modes` are what the devices do while they are there.
+    ///
+    /// # Errors
+    /// When the log does not tell of a device or an obstacle.
+    pub fn input(&self, names: &Names, modes: &[DeviceMode]) -> Result<Input, Error> {
+        let step = self.step;
+        let missing = |name: &String| Error::Log(format!("step {step} of the log does not tell of {name:?}"));
+        let mut input = Input::default();
+        for (name, mode) in names.devices.iter().zip(modes) {
+            let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
+            let mode = if device.present { *mode } else { DeviceMode::Away };
+            input.devices.push(DeviceInput { position: device.position.into(), mode });
+        }
+        for name in &names.obstacles {
+            input.obstacles.push((*self.message.obstacles.get(name).ok_or_else(|| missing(name))?).into());
+        }
+        Ok(input)
+    }
+
+    /// What is not, to the bit, what a step gave: a name, what was logged and what came out.
+    pub fn difference(&self, names: &Names, output: &Output) -> Option<(String, f64, f64)> {
+        let vector = |name: String, logged: DVec3, now: DVec3| {
+            let axes = ["x", "y", "z"].into_iter().zip(logged.to_array()).zip(now.to_array());
+            let mut off = axes.filter(|((_, a), b)| a.to_bits() != b.to_bits());
+            off.next().map(|((axis, a), b)| (format!("{name}.{axis}"), a, b))
+        };
+        for (name, now) in names.devices.iter().zip(&output.devices) {
+            let Some(logged) = self.message.devices.get(name) else { continue };
+            let force = vector(format!("{name}.force"), logged.force.into(), now.force_on_hand);
+            let proxy = || vector(format!("{name}.proxy"), logged.proxy.into(), now.proxy);
+            if let Some(found) = force.or_else(proxy) {
+                return Some(found);
+            }
+        }
+        for (name, now) in names.objects.iter().zip(&output.objects) {
+            let Some(logged) = self.message.objects.get(name) else { continue };
+            let pose = Pose::from(logged.pose);
+            let found = vector(format!("{name}.position"), pose.position, now.pose.position)
+                .or_else(|| {
+                    let (a, b) = (pose.orientation, now.pose.orientation);
+                    let same = a.to_array().map(f64::to_bits) == b.to_array().map(f64::to_bits);
+                    (!same).then(|| (format!("{name}.orientation.w"), a.w, b.w))
+                })
+                .or_else(|| vector(format!("{name}.velocity"), logged.velocity.into(), now.twist.linear))
+                .or_else(|| {
+                    vector(
+                        format!("{name}.angular_velocity"),
+                        logged.angular_velocity.into(),
+                        now.twist.angular,
+                    )
+                });
+            if found.is_some() {
+                return found;
+            }
+        }
+        energy_difference(&self.message.energy, &output.energy)
+    }
+}
+
+fn energy_difference(logged: &EnergyMessage, now: &EnergyLedger) -> Option<(String, f64, f64)> {
+    let numbers = |e: &EnergyMessage| {
+        [
+            ("kinetic", e.kinetic),
+            ("elastic", e.elastic),
+            ("residual", e.residual),
+            ("potential", e.potential),
+            ("coupling", e.coupling),
+            ("input", e.input),
+            ("dissipated", e.dissipated),
+            ("friction", e.friction),
+            ("impact", e.impact),
+        ]
+    };
+    let pairs = numbers(logged).into_iter().zip(numbers(&now.into()));
+    let mut off = pairs.filter(|((_, a), (_, b))| a.to_bits() != b.to_bits());
+    off.next().map(|((name, a), (_, b))| (format!("energy.{name}"), a, b))
+}

@@ -1,0 +1,190 @@
+//! Writing a log beside the force process, by a thread that can't disturb it.
+
+use super::messages::{ModesOf, Names, StepOf, contacts, transforms};
+use super::record::Record;
+use crate::error::Error;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
+use palpate::{Input, Model, State};
+use serde::Serialize;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, SystemTime};
+
+/// Steps that may wait for the writer.
+const WAITING: usize = 8192;
+
+/// How long the writer sleeps when there is nothing to write.
+const NAP: Duration = Duration::from_millis(5);
+
+/// The force process's end of a log: records that go round.
+pub struct LogHand {
+    full: rtrb::Producer<Box<Record>>,
+    spare: rtrb::Consumer<Box<Record>>,
+    /// Steps for which the writer was too slow.
+    missed: u64,
+}
+
+/// The writer's end.
+pub struct LogWriter<W: Write + Seek> {
+    writer: Writer<W>,
+    full: rtrb::Consumer<Box<Record>>,
+    spare: rtrb::Producer<Box<Record>>,
+    names: Names,
+    channels: Channels,
+    text: Vec<u8>,
+    start_ns: u64,
+    steps: u64,
+}
+
+struct Channels {
+    step: u16,
+    contacts: u16,
+    modes: u16,
+    tf: u16,
+}
+
+/// What a log came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LogSummary {
+    /// Steps that were written.
+    pub steps: u64,
+    /// Steps that the writer was too slow for: a replay ends there.
+    pub missed: u64,
+}
+
+impl LogHand {
+    /// Hand a step to the log, if a record is free.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call.
+    pub fn take(&mut self, fill: impl FnOnce(&mut Record)) {
+        let Ok(mut record) = self.spare.pop() else {
+            self.missed += 1;
+            return;
+        };
+        fill(&mut record);
+        // There are no more records than places.
+        self.missed += u64::from(self.full.push(record).is_err());
+    }
+
+    /// Steps for which the writer was too slow.
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> Error {
+    Error::Log(format!("cannot write the log: {error}"))
+}
+
+impl<W: Write + Seek> LogWriter<W> {
+    /// Begin a log of a scene at its start, with facts about it and the files that it was read from.
+    ///
+    /// # Errors
+    /// When it can't be written.
+    pub fn new(
+        out: W,
+        names: Names,
+        facts: BTreeMap<String, String>,
+        files: &[(String, Vec<u8>)],
+        (model, state, input): (&Model, &State, &Input),
+    ) -> Result<(LogHand, Self), Error> {
+        let options = WriteOptions::new()
+            .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_level(1);
+        let mut writer = options.create(out).map_err(failed)?;
+        let start_ns = SystemTime::UNIX_EPOCH.elapsed().map_or(0, |time| time.as_nanos() as u64);
+        for (name, data) in files {
+            let attachment = Attachment {
+                log_time: start_ns,
+                create_time: start_ns,
+                name: name.clone(),
+                media_type: "application/octet-stream".to_string(),
+                data: Cow::Borrowed(data),
+            };
+            writer.attach(&attachment).map_err(failed)?;
+        }
+        writer.write_metadata(&Metadata { name: "palpate".to_string(), metadata: facts }).map_err(failed)?;
+        let mut channel = |topic: &str, schema: &str, text: &str| -> Result<u16, Error> {
+            let schema = writer.add_schema(schema, "jsonschema", text.as_bytes()).map_err(failed)?;
+            writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(failed)
+        };
+        let object = r#"{"type":"object"}"#;
+        let channels = Channels {
+            step: channel("/step", "palpate.Step", object)?,
+            contacts: channel("/contacts", "palpate.Contacts", object)?,
+            modes: channel("/modes", "palpate.Modes", object)?,
+            tf: channel("/tf", "foxglove.FrameTransforms", TRANSFORMS)?,
+        };
+        let (full_in, full_out) = rtrb::RingBuffer::new(WAITING);
+        let (mut spare_in, spare_out) = rtrb::RingBuffer::new(WAITING);
+        // Not clones, whose buffers would have no room.
+        while spare_in.push(Box::new(Record::new(model, state, input))).is_ok() {}
+        let hand = LogHand { full: full_in, spare: spare_out, missed: 0 };
+        let text = Vec::new();
+        Ok((
+            hand,
+            Self { writer, full: full_out, spare: spare_in, names, channels, text, start_ns, steps: 0 },
+        ))
+    }
+
+    /// Write until `done` is set and nothing is left; gives how many steps were written, and what they were written to.
+    ///
+    /// # Errors
+    /// When the log can't be written: the disk is full, for one.
+    pub fn run(mut self, done: &AtomicBool) -> Result<(u64, W), Error> {
+        loop {
+            // Whatever was handed over before it was done is written.
+            let last = done.load(Ordering::Acquire);
+            while let Ok(record) = self.full.pop() {
+                self.write(&record)?;
+                // There are no more records than places.
+                let _ = self.spare.push(record);
+            }
+            if last {
+                break;
+            }
+            std::thread::sleep(NAP);
+        }
+        self.writer.finish().map_err(failed)?;
+        let mut out = self.writer.into_inner();
+        out.flush().map_err(failed)?;
+        Ok((self.steps, out))
+    }
+
+    fn write(&mut self, record: &Record) -> Result<(), Error> {
+        self.steps += 1;
+        let time = self.start_ns + (record.time_s * 1e9) as u64;
+        self.put(self.channels.step, record.step, time, |names| StepOf(record, names))?;
+        if record.pictured {
+            self.put(self.channels.contacts, record.step, time, |names| contacts(record, names))?;
+            self.put(self.channels.modes, record.step, time, |names| ModesOf(record, names))?;
+            self.put(self.channels.tf, record.step, time, |names| transforms(record, names, time))?;
+        }
+        Ok(())
+    }
+
+    fn put<'s, M: Serialize>(
+        &'s mut self,
+        channel_id: u16,
+        step: u64,
+        time: u64,
+        message: impl FnOnce(&'s Names) -> M,
+    ) -> Result<(), Error> {
+        self.text.clear();
+        serde_json::to_writer(&mut self.text, &message(&self.names)).map_err(failed)?;
+        let header = MessageHeader { channel_id, sequence: step as u32, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, &self.text).map_err(failed)
+    }
+}
+
+/// Foxglove's own schema of the same name, as far as its 3D panel needs it.
+const TRANSFORMS: &str = r#"{"title":"foxglove.FrameTransforms","type":"object","properties":{"transforms":{"type":"array","items":{
+"type":"object","properties":{"timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+"parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},
+"translation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
+"rotation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}}}}"#;

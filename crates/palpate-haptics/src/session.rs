@@ -1,0 +1,320 @@
+//! A run in real time: the processes as threads.
+
+use crate::clock::Clock;
+use crate::deformation_process::{DeformationProcess, Frame};
+use crate::device::{Device, Mount, Traits};
+use crate::error::Error;
+use crate::force_process::{ForceProcess, Mover};
+use crate::haptic_update::{HapticUpdate, UpdateCounts};
+use crate::log::{LogHand, LogSummary, LogWriter};
+use crate::passivity::PassivityController;
+use crate::port::{ForcePort, port};
+use crate::safety::{Safety, SafetyLimits};
+use crate::scheduling::{Granted, Scheduling};
+use crate::timing::Timing;
+use palpate::{DeviceMode, Model, Output};
+use std::io::{Seek, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
+use std::time::{Duration, Instant};
+
+/// The devices begin this long before the force process, and all processes this long after they were asked for.
+const HEAD_START: Duration = Duration::from_millis(20);
+
+/// A device with everything that its haptic update needs.
+pub struct Attached {
+    /// The driver.
+    pub device: Box<dyn Device>,
+    /// What it does in the scene.
+    pub mode: DeviceMode,
+    /// Where it is in the world.
+    pub mount: Mount,
+    /// How often it is updated [Hz].
+    pub rate_hz: f64,
+    /// What it may do to a hand.
+    pub limits: SafetyLimits,
+    /// Whether its port's energy is controlled.
+    pub passive: bool,
+    /// Whether it waits for a button before it gives force.
+    pub by_button: bool,
+}
+
+/// What to run.
+pub struct Session {
+    /// The scene.
+    pub model: Arc<Model>,
+    /// A device for each of the model's.
+    pub devices: Vec<Attached>,
+    /// A mover for each obstacle.
+    pub movers: Vec<Mover>,
+    /// Steps after which it ends; none goes on until it is stopped.
+    pub steps: Option<u64>,
+    /// Pictures per second; 0 for none.
+    pub pictures_hz: f64,
+    /// What the force process asks of the system; haptic updates ask for a priority less.
+    pub scheduling: Scheduling,
+    /// A device that has told nothing for so long [s] is away.
+    pub patience_s: f64,
+}
+
+/// How a run in real time went.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// What the force process got from the system.
+    pub granted: Granted,
+    /// How it kept its time.
+    pub force: Timing,
+    /// How long pictures took; lateness is not looked at.
+    pub pictures: Timing,
+    /// The devices, in the model's order.
+    pub devices: Vec<DeviceReport>,
+    /// The scene at the end.
+    pub output: Output,
+    /// Steps.
+    pub steps: u64,
+    /// Steps in which the contacts of some object could not be solved, or were left out.
+    pub unsolved: u64,
+    /// What was logged.
+    pub log: Option<LogSummary>,
+    /// Wall-clock time [s] that the steps took.
+    pub wall_s: f64,
+}
+
+/// How it went for a device.
+#[derive(Debug, Clone)]
+pub struct DeviceReport {
+    /// What it is.
+    pub traits: Traits,
+    /// What its updates met.
+    pub counts: UpdateCounts,
+    /// How they kept their time.
+    pub timing: Timing,
+}
+
+/// What the force process's thread gives back.
+struct Forces {
+    process: ForceProcess,
+    granted: Granted,
+    timing: Timing,
+    unsolved: u64,
+    wall_s: f64,
+    missed: u64,
+}
+
+impl Session {
+    /// Run until the steps are done or `stop` is set. `show` gets every picture, on the deformation process's thread;
+    /// `steps` counts along. Gives back what the log was written to.
+    ///
+    /// # Errors
+    /// When the setting is not one, a thread can't be started, or the log can't be written.
+    pub fn run<W: Write + Seek + Send>(
+        self,
+        log: Option<(LogHand, LogWriter<W>)>,
+        stop: &AtomicBool,
+        steps: &AtomicU64,
+        mut show: impl FnMut(&Frame) + Send,
+    ) -> Result<(Report, Option<W>), Error> {
+        self.check()?;
+        let Self { model, devices, movers, steps: most, pictures_hz, scheduling, patience_s } = self;
+        let start = Instant::now() + HEAD_START;
+        let step_s = model.parameters().step_s;
+        let (updates, seats) = connect(devices);
+        let process = ForceProcess::new(model.clone(), seats, movers, patience_s);
+        let (showing, mut pictures) = DeformationProcess::new(model.clone(), process.state());
+        let (hand, writer) = log.unzip();
+        let logged = AtomicBool::new(false);
+        let logged = &logged;
+        let ended = AtomicBool::new(false);
+        let ended = &ended;
+        std::thread::scope(|scope| {
+            let picture_every =
+                if pictures_hz > 0.0 { (1.0 / (pictures_hz * step_s)).round().max(1.0) as u64 } else { 0 };
+            let writing = writer.map(|writer| spawn(scope, "log", move || writer.run(logged))).transpose()?;
+            let mut updating = Vec::new();
+            for (update, rate_hz) in updates {
+                let asked = Scheduling {
+                    priority: scheduling.priority.map(|p| p.saturating_sub(10).max(1)),
+                    core: None,
+                };
+                let clock = Clock::new(start, 1.0 / rate_hz);
+                updating
+                    .push(spawn(scope, "haptic update", move || run_update(update, &clock, asked, ended))?);
+            }
+            let clock = Clock::new(start + HEAD_START, step_s);
+            let parts = Running { process, clock, hand, showing, picture_every, most, stop, steps };
+            let forcing = spawn(scope, "force", move || parts.run(start, scheduling))?;
+            let seeing = spawn(scope, "deformation", move || {
+                let mut timing = Timing::default();
+                while pictures_hz > 0.0 && !ended.load(Ordering::Relaxed) {
+                    let begun = Instant::now();
+                    if let Some(frame) = pictures.cycle() {
+                        timing.record(Duration::ZERO, begun.elapsed());
+                        show(frame);
+                    }
+                    std::thread::sleep(
+                        Duration::from_secs_f64(0.5 / pictures_hz).saturating_sub(begun.elapsed()),
+                    );
+                }
+                timing
+            })?;
+            let forces = join(forcing, "force process");
+            ended.store(true, Ordering::Relaxed);
+            logged.store(true, Ordering::Release);
+            let forces = forces?;
+            let devices: Result<Vec<_>, _> =
+                updating.into_iter().map(|thread| join(thread, "haptic update")).collect();
+            let pictures = join(seeing, "deformation process")?;
+            let written =
+                writing.map(|thread| join(thread, "log").and_then(|written| written)).transpose()?;
+            let (steps, out) = written.unzip();
+            let report = Report {
+                granted: forces.granted,
+                force: forces.timing,
+                pictures,
+                devices: devices?,
+                output: forces.process.state().output().clone(),
+                steps: forces.process.steps(),
+                unsolved: forces.unsolved,
+                log: steps.map(|steps| LogSummary { steps, missed: forces.missed }),
+                wall_s: forces.wall_s,
+            };
+            Ok((report, out))
+        })
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let fail = |what: String| Err(Error::Setup(what));
+        let step_s = self.model.parameters().step_s;
+        if !(200e-6..=10e-3).contains(&step_s) {
+            return fail(format!(
+                "the step is {step_s} s: in real time it is 0.0002 s to 0.01 s (5 kHz to 100 Hz; hands want 1 kHz)"
+            ));
+        }
+        for attached in &self.devices {
+            let rate = attached.rate_hz;
+            if !(50.0..=5000.0).contains(&rate) {
+                return fail(format!("a device is to be updated at {rate} Hz, expected 50 to 5000"));
+            }
+        }
+        if self.devices.len() != self.model.parameters().devices.len() {
+            return fail(format!(
+                "{} devices for a scene of {}",
+                self.devices.len(),
+                self.model.parameters().devices.len()
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The force process with everything around its cycle.
+struct Running<'a> {
+    process: ForceProcess,
+    clock: Clock,
+    hand: Option<LogHand>,
+    showing: crate::deformation_process::Showing,
+    picture_every: u64,
+    most: Option<u64>,
+    stop: &'a AtomicBool,
+    steps: &'a AtomicU64,
+}
+
+impl Running<'_> {
+    fn run(self, start: Instant, scheduling: Scheduling) -> Forces {
+        let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps } = self;
+        let granted = scheduling.claim();
+        process.warm_up();
+        let mut timing = Timing::default();
+        let mut unsolved = 0;
+        let period = clock.deadline(1) - clock.deadline(0);
+        let mut tick = clock.next_after(0);
+        let begun_all = clock.deadline(tick);
+        while most.is_none_or(|most| process.steps() < most) && !stop.load(Ordering::Relaxed) {
+            let late = clock.wait(tick);
+            let begun = Instant::now();
+            let output = process.cycle(begun.saturating_duration_since(start).as_secs_f64());
+            unsolved += u64::from(output.status.unsolved_objects > 0 || output.status.dropped_contacts > 0);
+            let pictured = picture_every > 0 && process.steps().is_multiple_of(picture_every);
+            if pictured {
+                showing.show(process.state());
+            }
+            let took = begun.elapsed();
+            if let Some(hand) = &mut hand {
+                hand.take(|record| {
+                    (record.step, record.tick, record.late, record.took) =
+                        (process.steps(), tick, late, took);
+                    record.take(process.input(), process.state(), pictured);
+                });
+            }
+            steps.store(process.steps(), Ordering::Relaxed);
+            timing.record(late, took);
+            // On the grid again, whatever was missed.
+            let next = if Instant::now() > clock.deadline(tick + 1) {
+                let next = clock.next_after(tick);
+                timing.record_overrun(took > period, next - tick - 1);
+                next
+            } else {
+                tick + 1
+            };
+            tick = next;
+        }
+        let wall_s = Instant::now().saturating_duration_since(begun_all).as_secs_f64();
+        let missed = hand.map_or(0, |hand| hand.missed());
+        Forces { process, granted, timing, unsolved, wall_s, missed }
+    }
+}
+
+fn run_update(
+    mut update: HapticUpdate,
+    clock: &Clock,
+    asked: Scheduling,
+    ended: &AtomicBool,
+) -> DeviceReport {
+    // What it got is that of the force process, or less.
+    let _ = asked.claim();
+    let mut timing = Timing::default();
+    let mut tick = clock.next_after(0);
+    while !ended.load(Ordering::Relaxed) {
+        let late = clock.wait(tick);
+        let begun = Instant::now();
+        update.cycle(clock.now_s());
+        timing.record(late, begun.elapsed());
+        tick = clock.next_after(tick);
+    }
+    DeviceReport { traits: update.traits(), counts: update.counts(), timing }
+}
+
+/// A haptic update and its rate for every device, and its seat in the force process.
+type Connected = (Vec<(HapticUpdate, f64)>, Vec<(ForcePort, DeviceMode)>);
+
+fn connect(devices: Vec<Attached>) -> Connected {
+    let one = |attached: Attached| {
+        let Attached { device, mode, mount, rate_hz, limits, passive, by_button } = attached;
+        let traits = device.traits();
+        let (device_port, force_port) = port();
+        let controller =
+            PassivityController::new(traits.mass_kg, traits.resolution_m * mount.scale, 1.0 / rate_hz);
+        let limits = SafetyLimits { force_n: limits.force_n.min(traits.force_n), ..limits };
+        let safety = Safety::new(limits);
+        let update =
+            HapticUpdate::new(device, device_port, mount, safety, passive.then_some(controller), by_button);
+        ((update, rate_hz), (force_port, mode))
+    };
+    devices.into_iter().map(one).unzip()
+}
+
+fn spawn<'scope, T: Send + 'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    name: &str,
+    body: impl FnOnce() -> T + Send + 'scope,
+) -> Result<ScopedJoinHandle<'scope, T>, Error> {
+    let thread = Builder::new().name(format!("palpate {name}"));
+    thread
+        .spawn_scoped(scope, body)
+        .map_err(|e| Error::Thread(format!("cannot start a thread for the {name}: {e}")))
+}
+
+fn join<T>(thread: ScopedJoinHandle<'_, T>, name: &str) -> Result<T, Error> {
+    thread.join().map_err(|_| Error::Thread(format!("the thread of the {name} has ended by a bug")))
+}

@@ -1,0 +1,87 @@
+//! A cycle allocates nothing.
+
+use super::scenes::{STEP_S, half_width, model, path, process};
+use palpate_haptics::device::{Hand, Mount, Simulated, Traits};
+use palpate_haptics::log::{LogWriter, Names};
+use palpate_haptics::{DeformationProcess, HapticUpdate, PassivityController, Safety, SafetyLimits, Timing};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::time::Duration;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Counts the allocations of each thread.
+struct Counting;
+
+// SAFETY: every call goes on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller's layout, unchanged.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the pointer came from the system's allocator with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the pointer came from the system's allocator with this layout.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+#[test]
+fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
+    let model = model(2, 300.0);
+    let edge = half_width(&model) + 0.004;
+    let (mut force, ports) = process(&model);
+    let mut updates: Vec<HapticUpdate> = ports
+        .into_iter()
+        .zip([1.0, -1.0])
+        .map(|(port, side)| {
+            let wanted = path(&format!("0,{},0,0\n0.5,{},0,0\n", side * 1.2 * edge, side * 0.9 * edge));
+            let device = Simulated::new(Traits::TOUCH, Hand::FIRM, wanted);
+            let passivity = PassivityController::new(0.2, 55e-6, STEP_S);
+            let safety = Safety::new(SafetyLimits::default());
+            HapticUpdate::new(Box::new(device), port, Mount::default(), safety, Some(passivity), false)
+        })
+        .collect();
+    let (mut showing, _pictures) = DeformationProcess::new(model.clone(), force.state());
+    let names = Names {
+        objects: vec!["body".into()],
+        devices: vec!["a".into(), "b".into()],
+        obstacles: vec!["floor".into()],
+    };
+    let start = (&*model, force.state(), force.input());
+    let (mut hand, _writer) =
+        LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log in memory");
+    let mut timing = Timing::default();
+    force.warm_up();
+
+    let (before, mut pushed) = (ALLOCATIONS.get(), 0.0_f64);
+    for tick in 1..=1500_u64 {
+        let now_s = tick as f64 * STEP_S;
+        updates.iter_mut().for_each(|update| update.cycle(now_s));
+        force.cycle(now_s);
+        if tick % 16 == 0 {
+            showing.show(force.state());
+        }
+        hand.take(|record| record.take(force.input(), force.state(), tick % 16 == 0));
+        timing.record(Duration::from_nanos(tick), Duration::from_nanos(2 * tick));
+        pushed = pushed.max(force.state().output().devices[0].force_on_hand.length());
+    }
+    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 1500 cycles");
+    assert!(pushed > 0.01 && hand.missed() == 0, "{pushed} N");
+    let probe = Box::new(0_u64);
+    assert!(ALLOCATIONS.get() > before, "{probe}");
+}

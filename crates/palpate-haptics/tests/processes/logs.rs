@@ -1,0 +1,98 @@
+//! Logs: what was written comes back to the bit, and repeats.
+
+use super::scenes::{STEP_S, half_width, model, process};
+use glam::DVec3;
+use palpate::{DeviceMode, State, step};
+use palpate_haptics::Motion;
+use palpate_haptics::log::{LogWriter, Names, Reader};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::sync::atomic::AtomicBool;
+
+fn names() -> Names {
+    Names { objects: vec!["body".into()], devices: vec!["finger".into()], obstacles: vec!["floor".into()] }
+}
+
+/// A log of 400 steps of a finger that presses, and falls silent in between.
+fn log() -> Vec<u8> {
+    let model = model(1, 300.0);
+    let edge = half_width(&model) + 0.004;
+    let (mut force, mut ports) = process(&model);
+    let facts = BTreeMap::from([("scene".to_string(), "a.toml".to_string())]);
+    let files = [("a.toml".to_string(), b"step = 1".to_vec())];
+    let start = (&*model, force.state(), force.input());
+    let (mut hand, writer) =
+        LogWriter::new(Cursor::new(Vec::new()), names(), facts, &files, start).expect("a log in memory");
+    for tick in 1..=400_u64 {
+        let now_s = tick as f64 * STEP_S;
+        if !(200..300).contains(&tick) {
+            let position = DVec3::new(edge - 0.003, 0.0005 * (now_s * 31.0).sin(), 1e-4);
+            ports[0].tell(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
+        }
+        force.cycle(now_s);
+        hand.take(|record| {
+            record.step = tick;
+            record.take(force.input(), force.state(), tick % 10 == 0);
+        });
+    }
+    let (steps, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
+    assert_eq!((steps, hand.missed()), (400, 0));
+    out.into_inner()
+}
+
+#[test]
+fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
+    let bytes = log();
+    let reader = Reader::new(&bytes).expect("a log");
+    assert_eq!(reader.facts().expect("facts")["scene"], "a.toml");
+    assert_eq!(reader.files().expect("files"), [("a.toml".to_string(), b"step = 1".to_vec())]);
+    assert_eq!(reader.steps(), 400);
+    let model = model(1, 300.0);
+    for other in [None, Some(250)] {
+        let mut state = State::new(&model);
+        let mut differs = None;
+        let mut away = 0;
+        for (at, logged) in reader.each_step().enumerate() {
+            let logged = logged.expect("a step");
+            assert_eq!(logged.step, at as u64 + 1);
+            let mut input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
+            away += u32::from(input.devices[0].mode == DeviceMode::Away);
+            if other == Some(logged.step) {
+                input.devices[0] = palpate::DeviceInput::touching(DVec3::X * 0.02);
+            }
+            step(&model, &mut state, &input);
+            differs = differs.or_else(|| {
+                logged.difference(&names(), state.output()).map(|(what, ..)| (logged.step, what))
+            });
+        }
+        match other {
+            None => assert_eq!(differs, None),
+            Some(step) => assert!(differs.as_ref().is_some_and(|(at, _)| *at == step), "{differs:?}"),
+        }
+        assert!(away > 40, "{away}");
+    }
+}
+
+#[test]
+fn what_is_no_log_or_half_of_one_is_refused_in_words() {
+    let bytes = log();
+    let error = |bytes: &[u8]| match Reader::new(bytes) {
+        Err(error) => error.to_string(),
+        Ok(reader) => {
+            let wrong = reader.each_step().find_map(Result::err).or(reader.files().err());
+            wrong.map_or(String::new(), |error| error.to_string())
+        }
+    };
+    assert_eq!(error(&bytes), "");
+    for (what, bytes) in
+        [("empty", &[][..]), ("text", b"t,x,y,z\n0,0,0,0\n"), ("half", &bytes[..bytes.len() / 2])]
+    {
+        assert!(error(bytes).starts_with("the log"), "{what}: {:?}", error(bytes));
+    }
+    // Whatever bytes are wrong, nothing panics.
+    for at in (0..bytes.len()).step_by(97) {
+        let mut wrong = bytes.clone();
+        wrong[at] ^= 0x55;
+        error(&wrong);
+    }
+}

@@ -1,0 +1,62 @@
+//! Small scenes for the tests.
+
+use glam::DVec3;
+use palpate::{
+    Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
+    Recording, Shape, Twist,
+};
+use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, Mover, port};
+use std::sync::Arc;
+
+/// Step of all scenes [s].
+pub const STEP_S: f64 = 1e-3;
+
+/// How far the recorded body's surface is from its centre along x [m].
+pub fn half_width(model: &Model) -> f64 {
+    let positions = model.recordings().next().map(|r| r.surface.positions.clone()).unwrap_or_default();
+    positions.iter().map(|p| p.x).fold(0.0, f64::max)
+}
+
+/// A body at rest in the air, a floor far below, and fingers with a coupling.
+pub fn model(fingers: usize, stiffness: f64) -> Arc<Model> {
+    let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+    let floor = Obstacle {
+        shape: Shape::Plane { normal: DVec3::Y },
+        pose: Pose { position: DVec3::Y * -10.0, ..Pose::IDENTITY },
+        friction: 0.5,
+    };
+    let finger = DeviceParameters {
+        tip_radius: 0.004,
+        patch_radius: 0.0,
+        friction: 0.5,
+        coupling: Some(Coupling { stiffness, damping: 0.2 }),
+    };
+    let parameters = ModelParameters {
+        step_s: STEP_S,
+        devices: vec![finger; fingers],
+        obstacles: vec![floor],
+        ..ModelParameters::default()
+    };
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    Arc::new(Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a good model"))
+}
+
+/// The force process of a model whose devices all touch, with the devices' ends of its ports.
+pub fn process(model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
+    let devices = model.parameters().devices.len();
+    let (ends, seats): (Vec<_>, Vec<_>) = (0..devices)
+        .map(|_| {
+            let (device, force) = port();
+            (device, (force, DeviceMode::Touch))
+        })
+        .unzip();
+    let floor = model.parameters().obstacles[0].pose;
+    let mover: Mover = Box::new(move |_| floor);
+    (ForceProcess::new(model.clone(), seats, vec![mover], 0.05), ends)
+}
+
+/// A path from text.
+pub fn path(text: &str) -> MotionPath {
+    MotionPath::parse(text, Columns::Position).expect("a good path")
+}

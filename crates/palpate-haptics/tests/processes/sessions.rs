@@ -1,0 +1,104 @@
+//! The processes as threads.
+
+use super::scenes::{half_width, model, path};
+use palpate::{DeviceMode, Pose};
+use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
+use palpate_haptics::log::{LogWriter, Names, Reader};
+use palpate_haptics::{Attached, ForceProcess, SafetyLimits, Scheduling, Session};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+fn session(steps: Option<u64>) -> Session {
+    let model = model(2, 300.0);
+    let edge = half_width(&model) + 0.004;
+    let attached = |side: f64| {
+        let wanted = path(&format!("0,{},0,0\n0.1,{},0,0\n", side * 1.1 * edge, side * 0.9 * edge));
+        let device: Box<dyn palpate_haptics::device::Device> = if side > 0.0 {
+            Box::new(Scripted::new(wanted))
+        } else {
+            Box::new(Simulated::new(Traits::TOUCH, Hand::FIRM, wanted))
+        };
+        Attached {
+            device,
+            mode: DeviceMode::Touch,
+            mount: Mount::default(),
+            rate_hz: 1000.0,
+            limits: SafetyLimits::default(),
+            passive: true,
+            by_button: false,
+        }
+    };
+    let floor = model.parameters().obstacles[0].pose;
+    Session {
+        devices: vec![attached(1.0), attached(-1.0)],
+        movers: vec![Box::new(move |_: f64| -> Pose { floor })],
+        model,
+        steps,
+        pictures_hz: 60.0,
+        scheduling: Scheduling { priority: None, core: None },
+        patience_s: 0.5,
+    }
+}
+
+#[test]
+fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
+    let session = session(Some(400));
+    let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
+    let names = Names {
+        objects: vec!["body".into()],
+        devices: vec!["a".into(), "b".into()],
+        obstacles: vec!["floor".into()],
+    };
+    let mut input = process.input().clone();
+    input.devices = vec![palpate::DeviceInput::away(); 2];
+    input.obstacles = vec![session.model.parameters().obstacles[0].pose];
+    let start = (&*session.model, process.state(), &input);
+    let log = LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log");
+    let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
+    let mut frames = 0;
+    let (report, out) = session
+        .run(Some(log), &stop, &steps, |frame| {
+            frames += 1;
+            let object = &frame.objects[0];
+            let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-5;
+            assert!(object.pose.is_some() && object.normals.iter().all(unit));
+        })
+        .expect("it runs");
+    assert_eq!((report.steps, report.force.cycles(), steps.load(Ordering::Relaxed)), (400, 400, 400));
+    assert!(frames > 3 && report.pictures.cycles() == frames, "{frames} pictures");
+    assert!(report.wall_s > 0.35, "by the clock: {} s", report.wall_s);
+    assert!(report.devices.iter().all(|device| device.counts.updates > 50 && device.counts.failed == 0));
+    let logged = report.log.expect("a log");
+    assert_eq!(logged.steps + logged.missed, 400);
+    let bytes = out.expect("what it was written to").into_inner();
+    assert_eq!(Reader::new(&bytes).expect("a log").steps(), logged.steps);
+}
+
+#[test]
+fn a_session_without_an_end_stops_when_it_is_told() {
+    let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
+    let session = session(None);
+    let report = std::thread::scope(|scope| {
+        let running = scope.spawn(|| session.run::<Cursor<Vec<u8>>>(None, &stop, &steps, |_| ()));
+        while steps.load(Ordering::Relaxed) < 50 {
+            std::thread::yield_now();
+        }
+        stop.store(true, Ordering::Relaxed);
+        running.join().expect("no panic").expect("it runs")
+    });
+    assert!(report.0.steps >= 50 && report.0.log.is_none());
+}
+
+#[test]
+fn what_can_not_be_in_real_time_is_refused() {
+    let mut wrong = session(Some(1));
+    wrong.devices[0].rate_hz = 0.0;
+    let refused = wrong.run::<Cursor<Vec<u8>>>(None, &AtomicBool::new(false), &AtomicU64::new(0), |_| ());
+    let error = refused.expect_err("no rate").to_string();
+    assert_eq!(error, "a device is to be updated at 0 Hz, expected 50 to 5000");
+    let mut wrong = session(Some(1));
+    wrong.devices.pop();
+    let refused = wrong.run::<Cursor<Vec<u8>>>(None, &AtomicBool::new(false), &AtomicU64::new(0), |_| ());
+    assert_eq!(refused.expect_err("one too few").to_string(), "1 devices for a scene of 2");
+}
