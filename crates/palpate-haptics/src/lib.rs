@@ -20,6 +20,7 @@ pub mod device;
 mod error;
 mod force_process;
 mod haptic_update;
+pub mod link;
 pub mod log;
 mod motion_path;
 mod passivity;

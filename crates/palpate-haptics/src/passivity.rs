@@ -32,8 +32,8 @@ pub struct PassivityController {
     /// What the hand had given [J] with each motion, by its sequence; and what it has given now.
     given: Box<[f64]>,
     given_now: f64,
-    /// What was lost and does not pay any more [J].
-    written_off: f64,
+    /// What was lost and does not pay any more [J]; none before the first answer, from which it counts.
+    written_off: Option<f64>,
     balance: f64,
     last: Option<DVec3>,
     held: DVec3,
@@ -52,7 +52,7 @@ impl PassivityController {
             likely: DVec3::ZERO,
             given: vec![0.0; REMEMBERED].into_boxed_slice(),
             given_now: 0.0,
-            written_off: 0.0,
+            written_off: None,
             balance: 0.0,
             last: None,
             held: DVec3::ZERO,
@@ -92,9 +92,11 @@ impl PassivityController {
         self.given[place(sequence)] = self.given_now;
         if effort.answers > 0 && effort.answers <= sequence && effort.taken_j.is_finite() {
             let answered = effort.answers.max((sequence + 1).saturating_sub(REMEMBERED as u64));
-            let balance = self.given[place(answered)] - effort.taken_j - self.written_off;
+            let kept = self.given[place(answered)] - effort.taken_j;
+            let written_off = self.written_off.get_or_insert(kept);
+            let balance = kept - *written_off;
             self.balance = balance.min(MOST_KEPT);
-            self.written_off += balance - self.balance;
+            *written_off += balance - self.balance;
             self.worst = self.worst.max(-self.balance);
         }
         if dt_s <= 0.0 || !wanted.is_finite() {

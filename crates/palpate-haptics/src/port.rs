@@ -1,5 +1,6 @@
 //! Where a device and the force process meet: two values, the newest of which counts.
 
+use crate::link::LinkSender;
 use glam::{DQuat, DVec3};
 use triple_buffer::{Input, Output, triple_buffer};
 
@@ -48,8 +49,16 @@ impl Default for Effort {
 
 /// The device's end of a port.
 pub struct DevicePort {
-    motion: Input<Motion>,
+    motion: Telling,
     effort: Output<Effort>,
+}
+
+/// Where motions go.
+enum Telling {
+    /// To a force process beside.
+    Here(Input<Motion>),
+    /// To one elsewhere.
+    Link(LinkSender),
 }
 
 /// The force process's end.
@@ -63,17 +72,26 @@ pub fn port() -> (DevicePort, ForcePort) {
     let (motion_in, motion_out) = triple_buffer(&Motion::default());
     let (effort_in, effort_out) = triple_buffer(&Effort::default());
     (
-        DevicePort { motion: motion_in, effort: effort_out },
+        DevicePort { motion: Telling::Here(motion_in), effort: effort_out },
         ForcePort { motion: motion_out, effort: effort_in },
     )
 }
 
 impl DevicePort {
+    /// Over a link, with the efforts that come back.
+    pub(crate) fn linked(sender: LinkSender, effort: Output<Effort>) -> Self {
+        Self { motion: Telling::Link(sender), effort }
+    }
+
     /// Tell where the hand is.
     ///
     /// # Real time
+    /// Over a link it takes a lock and calls the system.
     pub fn tell(&mut self, motion: Motion) {
-        self.motion.write(motion);
+        match &mut self.motion {
+            Telling::Here(input) => input.write(motion),
+            Telling::Link(sender) => sender.tell(&motion),
+        }
     }
 
     /// The newest effort.

@@ -2,6 +2,7 @@
 
 mod allocations;
 mod closed_loop;
+mod links;
 mod logs;
 mod scenes;
 mod sessions;
