@@ -6,11 +6,12 @@ use std::time::{Duration, Instant};
 /// The system is trusted to wake a thread within this of when it should; the rest is waited for awake.
 const SPIN: Duration = Duration::from_micros(100);
 
-/// A grid in time: tick k is k periods after the start.
+/// A grid in time: tick k is k periods after the start, and a phase later.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     start: Instant,
     period_s: f64,
+    phase_s: f64,
     sleeper: SpinSleeper,
 }
 
@@ -18,7 +19,12 @@ impl Clock {
     /// From a common start, with a period [s]. Short periods leave a thread awake for at most a third of them.
     pub fn new(start: Instant, period_s: f64) -> Self {
         let awake = SPIN.min(Duration::from_secs_f64(period_s / 3.0));
-        Self { start, period_s, sleeper: SpinSleeper::new(awake.subsec_nanos()) }
+        Self { start, period_s, phase_s: 0.0, sleeper: SpinSleeper::new(awake.subsec_nanos()) }
+    }
+
+    /// The same with all ticks later by a phase [s]; times still count from the start.
+    pub fn later(self, phase_s: f64) -> Self {
+        Self { phase_s, ..self }
     }
 
     /// Seconds since the start.
@@ -28,7 +34,7 @@ impl Clock {
 
     /// When a tick is due.
     pub fn deadline(&self, tick: u64) -> Instant {
-        self.start + Duration::from_secs_f64(tick as f64 * self.period_s)
+        self.start + Duration::from_secs_f64(self.phase_s + tick as f64 * self.period_s)
     }
 
     /// Wait for a tick; gives how late it is then.
@@ -40,7 +46,7 @@ impl Clock {
 
     /// The first tick after `tick` that is not over yet.
     pub fn next_after(&self, tick: u64) -> u64 {
-        let passed = (self.now_s() / self.period_s).ceil() as u64;
+        let passed = ((self.now_s() - self.phase_s) / self.period_s).ceil() as u64;
         passed.max(tick + 1)
     }
 }
@@ -56,6 +62,7 @@ mod tests {
         assert_eq!(clock.deadline(2500), start + Duration::from_secs_f64(2.5));
         let next = clock.next_after(3);
         assert!(next > 10 && clock.deadline(next) > start + Duration::from_millis(10), "{next}");
+        assert_eq!(clock.later(2e-4).deadline(2500), start + Duration::from_secs_f64(2.5002));
         // A tick that lies behind is late by what has passed since.
         assert!(clock.wait(2) >= Duration::from_millis(8));
         let waited = clock.next_after(next);

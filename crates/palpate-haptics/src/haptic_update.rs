@@ -4,7 +4,12 @@ use crate::device::{Device, Mount, Traits};
 use crate::passivity::PassivityController;
 use crate::port::{DevicePort, Motion};
 use crate::safety::{Safety, SafetyCounts};
+use crate::timing::Spread;
 use glam::{DQuat, DVec3};
+use std::time::Duration;
+
+/// Motions of which it is remembered when they were told.
+const TOLD: usize = 1024;
 
 /// One device's haptic update without its thread: what happens in a cycle.
 pub struct HapticUpdate {
@@ -16,6 +21,10 @@ pub struct HapticUpdate {
     /// Wait for a button before force passes.
     by_button: bool,
     sequence: u64,
+    /// When motions were told [s], by their sequence; the newest that was answered, and how long answers took.
+    told: Box<[f64]>,
+    answered: u64,
+    answers: Spread,
     last: Option<(f64, DVec3)>,
     /// The force that the device holds [N, world].
     held: DVec3,
@@ -61,6 +70,9 @@ impl HapticUpdate {
             passivity,
             by_button,
             sequence: 0,
+            told: vec![0.0; TOLD].into_boxed_slice(),
+            answered: 0,
+            answers: Spread::default(),
             last: None,
             held: DVec3::ZERO,
             counts: UpdateCounts::default(),
@@ -70,6 +82,11 @@ impl HapticUpdate {
     /// What its device is.
     pub fn traits(&self) -> Traits {
         self.device.traits()
+    }
+
+    /// How long it took from a motion to an effort that answers it or a later one, as the update saw it.
+    pub fn answers(&self) -> &Spread {
+        &self.answers
     }
 
     /// What has happened.
@@ -89,6 +106,11 @@ impl HapticUpdate {
     pub fn cycle(&mut self, now_s: f64) {
         self.counts.updates += 1;
         let effort = self.port.newest();
+        if effort.answers > self.answered && effort.answers + TOLD as u64 > self.sequence {
+            self.answered = effort.answers;
+            let told = self.told[(effort.answers % TOLD as u64) as usize];
+            self.answers.record(Duration::from_secs_f64((now_s - told).max(0.0)));
+        }
         let age_s = if effort.sequence == 0 { f64::INFINITY } else { now_s - effort.time_s };
         let Ok(reading) = self.device.read(now_s) else {
             // Whatever it does with that, it is not pushed.
@@ -101,6 +123,7 @@ impl HapticUpdate {
         let position = self.mount.world_from_device(reading.position);
         if position.is_finite() {
             self.sequence += 1;
+            self.told[(self.sequence % TOLD as u64) as usize] = now_s;
             let orientation = reading.orientation.unwrap_or(DQuat::IDENTITY);
             self.port.tell(Motion {
                 sequence: self.sequence,

@@ -40,5 +40,5 @@ pub use passivity::PassivityController;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};
 pub use safety::{Safety, SafetyCounts, SafetyLimits};
 pub use scheduling::{Granted, Scheduling};
-pub use session::{Attached, DeviceReport, Report, Session};
-pub use timing::{Percentiles, Timing};
+pub use session::{Attached, DeviceReport, Report, Session, SessionDevice, run_update};
+pub use timing::{Percentiles, Spread, Timing};

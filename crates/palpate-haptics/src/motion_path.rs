@@ -118,6 +118,12 @@ impl MotionPath {
         }
     }
 
+    /// The same path so much later [s].
+    pub fn later(mut self, by_s: f64) -> Self {
+        self.rows.iter_mut().for_each(|(time, _)| *time += by_s);
+        self
+    }
+
     /// Time of the last row [s].
     pub fn end(&self) -> f64 {
         self.rows.last().map_or(0.0, |(t, _)| *t)
@@ -173,6 +179,7 @@ mod tests {
         assert_eq!(path.at(1.0).position, DVec3::new(1.0, 0.0, 2.0));
         assert_eq!(path.at(9.0).position, DVec3::new(2.0, 0.0, 4.0));
         assert_eq!(path.end(), 1.5);
+        assert_eq!(path.clone().later(2.0).at(3.0), path.at(1.0));
         assert!(!path.turns());
     }
 

@@ -8,10 +8,10 @@ use crate::force_process::{ForceProcess, Mover};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
 use crate::log::{LogHand, LogSummary, LogWriter};
 use crate::passivity::PassivityController;
-use crate::port::{ForcePort, port};
+use crate::port::{DevicePort, ForcePort, port};
 use crate::safety::{Safety, SafetyLimits};
 use crate::scheduling::{Granted, Scheduling};
-use crate::timing::Timing;
+use crate::timing::{Spread, Timing};
 use palpate::{DeviceMode, Model, Output};
 use std::io::{Seek, Write};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 use std::time::{Duration, Instant};
 
-/// The devices begin this long before the force process, and all processes this long after they were asked for.
+/// The devices begin this long before the force process.
 const HEAD_START: Duration = Duration::from_millis(20);
 
 /// A device with everything that its haptic update needs.
@@ -40,12 +40,22 @@ pub struct Attached {
     pub by_button: bool,
 }
 
+/// A device of a session.
+pub enum SessionDevice {
+    /// On this machine, with a haptic update of its own.
+    Here(Attached),
+    /// Behind a link, whose port this is.
+    Linked(ForcePort, DeviceMode),
+}
+
 /// What to run.
 pub struct Session {
     /// The scene.
     pub model: Arc<Model>,
+    /// From when all times count.
+    pub start: Instant,
     /// A device for each of the model's.
-    pub devices: Vec<Attached>,
+    pub devices: Vec<SessionDevice>,
     /// A mover for each obstacle.
     pub movers: Vec<Mover>,
     /// Steps after which it ends; none goes on until it is stopped.
@@ -67,8 +77,8 @@ pub struct Report {
     pub force: Timing,
     /// How long pictures took; lateness is not looked at.
     pub pictures: Timing,
-    /// The devices, in the model's order.
-    pub devices: Vec<DeviceReport>,
+    /// The devices, in the model's order; none for those behind links.
+    pub devices: Vec<Option<DeviceReport>>,
     /// The scene at the end.
     pub output: Output,
     /// Steps.
@@ -88,8 +98,12 @@ pub struct DeviceReport {
     pub traits: Traits,
     /// What its updates met.
     pub counts: UpdateCounts,
+    /// What they got from the system.
+    pub granted: Granted,
     /// How they kept their time.
     pub timing: Timing,
+    /// How long it took from a motion to an effort that answers it.
+    pub answers: Spread,
 }
 
 /// What the force process's thread gives back.
@@ -116,8 +130,7 @@ impl Session {
         mut show: impl FnMut(&Frame) + Send,
     ) -> Result<(Report, Option<W>), Error> {
         self.check()?;
-        let Self { model, devices, movers, steps: most, pictures_hz, scheduling, patience_s } = self;
-        let start = Instant::now() + HEAD_START;
+        let Self { model, start, devices, movers, steps: most, pictures_hz, scheduling, patience_s } = self;
         let step_s = model.parameters().step_s;
         let (updates, seats) = connect(devices);
         let process = ForceProcess::new(model.clone(), seats, movers, patience_s);
@@ -131,19 +144,21 @@ impl Session {
             let picture_every =
                 if pictures_hz > 0.0 { (1.0 / (pictures_hz * step_s)).round().max(1.0) as u64 } else { 0 };
             let writing = writer.map(|writer| spawn(scope, "log", move || writer.run(logged))).transpose()?;
+            let here: Vec<bool> = updates.iter().map(Option::is_some).collect();
             let mut updating = Vec::new();
-            for (update, rate_hz) in updates {
+            for (update, rate_hz) in updates.into_iter().flatten() {
                 let asked = Scheduling {
                     priority: scheduling.priority.map(|p| p.saturating_sub(10).max(1)),
                     core: None,
                 };
-                let clock = Clock::new(start, 1.0 / rate_hz);
+                // Between two steps: what is told then is half a step old when it is used, and the answer half a step later.
+                let clock = Clock::new(start, 1.0 / rate_hz).later(0.5 * step_s);
                 updating
                     .push(spawn(scope, "haptic update", move || run_update(update, &clock, asked, ended))?);
             }
-            let clock = Clock::new(start + HEAD_START, step_s);
+            let clock = Clock::new(start, step_s);
             let parts = Running { process, clock, hand, showing, picture_every, most, stop, steps };
-            let forcing = spawn(scope, "force", move || parts.run(start, scheduling))?;
+            let forcing = spawn(scope, "force", move || parts.run(scheduling))?;
             let seeing = spawn(scope, "deformation", move || {
                 let mut timing = Timing::default();
                 while pictures_hz > 0.0 && !ended.load(Ordering::Relaxed) {
@@ -162,8 +177,11 @@ impl Session {
             ended.store(true, Ordering::Relaxed);
             logged.store(true, Ordering::Release);
             let forces = forces?;
-            let devices: Result<Vec<_>, _> =
-                updating.into_iter().map(|thread| join(thread, "haptic update")).collect();
+            let mut updated = updating.into_iter().map(|thread| join(thread, "haptic update"));
+            let devices: Result<Vec<_>, _> = here
+                .into_iter()
+                .map(|here| if here { updated.next().transpose() } else { Ok(None) })
+                .collect();
             let pictures = join(seeing, "deformation process")?;
             let written =
                 writing.map(|thread| join(thread, "log").and_then(|written| written)).transpose()?;
@@ -191,9 +209,9 @@ impl Session {
                 "the step is {step_s} s: in real time it is 0.0002 s to 0.01 s (5 kHz to 100 Hz; hands want 1 kHz)"
             ));
         }
-        for attached in &self.devices {
-            let rate = attached.rate_hz;
-            if !(50.0..=5000.0).contains(&rate) {
+        for device in &self.devices {
+            let SessionDevice::Here(Attached { rate_hz: rate, .. }) = device else { continue };
+            if !(50.0..=5000.0).contains(rate) {
                 return fail(format!("a device is to be updated at {rate} Hz, expected 50 to 5000"));
             }
         }
@@ -221,10 +239,11 @@ struct Running<'a> {
 }
 
 impl Running<'_> {
-    fn run(self, start: Instant, scheduling: Scheduling) -> Forces {
+    fn run(self, scheduling: Scheduling) -> Forces {
         let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps } = self;
         let granted = scheduling.claim();
         process.warm_up();
+        std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();
         let mut unsolved = 0;
         let period = clock.deadline(1) - clock.deadline(0);
@@ -233,7 +252,7 @@ impl Running<'_> {
         while most.is_none_or(|most| process.steps() < most) && !stop.load(Ordering::Relaxed) {
             let late = clock.wait(tick);
             let begun = Instant::now();
-            let output = process.cycle(begun.saturating_duration_since(start).as_secs_f64());
+            let output = process.cycle(clock.now_s());
             unsolved += u64::from(output.status.unsolved_objects > 0 || output.status.dropped_contacts > 0);
             let pictured = picture_every > 0 && process.steps().is_multiple_of(picture_every);
             if pictured {
@@ -265,14 +284,14 @@ impl Running<'_> {
     }
 }
 
-fn run_update(
+/// Update a device by the clock, on the thread that calls, until it has ended.
+pub fn run_update(
     mut update: HapticUpdate,
     clock: &Clock,
-    asked: Scheduling,
+    scheduling: Scheduling,
     ended: &AtomicBool,
 ) -> DeviceReport {
-    // What it got is that of the force process, or less.
-    let _ = asked.claim();
+    let granted = scheduling.claim();
     let mut timing = Timing::default();
     let mut tick = clock.next_after(0);
     while !ended.load(Ordering::Relaxed) {
@@ -282,26 +301,36 @@ fn run_update(
         timing.record(late, begun.elapsed());
         tick = clock.next_after(tick);
     }
-    DeviceReport { traits: update.traits(), counts: update.counts(), timing }
+    let answers = update.answers().clone();
+    DeviceReport { traits: update.traits(), counts: update.counts(), granted, timing, answers }
 }
 
-/// A haptic update and its rate for every device, and its seat in the force process.
-type Connected = (Vec<(HapticUpdate, f64)>, Vec<(ForcePort, DeviceMode)>);
+/// A haptic update and its rate for every device that is here, and the seats of all in the force process.
+type Connected = (Vec<Option<(HapticUpdate, f64)>>, Vec<(ForcePort, DeviceMode)>);
 
-fn connect(devices: Vec<Attached>) -> Connected {
-    let one = |attached: Attached| {
-        let Attached { device, mode, mount, rate_hz, limits, passive, by_button } = attached;
-        let traits = device.traits();
-        let (device_port, force_port) = port();
-        let controller =
-            PassivityController::new(traits.mass_kg, traits.resolution_m * mount.scale, 1.0 / rate_hz);
-        let limits = SafetyLimits { force_n: limits.force_n.min(traits.force_n), ..limits };
-        let safety = Safety::new(limits);
-        let update =
-            HapticUpdate::new(device, device_port, mount, safety, passive.then_some(controller), by_button);
-        ((update, rate_hz), (force_port, mode))
+fn connect(devices: Vec<SessionDevice>) -> Connected {
+    let one = |device: SessionDevice| match device {
+        SessionDevice::Here(attached) => {
+            let (device_port, force_port) = port();
+            let (mode, rate_hz) = (attached.mode, attached.rate_hz);
+            (Some((attached.update(device_port), rate_hz)), (force_port, mode))
+        }
+        SessionDevice::Linked(force_port, mode) => (None, (force_port, mode)),
     };
     devices.into_iter().map(one).unzip()
+}
+
+impl Attached {
+    /// Its haptic update, on a port: with a passivity controller if it is to be passive, and safety limits that its device
+    /// bears.
+    pub fn update(self, port: DevicePort) -> HapticUpdate {
+        let Self { device, mount, rate_hz, limits, passive, by_button, .. } = self;
+        let traits = device.traits();
+        let controller =
+            PassivityController::new(traits.mass_kg, traits.resolution_m * mount.scale, 1.0 / rate_hz);
+        let safety = Safety::new(SafetyLimits { force_n: limits.force_n.min(traits.force_n), ..limits });
+        HapticUpdate::new(device, port, mount, safety, passive.then_some(controller), by_button)
+    }
 }
 
 fn spawn<'scope, T: Send + 'scope>(

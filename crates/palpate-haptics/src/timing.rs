@@ -9,11 +9,15 @@ const LONGEST_NS: u64 = 10_000_000_000;
 /// How many digits of a time are kept.
 const DIGITS: u8 = 3;
 
-/// Lateness, compute time and overruns of a periodic process.
+/// Times as they come: recorded without allocating, told as percentiles.
 #[derive(Debug, Clone)]
+pub struct Spread(Histogram<u64>);
+
+/// Lateness, compute time and overruns of a periodic process.
+#[derive(Debug, Clone, Default)]
 pub struct Timing {
-    lateness: Histogram<u64>,
-    compute: Histogram<u64>,
+    lateness: Spread,
+    compute: Spread,
     /// Cycles that ended after the next one was due.
     pub overruns: u64,
     /// Those of them that computed longer than a period: not for waking up late.
@@ -35,13 +39,30 @@ pub struct Percentiles {
     pub max: f64,
 }
 
-impl Default for Timing {
+impl Default for Spread {
     fn default() -> Self {
-        let empty = || {
-            let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
-            histogram.unwrap_or_else(|_| unreachable!("constant bounds are good"))
-        };
-        Self { lateness: empty(), compute: empty(), overruns: 0, own_overruns: 0, skipped: 0 }
+        let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
+        Self(histogram.unwrap_or_else(|_| unreachable!("constant bounds are good")))
+    }
+}
+
+impl Spread {
+    /// Take in a time.
+    ///
+    /// # Real time
+    pub fn record(&mut self, time: Duration) {
+        self.0.saturating_record(time.as_nanos().min(u128::from(LONGEST_NS)) as u64);
+    }
+
+    /// How many there were.
+    pub fn count(&self) -> u64 {
+        self.0.len()
+    }
+
+    /// Their percentiles [µs].
+    pub fn percentiles_us(&self) -> Percentiles {
+        let at = |share: f64| self.0.value_at_quantile(share) as f64 * 1e-3;
+        Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: self.0.max() as f64 * 1e-3 }
     }
 }
 
@@ -50,8 +71,8 @@ impl Timing {
     ///
     /// # Real time
     pub fn record(&mut self, late: Duration, took: Duration) {
-        self.lateness.saturating_record(nanoseconds(late));
-        self.compute.saturating_record(nanoseconds(took));
+        self.lateness.record(late);
+        self.compute.record(took);
     }
 
     /// Take in a cycle that ended after the next was due, and how many ticks are passed over for it.
@@ -65,27 +86,18 @@ impl Timing {
 
     /// Cycles.
     pub fn cycles(&self) -> u64 {
-        self.compute.len()
+        self.compute.count()
     }
 
     /// How late cycles began.
     pub fn lateness_us(&self) -> Percentiles {
-        percentiles(&self.lateness)
+        self.lateness.percentiles_us()
     }
 
     /// How long they took.
     pub fn compute_us(&self) -> Percentiles {
-        percentiles(&self.compute)
+        self.compute.percentiles_us()
     }
-}
-
-fn nanoseconds(time: Duration) -> u64 {
-    time.as_nanos().min(u128::from(LONGEST_NS)) as u64
-}
-
-fn percentiles(histogram: &Histogram<u64>) -> Percentiles {
-    let at = |share: f64| histogram.value_at_quantile(share) as f64 * 1e-3;
-    Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: histogram.max() as f64 * 1e-3 }
 }
 
 #[cfg(test)]

@@ -61,7 +61,24 @@ pub(super) fn read_device(
         }
         None => DeviceMode::Touch,
     };
-    let path = source.motion_path(&device.path.file, Columns::Position)?;
+    let linked = device.linked.as_ref().filter(|linked| *linked.get_ref());
+    if let (Some(linked), true) = (linked, device.path.is_some() || device.simulated.is_some()) {
+        return source.fail(
+            linked.span(),
+            "a linked device has its path, or its hand, in the process that it is in: leave path and simulated out",
+        );
+    }
+    let path = match (&device.path, linked) {
+        (None, None) => {
+            return source.fail(
+                device.name.span(),
+                "the device needs path = { file = \"…\" }, or linked = true if it is in another process",
+            );
+        }
+        (entry, _) => {
+            entry.as_ref().map(|entry| source.motion_path(&entry.file, Columns::Position)).transpose()?
+        }
+    };
     let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
     let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated };
     remarks.extend(far_start(&device, objects));
@@ -69,24 +86,30 @@ pub(super) fn read_device(
     Ok(device)
 }
 
-/// A simulated device and the hand that holds it, by their names.
 fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), Failure> {
-    let (device, grip) = (entry.device.get_ref(), entry.grip.as_ref().map_or("firm", |grip| grip.get_ref()));
-    let Some(traits) = Traits::named(device) else {
-        let known = Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
-        return source.fail(entry.device.span(), format!("device is {device:?}, expected one of {known}"));
-    };
-    let hand = match grip {
-        "firm" => Hand::FIRM,
-        "light" => Hand::LIGHT,
-        "fingertip" => Hand::FINGERTIP,
-        other => {
-            let place = entry.grip.as_ref().map_or(0..0, toml::Spanned::span);
-            return source
-                .fail(place, format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\""));
-        }
+    let traits = known_device(entry.device.get_ref());
+    let traits = traits.or_else(|what| source.fail(entry.device.span(), what))?;
+    let hand = match &entry.grip {
+        None => Hand::FIRM,
+        Some(grip) => known_grip(grip.get_ref()).or_else(|what| source.fail(grip.span(), what))?,
     };
     Ok((traits, hand))
+}
+
+/// A device by its name.
+pub fn known_device(name: &str) -> Result<Traits, String> {
+    let known = || Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
+    Traits::named(name).ok_or_else(|| format!("device is {name:?}, expected one of {}", known()))
+}
+
+/// The hand that holds it, by its grip.
+pub fn known_grip(name: &str) -> Result<Hand, String> {
+    match name {
+        "firm" => Ok(Hand::FIRM),
+        "light" => Ok(Hand::LIGHT),
+        "fingertip" => Ok(Hand::FINGERTIP),
+        other => Err(format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\"")),
+    }
 }
 
 fn read_coupling(source: &Source, entry: &CouplingEntry) -> Result<Coupling, Failure> {
@@ -200,7 +223,7 @@ fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<String> {
     let DeviceMode::Held(grasp) = device.mode else { return None };
     let ModelObject { recording, start, .. } = &objects[grasp.object];
     let held = start.pose.world_from_body(recording.surface.rest_position(&grasp.point));
-    let distance = (device.path.at(0.0).position - held).length();
+    let distance = (device.path.as_ref()?.at(0.0).position - held).length();
     let pulled = match device.parameters.coupling {
         None => "the point is pulled there in the first step",
         Some(_) => "the coupling pulls it there from the first step on",

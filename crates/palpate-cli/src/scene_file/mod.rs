@@ -7,6 +7,7 @@ mod obstacles;
 mod place;
 
 use crate::Failure;
+pub use devices::{known_device, known_grip};
 use entries::SceneFile;
 use glam::DVec3;
 use palpate::{
@@ -45,8 +46,8 @@ pub struct SceneDevice {
     pub mode: DeviceMode,
     /// What it is.
     pub parameters: DeviceParameters,
-    /// Where it is over time; with a simulated hand, where that wants to be.
-    pub path: MotionPath,
+    /// Where it is over time; with a simulated hand, where that wants to be. None for a device in another process.
+    pub path: Option<MotionPath>,
     /// The device and the hand that follow the path as far as forces let them.
     pub simulated: Option<(Traits, Hand)>,
 }
@@ -67,6 +68,13 @@ pub const LARGEST: f64 = 1e6;
 
 /// An object's contact points answer one another: 9·n² numbers, here a gigabyte.
 const MOST_CONTACT_POINTS: i64 = 4096;
+
+impl SceneDevice {
+    /// Where its path is at a time [s]; at the origin without one.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.path.as_ref().map_or(DVec3::ZERO, |path| path.at(t).position)
+    }
+}
 
 impl SceneObstacle {
     /// Where it is at a time [s].
@@ -235,7 +243,7 @@ fn build(
 /// The files that a scene is read from.
 fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let recordings = file.object.iter().map(|object| &object.recording);
-    let paths = file.device.iter().map(|device| &device.path.file);
+    let paths = file.device.iter().filter_map(|device| Some(&device.path.as_ref()?.file));
     let obstacles = file.obstacle.iter().map(toml::Spanned::get_ref);
     let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));

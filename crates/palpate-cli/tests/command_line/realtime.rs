@@ -73,6 +73,45 @@ fn a_log_of_a_run_in_real_time_repeats_bit_for_bit_anywhere() {
 }
 
 #[test]
+fn devices_in_other_processes_come_over_a_link() {
+    let workplace = workplace();
+    let text =
+        workplace.text("fingers.toml").replace("path = { file = \"left_finger.csv\" }", "linked = true");
+    workplace.write("linked.toml", &text);
+    workplace.write("secret.txt", "a secret of this test\n");
+    workplace.write("wrong.txt", "a secret of another test\n");
+    // A port that is free now is most likely free a moment later.
+    let address = std::net::UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr());
+    let address = address.expect("a free port").to_string();
+    let run = [
+        "run",
+        "linked.toml",
+        "--realtime",
+        "--duration",
+        "4",
+        "--json",
+        "--secret",
+        "secret.txt",
+        "--listen",
+        &address,
+    ];
+    let device =
+        ["device", "left", "--path", "left_finger.csv", "--connect", &address, "--duration", "1", "--json"];
+    let (scene, finger) = std::thread::scope(|scope| {
+        let scene = scope.spawn(|| workplace.json(&run));
+        let finger = workplace.json(&[&device[..], &["--secret", "secret.txt"]].concat());
+        let stranger = workplace.fail(&[&device[..], &["--secret", "wrong.txt"]].concat());
+        assert_eq!(stranger, format!("{address} has another secret"));
+        (scene.join().expect("no panic"), finger)
+    });
+    assert!(finger["force_max_n"].as_f64() > Some(1e-3), "it feels the cube: {finger:#}");
+    assert!(finger["linked_s"].as_f64() > Some(0.3), "{finger:#}");
+    assert_eq!(scene["devices"][0]["kind"], "link");
+    assert!(scene["links"]["motions"].as_u64() > Some(100), "{scene:#}");
+    assert!(scene["links"]["refused"].as_u64() > Some(0), "{scene:#}");
+}
+
+#[test]
 fn the_paper_s_two_hands_run_in_real_time() {
     let workplace = Workplace::with_scene();
     let report = workplace.json(&[
@@ -105,6 +144,21 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
             "a device is to be updated at 0 Hz, expected 50 to 5000",
         ),
         (&["run", "scene.toml", "--realtime", "--pictures", "-1"], "--pictures is -1, expected 0 to 1000"),
+        (&["run", "scene.toml", "--secret", "a.txt"], "--secret is of a run in real time: add --realtime"),
+        (
+            &["device", "left", "--path", "left.csv", "--connect", "127.0.0.1:1", "--wait", "0.2"],
+            "no scene was found at 127.0.0.1:1 (",
+        ),
+        (&["device", "left", "--path", "none.csv"], "cannot read the path none.csv"),
+        (&["device", "left", "--path", "left.csv", "--rate", "1"], "--rate is 1 Hz, expected 50 to 5000"),
+        (
+            &["device", "left", "--path", "left.csv", "--simulated", "phantom"],
+            "device is \"phantom\", expected one of",
+        ),
+        (
+            &["device", "left", "--path", "left.csv", "--connect", "192.0.2.1:7402"],
+            "192.0.2.1 is reached from other machines: a link there needs a secret",
+        ),
         (&["run", "fingers.toml"], "the device \"right\" is held by a simulated hand"),
         (
             &["run", "scene.toml", "--realtime", "--log", "cube.palp"],
@@ -127,6 +181,16 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
             "line 25: device is \"phantom\", expected one of \"touch\", \"omega.3\", \"inverse3\"",
         ),
         ("\"light\"", "\"iron\"", "line 25: grip is \"iron\", expected \"firm\", \"light\" or \"fingertip\""),
+        (
+            "path = { file = \"left_finger.csv\" }\n",
+            "",
+            "line 12: the device needs path = { file = \"…\" }, or linked = true",
+        ),
+        (
+            "simulated = {",
+            "linked = true\nsimulated = {",
+            "line 25: a linked device has its path, or its hand, in the process",
+        ),
         ("step = 0.002", "step = 0.02", "the step is 0.02 s: in real time it is 0.0002 s to 0.01 s"),
     ] {
         workplace.write("wrong.toml", text.replace(from, to));

@@ -219,22 +219,21 @@ impl Body {
         }
     }
 
-    /// Residual compliance from a place to the surface node itself [m/N]. Costs a patch's nodes: for pictures.
-    pub(super) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
-        let mut sum = DMat3::ZERO;
+    /// The nodes that a force at a place acts on, with their weights; a node may come more than once.
+    pub(super) fn spread(&self, place: &Place, mut give: impl FnMut(usize, f64)) {
         for (corner, weight) in self.recording.surface.corners(&place.point) {
-            if weight == 0.0 {
-                continue;
-            }
             match self.patch(place.reading) {
-                None => sum += self.recording.residual.block(node, corner) * weight,
-                Some(patch) => {
-                    for (other, w) in patch.weights.of(corner) {
-                        sum += self.recording.residual.block(node, other) * (w * weight);
-                    }
-                }
+                _ if weight == 0.0 => {}
+                None => give(corner, weight),
+                Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
             }
         }
+    }
+
+    /// Residual compliance from a place to the surface node itself [m/N].
+    fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
+        let mut sum = DMat3::ZERO;
+        self.spread(place, |other, weight| sum += self.recording.residual.block(node, other) * weight);
         sum
     }
 }

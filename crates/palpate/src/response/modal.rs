@@ -282,6 +282,19 @@ impl SampledModes {
         out: &mut [DVec3],
     ) {
         let recording = &body.recording;
+        // All forces as forces on nodes: patches share theirs.
+        let mut loads = deformed.loaded.clone();
+        for Acting { place, force, .. } in &deformed.patches {
+            body.spread(place, |node, weight| loads.push((node as u32, *force * weight)));
+        }
+        loads.sort_unstable_by_key(|(node, _)| *node);
+        loads.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            if same {
+                kept.1 += next.1;
+            }
+            same
+        });
         for (node, u) in out.iter_mut().enumerate() {
             let row = |axis: usize| recording.modes.row(node, axis);
             *u = DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
@@ -290,10 +303,7 @@ impl SampledModes {
             }
             let dent =
                 |&(other, force): &(u32, DVec3)| recording.residual.block(node, other as usize) * force;
-            *u += deformed.loaded.iter().map(dent).sum::<DVec3>();
-            for Acting { place, force, .. } in &deformed.patches {
-                *u += body.residual_of_node(node, place) * *force;
-            }
+            *u += loads.iter().map(dent).sum::<DVec3>();
         }
     }
 }

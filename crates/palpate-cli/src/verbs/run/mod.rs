@@ -12,7 +12,7 @@ use glam::DVec3;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
-pub use realtime::RealtimeArguments;
+pub use realtime::{RealtimeArguments, device_line, percentiles, read_secret, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -81,11 +81,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Run a scene to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
-    if let Some(device) = scene.devices.iter().find(|device| device.simulated.is_some()) {
-        return Err(Failure(format!(
-            "the device {:?} is held by a simulated hand, which lives in real time: add --realtime",
-            device.name
-        )));
+    for SceneDevice { name, path, simulated, .. } in &scene.devices {
+        let what = match (path, simulated) {
+            (None, _) => "comes over a link",
+            (_, Some(_)) => "is held by a simulated hand",
+            _ => continue,
+        };
+        return Err(Failure(format!("the device {name:?} {what}, which lives in real time: add --realtime")));
     }
     let step_s = scene.model.parameters().step_s;
     let steps = count_steps(scene, arguments)?;
@@ -116,7 +118,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
 /// How many steps: as many as asked for, or to the end of the longest path.
 fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let step_s = scene.model.parameters().step_s;
-    let devices = scene.devices.iter().map(|device| &device.path);
+    let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
     let paths = devices.chain(scene.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
     let longest = paths.map(|path| path.end()).fold(0.0, f64::max);
     let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });
@@ -136,8 +138,7 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
 
 fn input_at(scene: &Scene, time: f64) -> Input {
     let devices = scene.devices.iter();
-    let devices =
-        devices.map(|device| DeviceInput { position: device.path.at(time).position, mode: device.mode });
+    let devices = devices.map(|device| DeviceInput { position: device.at(time), mode: device.mode });
     Input {
         devices: devices.collect(),
         obstacles: scene.obstacles.iter().map(|obstacle| obstacle.at(time)).collect(),
@@ -146,7 +147,7 @@ fn input_at(scene: &Scene, time: f64) -> Input {
 
 fn move_input(scene: &Scene, time: f64, input: &mut Input) {
     for (device, entry) in scene.devices.iter().zip(&mut input.devices) {
-        entry.position = device.path.at(time).position;
+        entry.position = device.at(time);
     }
     for (obstacle, pose) in scene.obstacles.iter().zip(&mut input.obstacles) {
         *pose = obstacle.at(time);

@@ -10,14 +10,19 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{Pose, State};
 use palpate_haptics::device::{Device, Mount, Scripted, Simulated};
+use palpate_haptics::link::{LinkCounts, LinkServer, Secret};
 use palpate_haptics::log::{LogHand, LogWriter, Names};
-use palpate_haptics::{Attached, Mover, Percentiles, Report, SafetyLimits, Scheduling, Session, Timing};
+use palpate_haptics::{
+    Attached, DevicePort, DeviceReport, MotionPath, Mover, Percentiles, Report, SafetyLimits, Scheduling,
+    Session, SessionDevice, Timing, port,
+};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How a run in real time goes.
 #[derive(Args, Debug, Clone, Default)]
@@ -37,6 +42,12 @@ pub struct RealtimeArguments {
     /// The core that the force process stays on, counted from 0; by default the last one
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
+    /// Where devices with `linked = true` are waited for, which `palpate device` brings
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
+    pub listen: Option<SocketAddr>,
+    /// A file with the secret that both ends of a link know; needed between machines
+    #[arg(long, value_name = "FILE")]
+    pub secret: Option<PathBuf>,
     /// Leave the passivity controllers out
     #[arg(long)]
     pub not_passive: bool,
@@ -58,6 +69,8 @@ impl RealtimeArguments {
             "--log"
         } else if self.core.is_some() {
             "--core"
+        } else if self.secret.is_some() {
+            "--secret"
         } else if self.not_passive {
             "--not-passive"
         } else {
@@ -88,9 +101,22 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     };
     let log = options.log.as_deref().map(|path| begin_log(scene, arguments, path, names)).transpose()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let start = Instant::now();
+    let mut linked = Vec::new();
+    let mut seat = |device: &SceneDevice| match &device.path {
+        Some(path) => SessionDevice::Here(attach(device, path, options)),
+        None => {
+            let (device_port, force_port) = port();
+            linked.push((device.name.clone(), device_port));
+            SessionDevice::Linked(force_port, device.mode)
+        }
+    };
+    let devices = scene.devices.iter().map(&mut seat).collect();
+    let server = listen(options, linked, start)?;
     let session = Session {
         model: scene.model.clone(),
-        devices: scene.devices.iter().map(|device| attach(device, options)).collect(),
+        start,
+        devices,
         movers: movers(scene),
         steps: Some(steps as u64),
         pictures_hz: options.pictures,
@@ -98,13 +124,14 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         patience_s: PATIENCE_S,
     };
     let (report, file) = watch(session, log, steps)?;
+    let links = server.map(|server| server.counts());
     if let Some(file) = file {
         file.finish()?;
     }
     if arguments.outputs.json {
-        print_json(&json(scene, &report))
+        print_json(&json(scene, &report, links))
     } else {
-        print(&text(scene, &report, options.log.as_deref()))
+        print(&text(scene, &report, links, options.log.as_deref()))
     }
 }
 
@@ -136,10 +163,35 @@ fn watch(
     })
 }
 
-fn attach(device: &SceneDevice, options: &RealtimeArguments) -> Attached {
+/// Listen for the devices that come over links, if there are any.
+fn listen(
+    options: &RealtimeArguments,
+    ports: Vec<(String, DevicePort)>,
+    start: Instant,
+) -> Result<Option<LinkServer>, Failure> {
+    let Some(address) = options.listen.filter(|_| !ports.is_empty()) else { return Ok(None) };
+    let names: Vec<&str> = ports.iter().map(|(name, _)| name.as_str()).collect();
+    let text = format!(
+        "waiting at {address} for {}: palpate device {} --connect {address} …",
+        names.join(", "),
+        names[0]
+    );
+    let server = LinkServer::new(address, &read_secret(options.secret.as_deref())?, ports, start)?;
+    crate::tell(&text);
+    Ok(Some(server))
+}
+
+/// The secret in a file; none without one.
+pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
+    let Some(file) = file else { return Ok(Secret::none()) };
+    let text = std::fs::read_to_string(file).map_err(|e| Failure::file("read the secret", file, &e))?;
+    Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
+}
+
+fn attach(device: &SceneDevice, path: &MotionPath, options: &RealtimeArguments) -> Attached {
     let driver: Box<dyn Device> = match device.simulated {
-        Some((traits, hand)) => Box::new(Simulated::new(traits, hand, device.path.clone())),
-        None => Box::new(Scripted::new(device.path.clone())),
+        Some((traits, hand)) => Box::new(Simulated::new(traits, hand, path.clone())),
+        None => Box::new(Scripted::new(path.clone())),
     };
     let simulated = device.simulated.is_some();
     // A path feels nothing: whatever its force is, nobody has to be kept from it.
@@ -194,11 +246,13 @@ fn begin_log(
     Ok(LogWriter::new(file, names, facts, &files, (&scene.model, &state, &input))?)
 }
 
-fn percentiles(of: Percentiles) -> Value {
+/// Percentiles [µs] for a program.
+pub fn percentiles(of: Percentiles) -> Value {
     json!({ "p50": of.p50, "p99": of.p99, "p999": of.p999, "max": of.max })
 }
 
-fn timing(of: &Timing) -> Value {
+/// How a process kept its time, for a program.
+pub fn timing(of: &Timing) -> Value {
     json!({
         "cycles": of.cycles(),
         "compute_us": percentiles(of.compute_us()),
@@ -210,8 +264,9 @@ fn timing(of: &Timing) -> Value {
 }
 
 /// For a program.
-fn json(scene: &Scene, report: &Report) -> Value {
+fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) -> Value {
     let devices = scene.devices.iter().zip(&report.devices).map(|(device, own)| {
+        let Some(own) = own else { return json!({ "name": device.name, "kind": "link" }) };
         let (counts, safety) = (own.counts, own.counts.safety);
         json!({
             "name": device.name,
@@ -221,6 +276,7 @@ fn json(scene: &Scene, report: &Report) -> Value {
             "updates": counts.updates,
             "failed": counts.failed,
             "timing": timing(&own.timing),
+            "answer_us": percentiles(own.answers.percentiles_us()),
             "passivity": { "acted": counts.passivity_acted, "missing_max_j": counts.passivity_worst_j },
             "safety": {
                 "clamped": safety.clamped,
@@ -245,12 +301,19 @@ fn json(scene: &Scene, report: &Report) -> Value {
         "unsolved_steps": report.unsolved,
         "devices": devices.collect::<Vec<_>>(),
         "objects": objects.collect::<Vec<_>>(),
+        "links": links.map(|links| json!({
+            "connected": links.connected,
+            "refused": links.refused,
+            "motions": links.motions,
+            "old": links.old,
+            "garbage": links.garbage,
+        })),
         "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed })),
     })
 }
 
 /// The same for a person.
-fn text(scene: &Scene, report: &Report, log: Option<&Path>) -> String {
+fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, log: Option<&Path>) -> String {
     let step_s = scene.model.parameters().step_s;
     let line = |name: &str, of: Percentiles| {
         format!("  {name:<22} {:>9.1} {:>9.1} {:>9.1} {:>9.1}\n", of.p50, of.p99, of.p999, of.max)
@@ -272,40 +335,22 @@ fn text(scene: &Scene, report: &Report, log: Option<&Path>) -> String {
     if report.pictures.cycles() > 0 {
         out += &line("deformation: compute", report.pictures.compute_us());
     }
-    for (device, own) in scene.devices.iter().zip(&report.devices) {
-        out += &line(&format!("{}: lateness", device.name), own.timing.lateness_us());
+    let here = || {
+        scene.devices.iter().zip(&report.devices).filter_map(|(device, own)| Some((device, own.as_ref()?)))
+    };
+    for (device, own) in here() {
+        out += &line(&format!("{}: motion to force", device.name), own.answers.percentiles_us());
     }
     out += "\n";
     out += &overruns(report, step_s);
-    for (device, own) in scene.devices.iter().zip(&report.devices) {
-        let (counts, safety) = (own.counts, own.counts.safety);
-        out += &format!("  {:<12} {}, {:.4} N at most", device.name, own.traits.kind, counts.force_max_n);
-        if own.traits.force_n.is_finite() {
-            out += &format!(
-                "; gave the hand {:+.3e} J; passivity acted in {} of {} updates",
-                counts.given_j, counts.passivity_acted, counts.updates
-            );
-            let faults = [
-                (safety.clamped, "clamped"),
-                (safety.slewed, "slewed"),
-                (safety.stale, "stale"),
-                (safety.too_fast, "too fast"),
-                (safety.not_finite, "no number"),
-                (safety.trips, "trips"),
-                (counts.failed, "failed"),
-            ];
-            let met: Vec<String> = faults
-                .iter()
-                .filter(|(count, _)| *count > 0)
-                .map(|(count, what)| format!("{count} {what}"))
-                .collect();
-            out += &if met.is_empty() {
-                "; safety met nothing".to_string()
-            } else {
-                format!("; safety: {}", met.join(", "))
-            };
-        }
-        out += "\n";
+    for (device, own) in here() {
+        out += &format!("  {:<12} {}\n", device.name, device_line(own));
+    }
+    if let Some(LinkCounts { connected, refused, motions, old, garbage }) = links {
+        out += &format!(
+            "  links        {connected} devices came, {refused} were refused; {motions} motions, {old} late or doubled, \
+             {garbage} no motions\n"
+        );
     }
     if report.unsolved > 0 {
         out += &format!(
@@ -324,6 +369,35 @@ fn text(scene: &Scene, report: &Report, log: Option<&Path>) -> String {
         out += "\n";
     }
     out
+}
+
+/// What a device gave and met, in a line.
+pub fn device_line(own: &DeviceReport) -> String {
+    let (counts, safety) = (own.counts, own.counts.safety);
+    let mut out = format!("{}, {:.4} N at most", own.traits.kind, counts.force_max_n);
+    if own.traits.force_n.is_infinite() {
+        return out;
+    }
+    out += &format!(
+        "; gave the hand {:+.3e} J; passivity acted in {} of {} updates",
+        counts.given_j, counts.passivity_acted, counts.updates
+    );
+    let faults = [
+        (safety.clamped, "clamped"),
+        (safety.slewed, "slewed"),
+        (safety.stale, "stale"),
+        (safety.too_fast, "too fast"),
+        (safety.not_finite, "no number"),
+        (safety.trips, "trips"),
+        (counts.failed, "failed"),
+    ];
+    let met = faults.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    let met: Vec<String> = met.collect();
+    out + &if met.is_empty() {
+        "; safety met nothing".to_string()
+    } else {
+        format!("; safety: {}", met.join(", "))
+    }
 }
 
 /// What became of cycles that were not done when the next was due.

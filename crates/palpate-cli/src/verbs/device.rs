@@ -1,0 +1,226 @@
+//! `palpate device`: a device here, for a scene in another process or on another machine.
+
+use crate::Failure;
+use crate::scene_file::{known_device, known_grip};
+use crate::verbs::run::{device_line, percentiles, read_secret, timing};
+use crate::verbs::{print, print_json};
+use crate::whole_file::stop_on_interrupt;
+use clap::Args;
+use palpate::DeviceMode;
+use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated};
+use palpate_haptics::link::{LinkClient, LinkState};
+use palpate_haptics::{
+    Attached, Clock, Columns, DeviceReport, MotionPath, SafetyLimits, Scheduling, run_update,
+};
+use serde_json::json;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Run a haptic device here for a scene that runs elsewhere
+///
+/// The scene has a device of this name with `linked = true`, and runs with `palpate run SCENE --realtime`. This process reads the
+/// device, sends where the hand is, and pushes the hand with what comes back, as far as it is safe and passive. If the link
+/// breaks, the force goes away at once, and comes back when the link does.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = "On one machine:
+  palpate run scene.toml --realtime --duration 60
+  palpate device left --path left.csv --simulated touch
+Between machines, with a secret that both know:
+  palpate run scene.toml --realtime --listen 0.0.0.0:7402 --secret secret.txt
+  palpate device left --path left.csv --connect 192.168.1.20:7402 --secret secret.txt")]
+pub struct Arguments {
+    /// The device's name in the scene
+    pub name: String,
+    /// Where the scene runs
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
+    pub connect: SocketAddr,
+    /// Where the hand goes: t,x,y,z in s and m, world
+    #[arg(long, value_name = "FILE.csv")]
+    pub path: PathBuf,
+    /// A simulated device in a simulated hand that wants to be where the path is: touch, omega.3 or inverse3
+    #[arg(long, value_name = "DEVICE")]
+    pub simulated: Option<String>,
+    /// How the simulated hand holds it: firm, light or fingertip
+    #[arg(long, value_name = "GRIP", requires = "simulated")]
+    pub grip: Option<String>,
+    /// Updates per second [Hz]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
+    pub rate: f64,
+    /// How long [s], from when the link is there; by default to the end of the path
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// How long a scene is looked for [s]
+    #[arg(long, value_name = "S", default_value_t = 30.0, allow_negative_numbers = true)]
+    pub wait: f64,
+    /// A file with the secret that both ends of the link know; needed between machines
+    #[arg(long, value_name = "FILE")]
+    pub secret: Option<PathBuf>,
+    /// Leave the passivity controller out
+    #[arg(long)]
+    pub not_passive: bool,
+    /// One JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Real-time priority of the haptic update.
+const PRIORITY: u8 = 70;
+
+/// Between two looks at the link.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Run the verb.
+pub fn device(arguments: &Arguments) -> Result<(), Failure> {
+    let text = std::fs::read_to_string(&arguments.path)
+        .map_err(|e| Failure::file("read the path", &arguments.path, &e))?;
+    let path = MotionPath::parse(&text, Columns::Position)
+        .map_err(|what| Failure(format!("path {}: {what}", arguments.path.display())))?;
+    let duration = arguments.duration.unwrap_or(path.end());
+    if !(duration > 0.0 && duration < 1e8) {
+        return Err(Failure(format!("the duration is {duration} s, expected above 0: --duration gives one")));
+    }
+    if !(50.0..=5000.0).contains(&arguments.rate) {
+        return Err(Failure(format!("--rate is {} Hz, expected 50 to 5000", arguments.rate)));
+    }
+    // Whatever is wrong with it is told before anybody is looked for.
+    attach(arguments, path.clone())?;
+    let start = Instant::now();
+    let secret = read_secret(arguments.secret.as_deref())?;
+    let (port, client) = LinkClient::new(arguments.connect, &secret, &arguments.name, start)?;
+    let stop = stop_on_interrupt();
+    find(&client, arguments, start, stop)?;
+    // The hand sets out when there is something to touch.
+    let found = start.elapsed().as_secs_f64();
+    let update = attach(arguments, path.later(found))?.update(port);
+    let (clock, ended) = (Clock::new(start, 1.0 / arguments.rate), AtomicBool::new(false));
+    let scheduling = Scheduling { priority: Some(PRIORITY), core: None };
+    let (report, linked) = std::thread::scope(|scope| {
+        let updating = scope.spawn(|| run_update(update, &clock, scheduling, &ended));
+        let linked = watch(&client, arguments, found + duration, start, stop);
+        ended.store(true, Ordering::Relaxed);
+        let report = updating.join().map_err(|_| Failure("the haptic update has ended by a bug".to_string()));
+        (report, linked)
+    });
+    let (report, linked) = (report?, linked?);
+    if arguments.json {
+        print_json(&json(arguments, &report, linked))
+    } else {
+        print(&text_of(arguments, &report))
+    }
+}
+
+fn attach(arguments: &Arguments, path: MotionPath) -> Result<Attached, Failure> {
+    let hand = arguments.grip.as_deref().map_or(Ok(Hand::FIRM), known_grip).map_err(Failure)?;
+    let mut limits = SafetyLimits {
+        force_n: f64::MAX,
+        slew_n_s: f64::MAX,
+        speed_m_s: f64::MAX,
+        ..SafetyLimits::default()
+    };
+    let device: Box<dyn Device> = match arguments.simulated.as_deref() {
+        None => Box::new(Scripted::new(path)),
+        Some(name) => {
+            let traits = known_device(name).map_err(Failure)?;
+            limits = SafetyLimits { force_n: traits.force_n, ..SafetyLimits::default() };
+            Box::new(Simulated::new(traits, hand, path))
+        }
+    };
+    Ok(Attached {
+        device,
+        // The scene says what it does there.
+        mode: DeviceMode::Touch,
+        mount: Mount::default(),
+        rate_hz: arguments.rate,
+        limits,
+        passive: arguments.simulated.is_some() && !arguments.not_passive,
+        by_button: false,
+    })
+}
+
+/// Wait until the link is there.
+fn find(
+    client: &LinkClient,
+    arguments: &Arguments,
+    start: Instant,
+    stop: &AtomicBool,
+) -> Result<(), Failure> {
+    let Arguments { connect, name, wait, .. } = arguments;
+    loop {
+        let why = match client.state() {
+            LinkState::Linked => {
+                crate::tell(&format!("linked to {connect} as {name}"));
+                return Ok(());
+            }
+            LinkState::Refused(why) => return Err(Failure(why)),
+            LinkState::Seeking(why) => why,
+        };
+        if start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || stop.load(Ordering::Relaxed) {
+            return Err(Failure(format!(
+                "no scene was found at {connect} ({why}): start one with `palpate run SCENE.toml --realtime`, in which the \
+                 device {name:?} has linked = true"
+            )));
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Say how the link is until the time is over; gives for how long [s] it was there.
+fn watch(
+    client: &LinkClient,
+    arguments: &Arguments,
+    end_s: f64,
+    start: Instant,
+    stop: &AtomicBool,
+) -> Result<f64, Failure> {
+    let (mut last, mut linked) = (LinkState::Linked, 0.0);
+    while start.elapsed().as_secs_f64() < end_s && !stop.load(Ordering::Relaxed) {
+        let state = client.state();
+        match &state {
+            LinkState::Linked => linked += LOOK.as_secs_f64(),
+            LinkState::Refused(why) => return Err(Failure(why.clone())),
+            LinkState::Seeking(_) => {}
+        }
+        if last != state {
+            crate::tell(&match &state {
+                LinkState::Seeking(why) => format!("looking for {}: {why}", arguments.connect),
+                _ => format!("linked to {} again", arguments.connect),
+            });
+        }
+        last = state;
+        std::thread::sleep(LOOK);
+    }
+    Ok(linked)
+}
+
+fn json(arguments: &Arguments, report: &DeviceReport, linked_s: f64) -> serde_json::Value {
+    json!({
+        "name": arguments.name,
+        "kind": report.traits.kind,
+        "linked_s": linked_s,
+        "updates": report.counts.updates,
+        "force_max_n": report.counts.force_max_n,
+        "given_j": report.counts.given_j,
+        "granted": report.granted.to_string(),
+        "timing": timing(&report.timing),
+        "answer_us": percentiles(report.answers.percentiles_us()),
+    })
+}
+
+fn text_of(arguments: &Arguments, report: &DeviceReport) -> String {
+    let answers = report.answers.percentiles_us();
+    format!(
+        "{} updates at {:.0} Hz; {}\n  {:<12} {}\n  motion to force {:.0} µs median; 99 % below {:.0}, 99.9 % below {:.0}, all \
+         below {:.0}\n",
+        report.counts.updates,
+        arguments.rate,
+        report.granted,
+        arguments.name,
+        device_line(report),
+        answers.p50,
+        answers.p99,
+        answers.p999,
+        answers.max
+    )
+}
