@@ -150,6 +150,11 @@ impl HapticUpdate {
         self.push(force, now_s);
     }
 
+    /// Push the hand no more.
+    pub fn let_go(&mut self, now_s: f64) {
+        self.push(DVec3::ZERO, now_s);
+    }
+
     fn push(&mut self, force: DVec3, now_s: f64) {
         if let Some(passivity) = &mut self.passivity {
             passivity.hold(force);

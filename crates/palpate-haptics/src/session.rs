@@ -106,6 +106,15 @@ pub struct DeviceReport {
     pub answers: Spread,
 }
 
+/// Sets flags when it goes.
+struct SetWhenDropped<'a>(&'a [AtomicBool; 2]);
+
+impl Drop for SetWhenDropped<'_> {
+    fn drop(&mut self) {
+        self.0.iter().for_each(|flag| flag.store(true, Ordering::Release));
+    }
+}
+
 /// What the force process's thread gives back.
 struct Forces {
     process: ForceProcess,
@@ -136,11 +145,11 @@ impl Session {
         let process = ForceProcess::new(model.clone(), seats, movers, patience_s);
         let (showing, mut pictures) = DeformationProcess::new(model.clone(), process.state());
         let (hand, writer) = log.unzip();
-        let logged = AtomicBool::new(false);
-        let logged = &logged;
-        let ended = AtomicBool::new(false);
-        let ended = &ended;
+        let flags = [AtomicBool::new(false), AtomicBool::new(false)];
+        let [ended, logged] = &flags;
         std::thread::scope(|scope| {
+            // However it ends, no thread goes on alone.
+            let over = SetWhenDropped(&flags);
             let picture_every =
                 if pictures_hz > 0.0 { (1.0 / (pictures_hz * step_s)).round().max(1.0) as u64 } else { 0 };
             let writing = writer.map(|writer| spawn(scope, "log", move || writer.run(logged))).transpose()?;
@@ -174,8 +183,7 @@ impl Session {
                 timing
             })?;
             let forces = join(forcing, "force process");
-            ended.store(true, Ordering::Relaxed);
-            logged.store(true, Ordering::Release);
+            drop(over);
             let forces = forces?;
             let mut updated = updating.into_iter().map(|thread| join(thread, "haptic update"));
             let devices: Result<Vec<_>, _> = here
@@ -263,8 +271,14 @@ impl Running<'_> {
                 hand.take(|record| {
                     (record.step, record.tick, record.late, record.took) =
                         (process.steps(), tick, late, took);
-                    record.take(process.input(), process.state(), pictured);
+                    record.take(process.input(), process.state());
                 });
+                if pictured {
+                    hand.take_picture(|picture| {
+                        picture.step = process.steps();
+                        picture.take(process.input(), process.state());
+                    });
+                }
             }
             steps.store(process.steps(), Ordering::Relaxed);
             timing.record(late, took);
@@ -301,6 +315,7 @@ pub fn run_update(
         timing.record(late, begun.elapsed());
         tick = clock.next_after(tick);
     }
+    update.let_go(clock.now_s());
     let answers = update.answers().clone();
     DeviceReport { traits: update.traits(), counts: update.counts(), granted, timing, answers }
 }

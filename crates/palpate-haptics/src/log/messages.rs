@@ -1,6 +1,6 @@
 //! The messages of a log as JSON.
 
-use super::record::Record;
+use super::record::{Picture, Record};
 use glam::{DQuat, DVec3};
 use palpate::{Against, DeviceMode, EnergyLedger, Pose};
 use serde::ser::SerializeMap;
@@ -213,7 +213,7 @@ pub(super) struct ContactMessage<'a> {
 }
 
 pub(super) fn contacts<'a>(
-    record: &Record,
+    picture: &Picture,
     names: &'a Names,
 ) -> HashMap<&'static str, Vec<ContactMessage<'a>>> {
     let name = |list: &'a [String], at: usize| list.get(at).map_or("", String::as_str);
@@ -230,11 +230,11 @@ pub(super) fn contacts<'a>(
         gap: contact.gap,
         slip_speed: contact.slip_speed,
     };
-    HashMap::from([("contacts", record.contacts.iter().map(one).collect())])
+    HashMap::from([("contacts", picture.contacts.iter().map(one).collect())])
 }
 
 /// `/modes`.
-pub(super) struct ModesOf<'a>(pub &'a Record, pub &'a Names);
+pub(super) struct ModesOf<'a>(pub &'a Picture, pub &'a Names);
 
 impl Serialize for ModesOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -243,11 +243,11 @@ impl Serialize for ModesOf<'_> {
 }
 
 /// `/tf`: foxglove.FrameTransforms.
-pub(super) fn transforms(record: &Record, names: &Names, nanoseconds: u64) -> serde_json::Value {
+pub(super) fn transforms(picture: &Picture, names: &Names, nanoseconds: u64) -> serde_json::Value {
     let stamp =
         serde_json::json!({ "sec": nanoseconds / 1_000_000_000, "nsec": nanoseconds % 1_000_000_000 });
-    let objects = names.objects.iter().zip(record.objects.iter().map(|object| object.pose));
-    let obstacles = names.obstacles.iter().zip(record.input.obstacles.iter().copied());
+    let objects = names.objects.iter().zip(picture.objects.iter().copied());
+    let obstacles = names.obstacles.iter().zip(picture.obstacles.iter().copied());
     let one = |(name, pose): (&String, Pose)| {
         let Placement { position, orientation } = pose.into();
         serde_json::json!({

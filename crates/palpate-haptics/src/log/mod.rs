@@ -17,5 +17,5 @@ mod writer;
 
 pub use messages::Names;
 pub use reader::{LoggedStep, Reader};
-pub use record::Record;
+pub use record::{Picture, Record};
 pub use writer::{LogHand, LogSummary, LogWriter};

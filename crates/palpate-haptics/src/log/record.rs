@@ -1,7 +1,7 @@
 //! What goes from the force process to the log, in buffers that are made once and go round.
 
 use palpate::{
-    ContactOutput, DeviceOutput, EnergyLedger, Input, Model, ObjectOutput, Output, State, StepStatus,
+    ContactOutput, DeviceOutput, EnergyLedger, Input, Model, ObjectOutput, Output, Pose, State, StepStatus,
 };
 use std::time::Duration;
 
@@ -28,8 +28,19 @@ pub struct Record {
     pub energy: EnergyLedger,
     /// See `devices`.
     pub status: StepStatus,
-    /// Whether what follows was taken too: for pictures.
-    pub pictured: bool,
+}
+
+/// What a picture of a step takes.
+#[derive(Debug)]
+pub struct Picture {
+    /// Steps since the start.
+    pub step: u64,
+    /// Simulated time at its end [s].
+    pub time_s: f64,
+    /// Where the objects and the obstacles are.
+    pub objects: Vec<Pose>,
+    /// See `objects`.
+    pub obstacles: Vec<Pose>,
     /// Contacts that carry force.
     pub contacts: Vec<ContactOutput>,
     /// Modal coordinates q [m·√kg] of every object.
@@ -38,9 +49,8 @@ pub struct Record {
 
 impl Record {
     /// Room for the steps of a scene.
-    pub fn new(model: &Model, state: &State, input: &Input) -> Self {
+    pub fn new(state: &State, input: &Input) -> Self {
         let output = state.output();
-        let modes = (0..model.recordings().count()).map(|object| vec![0.0; state.modal_state(object).len()]);
         Self {
             step: 0,
             tick: 0,
@@ -52,29 +62,51 @@ impl Record {
             objects: output.objects.clone(),
             energy: output.energy,
             status: output.status,
-            pictured: false,
+        }
+    }
+
+    /// Take over a step.
+    ///
+    /// # Real time
+    /// No allocation.
+    pub fn take(&mut self, input: &Input, state: &State) {
+        let Output { time_s, devices, objects, energy, status, .. } = state.output();
+        (self.time_s, self.energy, self.status) = (*time_s, *energy, *status);
+        self.input.devices.copy_from_slice(&input.devices);
+        self.input.obstacles.copy_from_slice(&input.obstacles);
+        self.devices.copy_from_slice(devices);
+        self.objects.copy_from_slice(objects);
+    }
+}
+
+impl Picture {
+    /// Room for the pictures of a scene.
+    pub fn new(model: &Model, state: &State, input: &Input) -> Self {
+        let output = state.output();
+        let modes = (0..model.recordings().count()).map(|object| vec![0.0; state.modal_state(object).len()]);
+        Self {
+            step: 0,
+            time_s: 0.0,
+            objects: output.objects.iter().map(|object| object.pose).collect(),
+            obstacles: input.obstacles.clone(),
             contacts: Vec::with_capacity(output.contacts.capacity()),
             modes: modes.collect(),
         }
     }
 
-    /// Take over a step, and what a picture takes if it is wanted.
+    /// Take over a step.
     ///
     /// # Real time
     /// No allocation.
-    pub fn take(&mut self, input: &Input, state: &State, pictured: bool) {
-        let Output { time_s, devices, objects, contacts, energy, status } = state.output();
-        (self.time_s, self.energy, self.status, self.pictured) = (*time_s, *energy, *status, pictured);
-        self.input.devices.copy_from_slice(&input.devices);
-        self.input.obstacles.copy_from_slice(&input.obstacles);
-        self.devices.copy_from_slice(devices);
-        self.objects.copy_from_slice(objects);
+    pub fn take(&mut self, input: &Input, state: &State) {
+        let output = state.output();
+        self.time_s = output.time_s;
+        self.objects.iter_mut().zip(&output.objects).for_each(|(pose, object)| *pose = object.pose);
+        self.obstacles.copy_from_slice(&input.obstacles);
         self.contacts.clear();
-        if pictured {
-            self.contacts.extend_from_slice(contacts);
-            for (object, modes) in self.modes.iter_mut().enumerate() {
-                modes.iter_mut().zip(state.modal_state(object)).for_each(|(q, mode)| *q = mode.q);
-            }
+        self.contacts.extend_from_slice(&output.contacts);
+        for (object, modes) in self.modes.iter_mut().enumerate() {
+            modes.iter_mut().zip(state.modal_state(object)).for_each(|(q, mode)| *q = mode.q);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Writing a log beside the force process, by a thread that can't disturb it.
 
 use super::messages::{ModesOf, Names, StepOf, contacts, transforms};
-use super::record::Record;
+use super::record::{Picture, Record};
 use crate::error::Error;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
@@ -13,25 +13,75 @@ use std::io::{Seek, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// Steps that may wait for the writer.
-const WAITING: usize = 8192;
+/// Steps and pictures that may wait for the writer.
+const STEPS_WAITING: usize = 8192;
+const PICTURES_WAITING: usize = 64;
 
 /// How long the writer sleeps when there is nothing to write.
 const NAP: Duration = Duration::from_millis(5);
 
-/// The force process's end of a log: records that go round.
-pub struct LogHand {
-    full: rtrb::Producer<Box<Record>>,
-    spare: rtrb::Consumer<Box<Record>>,
-    /// Steps for which the writer was too slow.
+/// One end of a round: what is full goes one way, what is spare comes back.
+struct Giver<T> {
+    full: rtrb::Producer<Box<T>>,
+    spare: rtrb::Consumer<Box<T>>,
+    /// How often nothing was spare.
     missed: u64,
+}
+
+/// The other end.
+struct Taker<T> {
+    full: rtrb::Consumer<Box<T>>,
+    spare: rtrb::Producer<Box<T>>,
+}
+
+/// A round of so many.
+fn round<T>(places: usize, make: impl Fn() -> T) -> (Giver<T>, Taker<T>) {
+    let (full_in, full_out) = rtrb::RingBuffer::new(places);
+    let (mut spare_in, spare_out) = rtrb::RingBuffer::new(places);
+    // Not clones, whose buffers would have no room.
+    while spare_in.push(Box::new(make())).is_ok() {}
+    (Giver { full: full_in, spare: spare_out, missed: 0 }, Taker { full: full_out, spare: spare_in })
+}
+
+impl<T> Giver<T> {
+    fn give(&mut self, fill: impl FnOnce(&mut T)) {
+        let Ok(mut one) = self.spare.pop() else {
+            self.missed += 1;
+            return;
+        };
+        fill(&mut one);
+        // There are no more of them than places.
+        self.missed += u64::from(self.full.push(one).is_err());
+    }
+}
+
+impl<T> Taker<T> {
+    fn each<E>(&mut self, mut take: impl FnMut(&T) -> Result<(), E>) -> Result<(), E> {
+        while let Ok(one) = self.full.pop() {
+            take(&one)?;
+            // There are no more of them than places.
+            let _ = self.spare.push(one);
+        }
+        Ok(())
+    }
+}
+
+/// The force process's end of a log.
+pub struct LogHand {
+    steps: Giver<Record>,
+    pictures: Giver<Picture>,
 }
 
 /// The writer's end.
 pub struct LogWriter<W: Write + Seek> {
+    steps: Taker<Record>,
+    pictures: Taker<Picture>,
+    out: Out<W>,
+}
+
+/// The file, and what it takes to write to it.
+struct Out<W: Write + Seek> {
     writer: Writer<W>,
-    full: rtrb::Consumer<Box<Record>>,
-    spare: rtrb::Producer<Box<Record>>,
     names: Names,
     channels: Channels,
     text: Vec<u8>,
@@ -61,18 +111,20 @@ impl LogHand {
     /// # Real time
     /// No allocation, lock or system call.
     pub fn take(&mut self, fill: impl FnOnce(&mut Record)) {
-        let Ok(mut record) = self.spare.pop() else {
-            self.missed += 1;
-            return;
-        };
-        fill(&mut record);
-        // There are no more records than places.
-        self.missed += u64::from(self.full.push(record).is_err());
+        self.steps.give(fill);
+    }
+
+    /// The same with what a picture takes.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call.
+    pub fn take_picture(&mut self, fill: impl FnOnce(&mut Picture)) {
+        self.pictures.give(fill);
     }
 
     /// Steps for which the writer was too slow.
     pub fn missed(&self) -> u64 {
-        self.missed
+        self.steps.missed
     }
 }
 
@@ -120,52 +172,53 @@ impl<W: Write + Seek> LogWriter<W> {
             modes: channel("/modes", "palpate.Modes", object)?,
             tf: channel("/tf", "foxglove.FrameTransforms", TRANSFORMS)?,
         };
-        let (full_in, full_out) = rtrb::RingBuffer::new(WAITING);
-        let (mut spare_in, spare_out) = rtrb::RingBuffer::new(WAITING);
-        // Not clones, whose buffers would have no room.
-        while spare_in.push(Box::new(Record::new(model, state, input))).is_ok() {}
-        let hand = LogHand { full: full_in, spare: spare_out, missed: 0 };
-        let text = Vec::new();
-        Ok((
-            hand,
-            Self { writer, full: full_out, spare: spare_in, names, channels, text, start_ns, steps: 0 },
-        ))
+        let (give_steps, steps) = round(STEPS_WAITING, || Record::new(state, input));
+        let (give_pictures, pictures) = round(PICTURES_WAITING, || Picture::new(model, state, input));
+        let hand = LogHand { steps: give_steps, pictures: give_pictures };
+        let out = Out { writer, names, channels, text: Vec::new(), start_ns, steps: 0 };
+        Ok((hand, Self { steps, pictures, out }))
     }
 
     /// Write until `done` is set and nothing is left; gives how many steps were written, and what they were written to.
     ///
     /// # Errors
     /// When the log can't be written: the disk is full, for one.
-    pub fn run(mut self, done: &AtomicBool) -> Result<(u64, W), Error> {
+    pub fn run(self, done: &AtomicBool) -> Result<(u64, W), Error> {
+        let Self { mut steps, mut pictures, mut out } = self;
         loop {
             // Whatever was handed over before it was done is written.
             let last = done.load(Ordering::Acquire);
-            while let Ok(record) = self.full.pop() {
-                self.write(&record)?;
-                // There are no more records than places.
-                let _ = self.spare.push(record);
-            }
+            steps.each(|record| out.step(record))?;
+            pictures.each(|picture| out.picture(picture))?;
             if last {
                 break;
             }
             std::thread::sleep(NAP);
         }
-        self.writer.finish().map_err(failed)?;
-        let mut out = self.writer.into_inner();
-        out.flush().map_err(failed)?;
-        Ok((self.steps, out))
+        out.writer.finish().map_err(failed)?;
+        let mut to = out.writer.into_inner();
+        to.flush().map_err(failed)?;
+        Ok((out.steps, to))
+    }
+}
+
+impl<W: Write + Seek> Out<W> {
+    fn step(&mut self, record: &Record) -> Result<(), Error> {
+        self.steps += 1;
+        let time = self.stamp(record.time_s);
+        self.put(self.channels.step, record.step, time, |names| StepOf(record, names))
     }
 
-    fn write(&mut self, record: &Record) -> Result<(), Error> {
-        self.steps += 1;
-        let time = self.start_ns + (record.time_s * 1e9) as u64;
-        self.put(self.channels.step, record.step, time, |names| StepOf(record, names))?;
-        if record.pictured {
-            self.put(self.channels.contacts, record.step, time, |names| contacts(record, names))?;
-            self.put(self.channels.modes, record.step, time, |names| ModesOf(record, names))?;
-            self.put(self.channels.tf, record.step, time, |names| transforms(record, names, time))?;
-        }
-        Ok(())
+    fn picture(&mut self, picture: &Picture) -> Result<(), Error> {
+        let (step, time) = (picture.step, self.stamp(picture.time_s));
+        self.put(self.channels.contacts, step, time, |names| contacts(picture, names))?;
+        self.put(self.channels.modes, step, time, |names| ModesOf(picture, names))?;
+        self.put(self.channels.tf, step, time, |names| transforms(picture, names, time))
+    }
+
+    /// Simulated time as nanoseconds of the day that the log began.
+    fn stamp(&self, time_s: f64) -> u64 {
+        self.start_ns + (time_s * 1e9) as u64
     }
 
     fn put<'s, M: Serialize>(

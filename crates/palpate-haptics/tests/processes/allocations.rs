@@ -75,8 +75,9 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         force.cycle(now_s);
         if tick % 16 == 0 {
             showing.show(force.state());
+            hand.take_picture(|picture| picture.take(force.input(), force.state()));
         }
-        hand.take(|record| record.take(force.input(), force.state(), tick % 16 == 0));
+        hand.take(|record| record.take(force.input(), force.state()));
         timing.record(Duration::from_nanos(tick), Duration::from_nanos(2 * tick));
         pushed = pushed.max(force.state().output().devices[0].force_on_hand.length());
     }

@@ -32,8 +32,11 @@ fn log() -> Vec<u8> {
         force.cycle(now_s);
         hand.take(|record| {
             record.step = tick;
-            record.take(force.input(), force.state(), tick % 10 == 0);
+            record.take(force.input(), force.state());
         });
+        if tick % 10 == 0 {
+            hand.take_picture(|picture| picture.take(force.input(), force.state()));
+        }
     }
     let (steps, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
     assert_eq!((steps, hand.missed()), (400, 0));

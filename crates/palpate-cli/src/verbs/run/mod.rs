@@ -2,6 +2,7 @@
 
 mod outputs;
 mod realtime;
+mod realtime_report;
 mod summary;
 
 use crate::Failure;
@@ -12,7 +13,8 @@ use glam::DVec3;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
-pub use realtime::{RealtimeArguments, device_line, percentiles, read_secret, timing};
+pub use realtime::{RealtimeArguments, read_secret};
+pub use realtime_report::{device_line, percentiles, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
