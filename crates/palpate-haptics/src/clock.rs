@@ -22,6 +22,11 @@ impl Clock {
         Self { start, period_s, phase_s: 0.0, sleeper: SpinSleeper::new(awake.subsec_nanos()) }
     }
 
+    /// The same without being awake before a tick: later by what the system takes to wake a thread, and cheaper.
+    pub fn asleep(self) -> Self {
+        Self { sleeper: SpinSleeper::new(0), ..self }
+    }
+
     /// The same with all ticks later by a phase [s]; times still count from the start.
     pub fn later(self, phase_s: f64) -> Self {
         Self { phase_s, ..self }

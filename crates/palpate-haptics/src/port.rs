@@ -49,12 +49,12 @@ impl Default for Effort {
 
 /// The device's end of a port.
 pub struct DevicePort {
-    motion: Telling,
-    effort: Output<Effort>,
+    pub(crate) motion: Telling,
+    pub(crate) effort: Output<Effort>,
 }
 
 /// Where motions go.
-enum Telling {
+pub(crate) enum Telling {
     /// To a force process beside.
     Here(Input<Motion>),
     /// To one elsewhere.
@@ -88,10 +88,7 @@ impl DevicePort {
     /// # Real time
     /// Over a link it takes a lock and calls the system.
     pub fn tell(&mut self, motion: Motion) {
-        match &mut self.motion {
-            Telling::Here(input) => input.write(motion),
-            Telling::Link(sender) => sender.tell(&motion),
-        }
+        self.motion.tell(motion);
     }
 
     /// The newest effort.
@@ -99,6 +96,15 @@ impl DevicePort {
     /// # Real time
     pub fn newest(&mut self) -> Effort {
         *self.effort.read()
+    }
+}
+
+impl Telling {
+    pub(crate) fn tell(&mut self, motion: Motion) {
+        match self {
+            Self::Here(input) => input.write(motion),
+            Self::Link(sender) => sender.tell(&motion),
+        }
     }
 }
 

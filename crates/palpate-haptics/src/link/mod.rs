@@ -1,6 +1,6 @@
 //! Devices on other machines, or in other processes: QUIC datagrams, encrypted, between two ends that know one secret.
 //!
-//! A device's end sends its motions as they come; the force process's end answers each with the newest effort. Whatever is lost
+//! A device's end sends its motions as they come; the force process's end sends every effort on as soon as it is there. Whatever is lost
 //! is lost: the next one is newer. What is late, doubled or out of order is told by its sequence and passed over. An end that hears
 //! nothing more begins anew, as often as it takes.
 

@@ -3,16 +3,26 @@
 use super::identity::Secret;
 use super::messages::{Hello, Welcome, effort_bytes, motion};
 use super::transport::transport;
+use crate::clock::Clock;
 use crate::error::Error;
-use crate::port::DevicePort;
+use crate::port::{DevicePort, Effort};
+use crate::scheduling::Scheduling;
 use quinn::crypto::rustls::QuicServerConfig;
 use quinn::{Connection, Endpoint, Incoming, ServerConfig};
 use std::collections::HashMap;
 use std::net::{SocketAddr, UdpSocket};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
+use triple_buffer::Output;
+
+/// Efforts are looked for this share of a step after it is due: a step that takes longer is answered a step later.
+const AFTER: f64 = 0.2;
+
+/// Real-time priority of the answers: below the force process and the haptic updates.
+const PRIORITY: u8 = 60;
 
 /// A device must say which it is within this.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -47,12 +57,21 @@ struct Counters {
     garbage: AtomicU64,
 }
 
-/// The ports that no device has now, by their devices' names; all names.
+/// The ports that no device has now, by their devices' names; the devices that have one; all names.
 struct Seats {
     free: Mutex<HashMap<String, DevicePort>>,
+    taken: Mutex<HashMap<String, Taken>>,
     names: Vec<String>,
     counters: Counters,
     start: Instant,
+}
+
+/// A device that has a port: where its efforts come from and go to.
+struct Taken {
+    efforts: Output<Effort>,
+    connection: Connection,
+    /// The newest that was sent.
+    sent: u64,
 }
 
 /// Listens for devices. It stops when it is dropped.
@@ -60,10 +79,13 @@ pub struct LinkServer {
     runtime: Option<Runtime>,
     endpoint: Endpoint,
     seats: Arc<Seats>,
+    over: Arc<AtomicBool>,
+    answering: Option<JoinHandle<()>>,
 }
 
 impl LinkServer {
-    /// Listen at an address for devices of these names. Times count from `start`.
+    /// Listen at an address for devices of these names. Times count from `start`; a force process with a period of `step_s` [s]
+    /// is answering, whose efforts are sent on right after they are there.
     ///
     /// # Errors
     /// When it is an address that others can reach and there is no secret; when the system does not let it listen there.
@@ -71,7 +93,7 @@ impl LinkServer {
         address: SocketAddr,
         secret: &Secret,
         ports: Vec<(String, DevicePort)>,
-        start: Instant,
+        (start, step_s): (Instant, f64),
     ) -> Result<Self, Error> {
         secret.check(address.ip())?;
         let failed = |error: std::io::Error| Error::Setup(format!("cannot listen at {address}: {error}"));
@@ -88,9 +110,17 @@ impl LinkServer {
         };
         let names = ports.iter().map(|(name, _)| name.clone()).collect();
         let free = Mutex::new(ports.into_iter().collect());
-        let seats = Arc::new(Seats { free, names, counters: Counters::default(), start });
+        let taken = Mutex::new(HashMap::new());
+        let seats = Arc::new(Seats { free, taken, names, counters: Counters::default(), start });
         runtime.spawn(listen(endpoint.clone(), seats.clone()));
-        Ok(Self { runtime: Some(runtime), endpoint, seats })
+        let over = Arc::new(AtomicBool::new(false));
+        let clock = Clock::new(start, step_s).later(AFTER * step_s).asleep();
+        let (answers, until) = (seats.clone(), over.clone());
+        let answering = std::thread::Builder::new().name("palpate answers".to_string());
+        let answering = answering.spawn(move || answer(&answers, &clock, &until)).map_err(|error| {
+            Error::Thread(format!("cannot start a thread for the link's answers: {error}"))
+        })?;
+        Ok(Self { runtime: Some(runtime), endpoint, seats, over, answering: Some(answering) })
     }
 
     /// Where it listens.
@@ -117,6 +147,11 @@ impl LinkServer {
 
 impl Drop for LinkServer {
     fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(answering) = self.answering.take() {
+            // It has ended, or by a bug of its own.
+            let _ = answering.join();
+        }
         self.endpoint.close(0_u32.into(), b"the session has ended");
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_timeout(Duration::from_millis(100));
@@ -124,7 +159,7 @@ impl Drop for LinkServer {
     }
 }
 
-/// A thread of its own for everything that goes over links.
+/// A thread of its own for everything that comes over links.
 pub(super) fn runtime() -> Result<Runtime, Error> {
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
@@ -150,11 +185,14 @@ async fn serve(incoming: Incoming, seats: Arc<Seats>) {
         add(&seats.counters.refused);
         return;
     };
-    let Ok(Some((name, mut port))) = tokio::time::timeout(PATIENCE, greet(&connection, &seats)).await else {
+    let Ok(Some((name, port))) = tokio::time::timeout(PATIENCE, greet(&connection, &seats)).await else {
         add(&seats.counters.refused);
         return;
     };
     add(&seats.counters.connected);
+    let DevicePort { motion: mut telling, effort: efforts } = port;
+    let taken = Taken { efforts, connection: connection.clone(), sent: 0 };
+    lock(&seats.taken).insert(name.clone(), taken);
     let mut newest = 0;
     while let Ok(bytes) = connection.read_datagram().await {
         let Some(motion) = motion(&bytes, seats.start.elapsed().as_secs_f64()) else {
@@ -167,14 +205,36 @@ async fn serve(incoming: Incoming, seats: Arc<Seats>) {
         }
         newest = motion.sequence;
         add(&seats.counters.motions);
-        port.tell(motion);
-        let effort = port.newest();
-        if effort.sequence > 0 {
-            // A datagram that can't be sent now would be too old later.
-            let _ = connection.send_datagram(effort_bytes(&effort).to_vec().into());
+        telling.tell(motion);
+    }
+    let taken = lock(&seats.taken).remove(&name);
+    if let Some(Taken { efforts, .. }) = taken {
+        lock(&seats.free).insert(name, DevicePort { motion: telling, effort: efforts });
+    }
+}
+
+/// Send efforts on as they come.
+fn answer(seats: &Seats, clock: &Clock, over: &AtomicBool) {
+    // What is not granted is done without.
+    let _ = Scheduling { priority: Some(PRIORITY), core: None }.claim();
+    let mut tick = clock.next_after(0);
+    while !over.load(Ordering::Relaxed) {
+        clock.wait(tick);
+        tick = clock.next_after(tick);
+        for taken in lock(&seats.taken).values_mut() {
+            let effort = *taken.efforts.read();
+            if effort.sequence > taken.sent {
+                taken.sent = effort.sequence;
+                // A datagram that can't be sent now would be too old later.
+                let _ = taken.connection.send_datagram(effort_bytes(&effort).to_vec().into());
+            }
         }
     }
-    seats.free.lock().unwrap_or_else(PoisonError::into_inner).insert(name, port);
+}
+
+/// What was left by a thread that ended by a bug is still what it was.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Hear which device it is, and give it its port.
@@ -185,7 +245,7 @@ async fn greet(connection: &Connection, seats: &Seats) -> Option<(String, Device
     let taken = match &hello {
         Err(_) => Err("it does not say which device it is".to_string()),
         Ok(Hello { device }) => {
-            let port = seats.free.lock().unwrap_or_else(PoisonError::into_inner).remove(device);
+            let port = lock(&seats.free).remove(device);
             port.map(|port| (device.clone(), port)).ok_or_else(|| {
                 if seats.names.contains(device) {
                     format!("the device {device:?} is taken")
@@ -204,7 +264,7 @@ async fn greet(connection: &Connection, seats: &Seats) -> Option<(String, Device
     match taken {
         Ok(taken) if sent => Some(taken),
         Ok((name, port)) => {
-            seats.free.lock().unwrap_or_else(PoisonError::into_inner).insert(name, port);
+            lock(&seats.free).insert(name, port);
             None
         }
         Err(_) => {

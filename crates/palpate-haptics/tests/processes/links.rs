@@ -129,8 +129,8 @@ fn a_force_goes_away_when_the_link_is_cut_and_comes_back_by_itself() {
     let secret = Secret::new("only for this test").expect("long enough");
     let (device_port, force_port) = port();
     let ports = vec![("finger".to_string(), device_port)];
-    let server =
-        LinkServer::new(LOCALHOST.parse().expect("an address"), &secret, ports, start).expect("it listens");
+    let server = LinkServer::new(LOCALHOST.parse().expect("an address"), &secret, ports, (start, 1e-3))
+        .expect("it listens");
     let faults = Arc::new(Faults::default());
     let (address, wire) = wire(server.address().expect("an address"), faults.clone());
     let over = Arc::new(AtomicBool::new(false));
@@ -212,8 +212,8 @@ fn strangers_are_refused_in_words_and_garbage_is_passed_over() {
     let secret = Secret::new("only for this test").expect("long enough");
     let (device_port, mut force_port) = port();
     let ports = vec![("finger".to_string(), device_port)];
-    let server =
-        LinkServer::new(LOCALHOST.parse().expect("an address"), &secret, ports, start).expect("it listens");
+    let server = LinkServer::new(LOCALHOST.parse().expect("an address"), &secret, ports, (start, 1e-3))
+        .expect("it listens");
     let address = server.address().expect("an address");
     let link = |secret: &Secret, name: &str| LinkClient::new(address, secret, name, start).expect("a socket");
 
@@ -254,7 +254,7 @@ fn strangers_are_refused_in_words_and_garbage_is_passed_over() {
 fn other_machines_need_a_secret() {
     let start = Instant::now();
     let listens =
-        LinkServer::new("0.0.0.0:0".parse().expect("an address"), &Secret::none(), Vec::new(), start);
+        LinkServer::new("0.0.0.0:0".parse().expect("an address"), &Secret::none(), Vec::new(), (start, 1e-3));
     let error = listens.err().map(|error| error.to_string());
     assert_eq!(error.as_deref(), Some("0.0.0.0 is reached from other machines: a link there needs a secret"));
     let links =

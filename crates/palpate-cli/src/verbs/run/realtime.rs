@@ -111,7 +111,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         }
     };
     let devices = scene.devices.iter().map(&mut seat).collect();
-    let server = listen(options, linked, start)?;
+    let server = listen(options, linked, (start, scene.model.parameters().step_s))?;
     let session = Session {
         model: scene.model.clone(),
         start,
@@ -166,7 +166,7 @@ fn watch(
 fn listen(
     options: &RealtimeArguments,
     ports: Vec<(String, DevicePort)>,
-    start: Instant,
+    clock: (Instant, f64),
 ) -> Result<Option<LinkServer>, Failure> {
     let Some(address) = options.listen.filter(|_| !ports.is_empty()) else { return Ok(None) };
     let names: Vec<&str> = ports.iter().map(|(name, _)| name.as_str()).collect();
@@ -175,7 +175,7 @@ fn listen(
         names.join(", "),
         names[0]
     );
-    let server = LinkServer::new(address, &read_secret(options.secret.as_deref())?, ports, start)?;
+    let server = LinkServer::new(address, &read_secret(options.secret.as_deref())?, ports, clock)?;
     crate::tell(&text);
     Ok(Some(server))
 }
