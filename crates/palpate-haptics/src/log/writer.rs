@@ -128,8 +128,15 @@ impl LogHand {
     }
 }
 
-fn failed(error: impl std::fmt::Display) -> Error {
-    Error::Log(format!("cannot write the log: {error}"))
+/// With what the error came from: that the disk is full stands there.
+fn failed(error: impl std::error::Error) -> Error {
+    let mut text = format!("cannot write the log: {error}");
+    let mut source = error.source();
+    while let Some(inner) = source {
+        text += &format!(": {inner}");
+        source = inner.source();
+    }
+    Error::Log(text)
 }
 
 impl<W: Write + Seek> LogWriter<W> {
