@@ -15,8 +15,9 @@ use palpate::{
 };
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{Hand, Traits};
-pub use place::Carried;
+use palpate_haptics::log::Names;
 use place::Source;
+pub use place::{Carried, read_path};
 use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -88,6 +89,15 @@ impl SceneObstacle {
 }
 
 impl Scene {
+    /// The names of all parts, as a log keeps them.
+    pub fn names(&self) -> Names {
+        Names {
+            objects: self.object_names.clone(),
+            devices: self.devices.iter().map(|device| device.name.clone()).collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+        }
+    }
+
     /// Whether anything but held points can act on its objects.
     pub fn has_touch(&self) -> bool {
         let touching = self.devices.iter().any(|device| device.mode == DeviceMode::Touch);

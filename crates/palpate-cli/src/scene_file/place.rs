@@ -62,13 +62,8 @@ impl Source<'_> {
 
     /// A path beside the scene.
     pub fn motion_path(&self, file: &Spanned<PathBuf>, columns: Columns) -> Result<MotionPath, Failure> {
-        let path = self.relative(file.get_ref());
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) => return self.fail(file.span(), Failure::file("read the path", &path, &e)),
-        };
-        let parsed = MotionPath::parse(&text, columns);
-        parsed.or_else(|what| self.fail(file.span(), format!("path {}: {what}", path.display())))
+        let read = read_path(&self.relative(file.get_ref()), columns);
+        read.or_else(|failure| self.fail(file.span(), failure))
     }
 
     /// A number above 0.
@@ -99,3 +94,9 @@ impl Source<'_> {
 
 /// Rubber on wood.
 const FRICTION: f64 = 0.5;
+
+/// Read a path from a CSV file.
+pub fn read_path(path: &Path, columns: Columns) -> Result<MotionPath, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the path", path, &e))?;
+    MotionPath::parse(&text, columns).map_err(|what| Failure(format!("path {}: {what}", path.display())))
+}

@@ -1,17 +1,15 @@
 //! `palpate device`: a device here, for a scene in another process or on another machine.
 
 use crate::Failure;
-use crate::scene_file::{known_device, known_grip};
-use crate::verbs::run::{device_line, percentiles, read_secret, timing};
+use crate::scene_file::{known_device, known_grip, read_path};
+use crate::verbs::run::{attach, device_line, percentiles, read_secret, timing};
 use crate::verbs::{print, print_json};
 use crate::whole_file::stop_on_interrupt;
 use clap::Args;
 use palpate::DeviceMode;
-use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated};
+use palpate_haptics::device::{Hand, Traits};
 use palpate_haptics::link::{LinkClient, LinkState};
-use palpate_haptics::{
-    Attached, Clock, Columns, DeviceReport, MotionPath, SafetyLimits, Scheduling, run_update,
-};
+use palpate_haptics::{Clock, Columns, DeviceReport, Scheduling, run_update};
 use serde_json::json;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -73,10 +71,7 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// Run the verb.
 pub fn device(arguments: &Arguments) -> Result<(), Failure> {
-    let text = std::fs::read_to_string(&arguments.path)
-        .map_err(|e| Failure::file("read the path", &arguments.path, &e))?;
-    let path = MotionPath::parse(&text, Columns::Position)
-        .map_err(|what| Failure(format!("path {}: {what}", arguments.path.display())))?;
+    let path = read_path(&arguments.path, Columns::Position)?;
     let duration = arguments.duration.unwrap_or(path.end());
     if !(duration > 0.0 && duration < 1e8) {
         return Err(Failure(format!("the duration is {duration} s, expected above 0: --duration gives one")));
@@ -84,8 +79,7 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     if !(50.0..=5000.0).contains(&arguments.rate) {
         return Err(Failure(format!("--rate is {} Hz, expected 50 to 5000", arguments.rate)));
     }
-    // Whatever is wrong with it is told before anybody is looked for.
-    attach(arguments, path.clone())?;
+    let simulated = simulated(arguments)?;
     let start = Instant::now();
     let secret = read_secret(arguments.secret.as_deref())?;
     let (port, client) = LinkClient::new(arguments.connect, &secret, &arguments.name, start)?;
@@ -93,7 +87,10 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     find(&client, arguments, start, stop)?;
     // The hand sets out when there is something to touch.
     let found = start.elapsed().as_secs_f64();
-    let update = attach(arguments, path.later(found))?.update(port);
+    // The scene says what it does there.
+    let mode = DeviceMode::Touch;
+    let attached = attach(path.later(found), simulated, mode, arguments.rate, arguments.not_passive);
+    let update = attached.update(port);
     let (clock, ended) = (Clock::new(start, 1.0 / arguments.rate), AtomicBool::new(false));
     let scheduling = Scheduling { priority: Some(PRIORITY), core: None };
     let (report, linked) = std::thread::scope(|scope| {
@@ -111,32 +108,11 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn attach(arguments: &Arguments, path: MotionPath) -> Result<Attached, Failure> {
+/// The simulated device and hand that are asked for.
+fn simulated(arguments: &Arguments) -> Result<Option<(Traits, Hand)>, Failure> {
     let hand = arguments.grip.as_deref().map_or(Ok(Hand::FIRM), known_grip).map_err(Failure)?;
-    let mut limits = SafetyLimits {
-        force_n: f64::MAX,
-        slew_n_s: f64::MAX,
-        speed_m_s: f64::MAX,
-        ..SafetyLimits::default()
-    };
-    let device: Box<dyn Device> = match arguments.simulated.as_deref() {
-        None => Box::new(Scripted::new(path)),
-        Some(name) => {
-            let traits = known_device(name).map_err(Failure)?;
-            limits = SafetyLimits { force_n: traits.force_n, ..SafetyLimits::default() };
-            Box::new(Simulated::new(traits, hand, path))
-        }
-    };
-    Ok(Attached {
-        device,
-        // The scene says what it does there.
-        mode: DeviceMode::Touch,
-        mount: Mount::default(),
-        rate_hz: arguments.rate,
-        limits,
-        passive: arguments.simulated.is_some() && !arguments.not_passive,
-        by_button: false,
-    })
+    let traits = arguments.simulated.as_deref().map(known_device).transpose().map_err(Failure)?;
+    Ok(traits.map(|traits| (traits, hand)))
 }
 
 /// Wait until the link is there.

@@ -7,7 +7,7 @@ use crate::verbs::{print, print_json};
 use clap::Args;
 use indicatif::ProgressBar;
 use palpate::{State, step};
-use palpate_haptics::log::{Names, Reader};
+use palpate_haptics::log::Reader;
 use serde_json::json;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -44,11 +44,7 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
             Unpacked::Other(failure) => failure,
         })?;
     let steps = reader.steps();
-    let names = Names {
-        objects: scene.object_names.clone(),
-        devices: scene.devices.iter().map(|device| device.name.clone()).collect(),
-        obstacles: scene.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
-    };
+    let names = scene.names();
     let modes: Vec<_> = scene.devices.iter().map(|device| device.mode).collect();
     let mut state = State::new(&scene.model);
     let mut outputs = Outputs::new(&arguments.outputs, &scene, &state, steps as usize)?;

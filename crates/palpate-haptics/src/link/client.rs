@@ -1,6 +1,7 @@
 //! The device's end of a link.
 
 use super::identity::Secret;
+use super::lock;
 use super::messages::{Hello, Welcome, effort, motion_bytes};
 use super::server::runtime;
 use super::transport::transport;
@@ -9,7 +10,7 @@ use crate::port::{DevicePort, Effort, Motion};
 use quinn::crypto::rustls::QuicClientConfig;
 use quinn::{ClientConfig, Connection, ConnectionError, Endpoint};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use triple_buffer::{Input, triple_buffer};
@@ -107,7 +108,7 @@ impl LinkClient {
 
     /// How the link is now.
     pub fn state(&self) -> LinkState {
-        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock(&self.shared.state).clone()
     }
 }
 
@@ -131,8 +132,8 @@ struct Link {
 
 impl Link {
     fn set(&self, connection: Option<Connection>, state: LinkState) {
-        *self.shared.connection.lock().unwrap_or_else(PoisonError::into_inner) = connection;
-        *self.shared.state.lock().unwrap_or_else(PoisonError::into_inner) = state;
+        *lock(&self.shared.connection) = connection;
+        *lock(&self.shared.state) = state;
     }
 
     /// Link, receive until it breaks, link again.

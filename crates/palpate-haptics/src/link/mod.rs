@@ -14,3 +14,10 @@ pub(crate) use client::LinkSender;
 pub use client::{LinkClient, LinkState};
 pub use identity::Secret;
 pub use server::{LinkCounts, LinkServer};
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What was left by a thread that ended by a bug is still what it was.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

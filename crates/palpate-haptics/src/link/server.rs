@@ -1,6 +1,7 @@
 //! The force process's end of links.
 
 use super::identity::Secret;
+use super::lock;
 use super::messages::{Hello, Welcome, effort_bytes, motion};
 use super::transport::transport;
 use crate::clock::Clock;
@@ -12,7 +13,7 @@ use quinn::{Connection, Endpoint, Incoming, ServerConfig};
 use std::collections::HashMap;
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
@@ -230,11 +231,6 @@ fn answer(seats: &Seats, clock: &Clock, over: &AtomicBool) {
             }
         }
     }
-}
-
-/// What was left by a thread that ended by a bug is still what it was.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Hear which device it is, and give it its port.

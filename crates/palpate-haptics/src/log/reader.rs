@@ -63,10 +63,13 @@ impl<'a> Reader<'a> {
 
     /// How many steps it holds.
     pub fn steps(&self) -> u64 {
-        let channel = self.summary.channels.iter().find(|(_, channel)| channel.topic == "/step");
-        let count =
-            |id: &u16| self.summary.stats.as_ref().and_then(|s| s.channel_message_counts.get(id).copied());
-        channel.and_then(|(id, _)| count(id)).unwrap_or(0)
+        let counts = self.summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
+        self.step_channel().and_then(|id| counts?.get(&id).copied()).unwrap_or(0)
+    }
+
+    fn step_channel(&self) -> Option<u16> {
+        let mut channels = self.summary.channels.iter();
+        channels.find(|(_, channel)| channel.topic == "/step").map(|(id, _)| *id)
     }
 
     /// The steps, in their order: each on its own is one, or why it can't be read.
@@ -75,9 +78,11 @@ impl<'a> Reader<'a> {
         let options = LinearReaderOptions::default()
             .with_record_length_limit(self.bytes.len().max(1 << 20))
             .with_validate_chunk_crcs(true);
-        let step =
-            self.summary.channels.iter().find(|(_, channel)| channel.topic == "/step").map(|(id, _)| *id);
-        Steps { bytes: self.bytes, reader: LinearReader::new_with_options(options), channel: step }
+        Steps {
+            bytes: self.bytes,
+            reader: LinearReader::new_with_options(options),
+            channel: self.step_channel(),
+        }
     }
 }
 

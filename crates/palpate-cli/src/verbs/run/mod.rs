@@ -13,7 +13,7 @@ use glam::DVec3;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
-pub use realtime::{RealtimeArguments, read_secret};
+pub use realtime::{RealtimeArguments, attach, read_secret};
 pub use realtime_report::{device_line, percentiles, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;

@@ -9,10 +9,10 @@ use crate::verbs::{print, print_json};
 use crate::whole_file::{WholeFile, stop_on_interrupt};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate::{Pose, State};
-use palpate_haptics::device::{Device, Mount, Scripted, Simulated};
+use palpate::{DeviceMode, Pose, State};
+use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated, Traits};
 use palpate_haptics::link::{LinkServer, Secret};
-use palpate_haptics::log::{LogHand, LogWriter, Names};
+use palpate_haptics::log::{LogHand, LogWriter};
 use palpate_haptics::{
     Attached, DevicePort, MotionPath, Mover, Report, SafetyLimits, Scheduling, Session, SessionDevice, port,
 };
@@ -93,17 +93,15 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure(format!("--pictures is {}, expected 0 to 1000", options.pictures)));
     }
     let steps = count_steps(scene, arguments)?;
-    let names = Names {
-        objects: scene.object_names.clone(),
-        devices: scene.devices.iter().map(|device| device.name.clone()).collect(),
-        obstacles: scene.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
-    };
-    let log = options.log.as_deref().map(|path| begin_log(scene, arguments, path, names)).transpose()?;
+    let log = options.log.as_deref().map(|path| begin_log(scene, arguments, path)).transpose()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let start = Instant::now();
     let mut linked = Vec::new();
     let mut seat = |device: &SceneDevice| match &device.path {
-        Some(path) => SessionDevice::Here(attach(device, path, options)),
+        Some(path) => {
+            let (rate, not_passive) = (options.device_rate, options.not_passive);
+            SessionDevice::Here(attach(path.clone(), device.simulated, device.mode, rate, not_passive))
+        }
         None => {
             let (device_port, force_port) = port();
             linked.push((device.name.clone(), device_port));
@@ -187,27 +185,28 @@ pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
 }
 
-fn attach(device: &SceneDevice, path: &MotionPath, options: &RealtimeArguments) -> Attached {
-    let driver: Box<dyn Device> = match device.simulated {
-        Some((traits, hand)) => Box::new(Simulated::new(traits, hand, path.clone())),
-        None => Box::new(Scripted::new(path.clone())),
+/// A device that follows a path, or whose simulated hand does.
+pub fn attach(
+    path: MotionPath,
+    simulated: Option<(Traits, Hand)>,
+    mode: DeviceMode,
+    rate_hz: f64,
+    not_passive: bool,
+) -> Attached {
+    let (device, limits): (Box<dyn Device>, _) = match simulated {
+        Some((traits, hand)) => {
+            let limits = SafetyLimits { force_n: traits.force_n, ..SafetyLimits::default() };
+            (Box::new(Simulated::new(traits, hand, path)), limits)
+        }
+        // A path feels nothing: whatever its force is, nobody has to be kept from it.
+        None => {
+            let (force_n, slew_n_s, speed_m_s) = (f64::MAX, f64::MAX, f64::MAX);
+            let limits = SafetyLimits { force_n, slew_n_s, speed_m_s, ..SafetyLimits::default() };
+            (Box::new(Scripted::new(path)), limits)
+        }
     };
-    let simulated = device.simulated.is_some();
-    // A path feels nothing: whatever its force is, nobody has to be kept from it.
-    let limits = if simulated {
-        SafetyLimits { force_n: driver.traits().force_n, ..SafetyLimits::default() }
-    } else {
-        SafetyLimits { force_n: f64::MAX, slew_n_s: f64::MAX, speed_m_s: f64::MAX, ..SafetyLimits::default() }
-    };
-    Attached {
-        device: driver,
-        mode: device.mode,
-        mount: Mount::default(),
-        rate_hz: options.device_rate,
-        limits,
-        passive: simulated && !options.not_passive,
-        by_button: false,
-    }
+    let passive = simulated.is_some() && !not_passive;
+    Attached { device, mode, mount: Mount::default(), rate_hz, limits, passive, by_button: false }
 }
 
 fn movers(scene: &Scene) -> Vec<Mover> {
@@ -222,7 +221,6 @@ fn begin_log(
     scene: &Scene,
     arguments: &Arguments,
     path: &Path,
-    names: Names,
 ) -> Result<(LogHand, LogWriter<WholeFile>), Failure> {
     let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
     let file = WholeFile::create(path, &inputs)?;
@@ -242,5 +240,5 @@ fn begin_log(
     ]);
     let state = State::new(&scene.model);
     let input = super::input_at(scene, 0.0);
-    Ok(LogWriter::new(file, names, facts, &files, (&scene.model, &state, &input))?)
+    Ok(LogWriter::new(file, scene.names(), facts, &files, (&scene.model, &state, &input))?)
 }
