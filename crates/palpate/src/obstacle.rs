@@ -110,8 +110,8 @@ impl ObstacleMesh {
         }
         let source_nodes = (0..positions.len() as u32).collect();
         let surface = Surface { positions, triangles, source_nodes };
-        let tree = SurfaceTree::new(&surface);
-        let bounds = tree.bounds(&surface, |_, _| Bands::default(), |_| 0.0);
+        let tree = SurfaceTree::new(&surface.positions, &surface.triangles);
+        let bounds = tree.bounds(&surface.triangles, |_, _| Bands::default(), |_| 0.0);
         let radius = surface.radius();
         let mut owners = vec![0; surface.positions.len()];
         for (t, corners) in surface.triangles.iter().enumerate() {

@@ -69,6 +69,9 @@ pub struct ModelParameters {
     pub obstacles: Vec<Obstacle>,
     /// Most contact points of one object, 9·n² numbers of memory. Beyond it contacts are left out, and the status says so.
     pub most_contact_points: usize,
+    /// Most places at which an object meets an obstacle. Where more of its surface nodes come near, fewer stand for all, each
+    /// for the patch around it.
+    pub most_places: usize,
 }
 
 impl Default for ModelParameters {
@@ -82,6 +85,7 @@ impl Default for ModelParameters {
             devices: Vec::new(),
             obstacles: Vec::new(),
             most_contact_points: 512,
+            most_places: usize::MAX,
         }
     }
 }
@@ -107,6 +111,9 @@ pub struct ModelObject {
     /// Coulomb's coefficient against other objects [1]; between two, the geometric mean of theirs.
     pub friction: f64,
 }
+
+/// A face stands on so many places at least.
+const LEAST_PLACES: usize = 8;
 
 /// Friction between objects when nothing is said: rubber on wood.
 const FRICTION: f64 = 0.5;
@@ -150,6 +157,10 @@ impl Model {
         }
         if !parameters.gravity.is_finite() {
             return Err(Error::Model(format!("gravity is {}, expected finite numbers", parameters.gravity)));
+        }
+        if parameters.most_places < LEAST_PLACES {
+            let given = parameters.most_places;
+            return Err(Error::Model(format!("most_places is {given}, expected {LEAST_PLACES} or more")));
         }
         for (at, device) in parameters.devices.iter().enumerate() {
             device.check(at)?;
@@ -256,7 +267,7 @@ impl SceneObject {
         radii.retain(|radius| *radius > 0.0);
         radii.sort_unstable_by(f64::total_cmp);
         radii.dedup();
-        let body = Body::new(recording, &radii);
+        let body = Body::new(recording, &radii, parameters.most_places);
         Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
     }
 

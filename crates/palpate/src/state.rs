@@ -1,7 +1,7 @@
 //! What changes while a scene runs, what a step takes and what it gives.
 
 use crate::contact::{
-    Against, Contact, ContactPoints, DeviceState, Grasp, Lift, NodeCache, Search, Solver, Vicinity,
+    Against, Contact, ContactPoints, DeviceState, Grasp, Level, Lift, NodeCache, Search, Solver, Vicinity,
     WantedList,
 };
 use crate::deformation::Deformation;
@@ -174,6 +174,8 @@ pub struct State {
     pub(crate) contacts: Vec<Contact>,
     /// Whether a device is inside an object, where it came to without crossing the surface: devices × objects.
     pub(crate) inside: Vec<bool>,
+    /// How coarsely each object meets each obstacle: objects × obstacles.
+    pub(crate) levels: Vec<Level>,
     /// What virtual couplings did.
     pub(crate) couplings: EnergyLedger,
     pub(crate) workspace: Workspace,
@@ -223,9 +225,15 @@ impl State {
             devices: vec![DeviceState::new(); devices],
             contacts: Vec::with_capacity(contacts),
             inside: vec![false; devices * model.objects.len()],
+            levels: vec![Level::default(); model.objects.len() * parameters.obstacles.len()],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
-                solver: Solver::new(model.objects.len(), devices, contacts),
+                solver: Solver::new(
+                    model.objects.len(),
+                    devices,
+                    contacts,
+                    parameters.most_places < usize::MAX,
+                ),
                 search: Search::new(),
                 caches: model.objects.iter().map(|o| NodeCache::new(&o.body)).collect(),
                 vicinities: (0..devices)

@@ -100,13 +100,13 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 
 /// Stage 2: what is, or may come, in contact within the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, obstacles, contacts, inside, workspace, output, .. } = state;
+    let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
     let Workspace { search, caches, vicinities, near, wanted, spare, modes, next_obstacles, .. } = workspace;
     wanted.clear();
     search.begin();
     let step = *steps;
     let mut scene =
-        Finding { model, objects, contacts, caches, search, vicinities, near, modes, wanted, step };
+        Finding { model, objects, contacts, caches, search, vicinities, levels, near, modes, wanted, step };
     let searched = || (0..model.objects.len()).filter(|&at| model.objects[at].is_searched());
     for (number, device) in devices.iter_mut().enumerate() {
         let asked = input.devices.get(number).is_some_and(|d| d.mode != DeviceMode::Away);

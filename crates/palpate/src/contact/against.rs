@@ -19,11 +19,27 @@ use glam::DVec3;
 /// one node to the next.
 const PUSHED: f64 = 0.3;
 
+/// After so many steps with less than this part of the places that are allowed, finer ones are tried.
+const FEW_PLACES: usize = 6;
+const FINER_AFTER: u64 = 50;
+
+/// What numbers of one level's features are below.
+const FEATURES: u64 = 1 << 40;
+
 /// Steps of conservative advancement.
 const ADVANCES: usize = 30;
 
 /// A weight below this is none: the point is on the edge, or nearly.
 const ON_EDGE: f64 = 0.02;
+
+/// How coarsely an object meets an obstacle.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Level {
+    /// Which places stand for its surface: 0 for all nodes.
+    number: usize,
+    /// The step in which many of them were near the last time.
+    since: u64,
+}
 
 /// An object and an obstacle over a step.
 struct Encounter<'a> {
@@ -32,6 +48,8 @@ struct Encounter<'a> {
     body: &'a Body,
     own: &'a ObjectState,
     obstacle: &'a Obstacle,
+    /// Which level of places stands for the surface: 0 for all nodes.
+    level: usize,
     /// The obstacle at the start and at the end.
     before: Pose,
     after: Pose,
@@ -52,12 +70,13 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
     let (start, free) = (own.rigid.pose, own.free.end.pose);
     let apart = (before.position - start.position).length();
     let way = before.way(&after, apart + object.radius) + start.way(&free, object.radius);
-    let encounter = Encounter {
+    let mut encounter = Encounter {
         at,
         number,
         body,
         own,
         obstacle,
+        level: 0,
         before,
         after,
         way,
@@ -65,15 +84,36 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         margin: MARGIN * body.edge + PUSHED * own.pushed,
         beside: if way > 0.5 * obstacle.shape.size() { way } else { 0.0 },
     };
-    let cache = &mut scene.caches[at];
-    let step = Ok(scene.step);
-    let sight = &mut Sight::new(body, Reading::Point, &own.response, &own.points, cache, step);
-    sight.widen();
-    let all = object.radius + sight.reach() + way + encounter.margin;
-    if apart - all > obstacle.shape.radius() {
-        return;
+    let most = scene.model.parameters.most_places;
+    let level = at * scene.model.parameters.obstacles.len() + number;
+    let (first, left_out) = (scene.wanted.list.len(), scene.wanted.left_out);
+    loop {
+        encounter.level = scene.levels[level].number;
+        let reading = body.level(encounter.level);
+        let (cache, step) = (&mut scene.caches[at], Ok(scene.step));
+        let sight = &mut Sight::new(body, reading, &own.response, &own.points, cache, step);
+        sight.widen();
+        let all = object.radius + sight.reach() + way + encounter.margin;
+        if apart - all <= obstacle.shape.radius() {
+            let known = known_contacts(scene.contacts, Against::Obstacle(number), at);
+            encounter.nodes(sight, known, scene.wanted, first.saturating_add(most));
+        }
+        let found = scene.wanted.list.len() - first;
+        if found > most && encounter.level < body.coarsest() {
+            // Too many: fewer stand for them.
+            scene.wanted.list.truncate(first);
+            scene.wanted.left_out = left_out;
+            scene.levels[level] = Level { number: encounter.level + 1, since: scene.step };
+            continue;
+        }
+        if found >= most / FEW_PLACES {
+            scene.levels[level].since = scene.step;
+        } else if encounter.level > 0 && scene.step - scene.levels[level].since >= FINER_AFTER {
+            // So few for so long that there is room for those that they stand for.
+            scene.levels[level] = Level { number: encounter.level - 1, since: scene.step };
+        }
+        break;
     }
-    encounter.nodes(sight, known_contacts(scene.contacts, Against::Obstacle(number), at), scene.wanted);
     encounter.corners(scene, at);
 }
 
@@ -91,11 +131,17 @@ impl Encounter<'_> {
     }
 
     /// The nodes, and for round obstacles the middles of triangles.
-    fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList) {
+    fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList, most: usize) {
+        let (reading, triangles) =
+            (self.body.level(self.level), self.body.tree(self.body.level(self.level)).1);
+        let enough = core::cell::Cell::new(false);
         let dent = sight.most_dent();
         sight.begin_visit();
         sight.walk(
             |sight, of, centre, radius| {
+                if enough.get() {
+                    return false;
+                }
                 let reach = radius + self.margin + self.beside;
                 let start = |within: f64| self.distance(centre, within) < within;
                 let end = |place: DVec3| self.distance_after(place, reach) < reach;
@@ -107,11 +153,11 @@ impl Encounter<'_> {
                 }
             },
             |sight, triangle, high| {
-                for node in self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize) {
+                for node in triangles[triangle as usize].map(|n| n as usize) {
                     if !sight.first_visit(node) {
                         continue;
                     }
-                    let place = match known.binary_search_by(|c| c.key.feature.cmp(&(node as u64))) {
+                    let place = match known.binary_search_by(|c| c.key.feature.cmp(&self.feature(node))) {
                         Ok(contact) => {
                             let point = self.own.points.of(known[contact].slot);
                             point.rest + point.placed.displacement
@@ -132,9 +178,13 @@ impl Encounter<'_> {
                         }
                     };
                     let free = sight.free_node(node);
-                    self.meet(wanted, place, free, self.body.node_point(node), node);
+                    let place_of = Place { point: self.body.node_point(node), reading };
+                    self.meet(wanted, place, free, place_of, self.feature(node));
                 }
-                self.middle(sight, triangle, dent, wanted);
+                if self.level == 0 {
+                    self.middle(sight, triangle, dent, wanted);
+                }
+                enough.set(wanted.list.len() > most && self.level < self.body.coarsest());
             },
         );
     }
@@ -162,12 +212,12 @@ impl Encounter<'_> {
         }
         let (exact, ends) = (corners.map(|node| sight.node(node)), corners.map(|node| sight.free_node(node)));
         let feature = self.body.recording.surface.positions.len() + triangle as usize;
-        let point = SurfacePoint { triangle, weights };
-        self.meet(wanted, at_weights(exact, weights), at_weights(ends, weights), point, feature);
+        let place = Place { point: SurfacePoint { triangle, weights }, reading: Reading::Point };
+        self.meet(wanted, at_weights(exact, weights), at_weights(ends, weights), place, feature as u64);
     }
 
     /// Want a contact if a place that goes from one body point to another comes near the obstacle.
-    fn meet(&self, wanted: &mut WantedList, from: DVec3, to: DVec3, point: SurfacePoint, feature: usize) {
+    fn meet(&self, wanted: &mut WantedList, from: DVec3, to: DVec3, of: Place, feature: u64) {
         let shape = &self.obstacle.shape;
         let start = self.before.body_from_world(self.own.rigid.pose.world_from_body(from));
         let end = self.after.body_from_world(self.own.free.end.pose.world_from_body(to));
@@ -195,21 +245,19 @@ impl Encounter<'_> {
         let Some((gap, outward)) = distance(place) else { return };
         let nearest = place - outward * gap;
         let normal = -(self.before.orientation * outward);
-        self.want(wanted, feature, point, normal, nearest);
+        self.want(wanted, feature, of, normal, nearest);
+    }
+
+    /// What a node is called among the contacts.
+    fn feature(&self, node: usize) -> u64 {
+        self.level as u64 * FEATURES + node as u64
     }
 
     /// Want a contact of a surface point with a point of the obstacle, in its frame.
-    fn want(
-        &self,
-        wanted: &mut WantedList,
-        feature: usize,
-        point: SurfacePoint,
-        normal: DVec3,
-        other: DVec3,
-    ) {
+    fn want(&self, wanted: &mut WantedList, feature: u64, place: Place, normal: DVec3, other: DVec3) {
         wanted.push(Wanted {
-            key: Key { other: Against::Obstacle(self.number), object: self.at, feature: feature as u64 },
-            place: Place { point, reading: Reading::Point },
+            key: Key { other: Against::Obstacle(self.number), object: self.at, feature },
+            place,
             other: WantedOther::Obstacle {
                 number: self.number,
                 start: self.before.world_from_body(other),
@@ -247,7 +295,8 @@ impl Encounter<'_> {
                 let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
                 let approach = Approach { point, way, known, edge: self.body.edge };
                 if let Some((point, normal)) = meeting(search, sight, &approach) {
-                    self.want(wanted, feature, point, start.orientation * normal, place);
+                    let of = Place { point, reading: Reading::Point };
+                    self.want(wanted, feature as u64, of, start.orientation * normal, place);
                 }
             },
         );

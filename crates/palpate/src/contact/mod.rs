@@ -14,7 +14,7 @@ mod solver;
 mod touch;
 mod wanted;
 
-pub(crate) use against::against;
+pub(crate) use against::{Level, against};
 pub(crate) use held::HeldSystem;
 pub(crate) use parts::{Lift, Parts};
 pub(crate) use points::{ContactPoint, ContactPoints};

@@ -10,6 +10,9 @@ use glam::{DMat3, DVec3};
 /// A length below this share of (distance from the origin + size) is round-off: a few roundings of x + R·(r + u).
 pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
+/// Friction beyond the cone by less than this share is round-off.
+const CONE: f64 = 1e-12;
+
 /// How an object moves rigidly with the forces, in linear terms about the last evaluation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lift {
@@ -195,16 +198,24 @@ impl Parts<'_> {
         }
     }
 
-    /// Take away what the search has left of forces on contacts that are apart: traces without which they stay so.
+    /// Take away what the search has left of forces on contacts that are apart, traces without which they stay so, and of
+    /// what is beyond Coulomb's cone.
     pub(super) fn drop_traces(&mut self, members: &[u32]) {
         for at in members.iter().map(|&at| at as usize) {
             let contact = self.contacts[at];
-            if contact.law == Law::Held || contact.force == DVec3::ZERO {
+            let Law::Touch { friction } = contact.law else { continue };
+            if contact.force == DVec3::ZERO {
                 continue;
             }
             let closes = contact.force.length() * contact.compliance.x_axis.x;
-            if contact.gap(self.apart(&contact)) > contact.least_gap + closes {
+            let normal = -contact.force.dot(contact.normal);
+            if normal <= 0.0 || contact.gap(self.apart(&contact)) > contact.least_gap + closes {
                 self.add_force(at, -contact.force);
+                continue;
+            }
+            let (across, most) = (contact.force + contact.normal * normal, friction * normal);
+            if across.length() > most * (1.0 + CONE) {
+                self.add_force(at, across * (most / across.length() - 1.0));
             }
         }
     }

@@ -62,7 +62,7 @@ impl NodeCache {
             some_dents: false,
             moment: None,
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
-            tight: vec![(0.0, 0); body.tree.spheres()],
+            tight: vec![(0.0, 0); body.tree(Reading::Point).0.spheres()],
             visits: vec![0; nodes],
             visit: 0,
         }
@@ -89,13 +89,15 @@ impl NodeCache {
     }
 
     /// Take over where contact points are that are nodes.
-    fn take_nodes(&mut self, points: &ContactPoints) {
-        for point in &points.points {
-            let Some(node) = point.known_node() else { continue };
+    fn take_nodes(&mut self, points: &ContactPoints, reading: Reading) {
+        for point in points.points.iter().filter(|point| point.place.reading == reading) {
+            let Some(node) = point.node else { continue };
             let by_modes = point.placed.displacement - point.placed.residual;
             self.positions[node] = point.rest + by_modes;
             self.free[node] = point.rest + point.free - point.placed.sag;
+            self.whole[node] = point.rest + point.placed.displacement;
             (self.stamps[node], self.free_stamps[node]) = (self.now, self.now);
+            self.whole_stamps[node] = self.whole_now;
         }
     }
 }
@@ -137,10 +139,11 @@ impl<'a> Sight<'a> {
         };
         let free = state.free_coordinates();
         if cache.begin(key) {
-            match reading {
-                Reading::Point if moment.is_ok() => cache.take_nodes(points),
-                Reading::Point => {}
-                Reading::Patch(_) => cache.take_single([q, free]),
+            if reading != Reading::Point {
+                cache.take_single([q, free]);
+            }
+            if moment.is_ok() {
+                cache.take_nodes(points, reading);
             }
         }
         // No place goes farther by the residual compliance than where the forces act, or hardly.
@@ -352,7 +355,8 @@ impl<'a> Sight<'a> {
     ) {
         let body = self.body;
         let visit = self.visit;
-        body.tree.walk((body.bounds(self.reading), &visit), self, near, found);
+        let (tree, _) = body.tree(self.reading);
+        tree.walk((body.bounds(self.reading), &visit), self, near, found);
     }
 }
 
@@ -390,7 +394,7 @@ impl Moving for Sight<'_> {
     }
 
     fn corners_of(&self, triangle: u32) -> [usize; 3] {
-        self.body.recording.surface.triangles[triangle as usize].map(|node| node as usize)
+        self.body.tree(self.reading).1[triangle as usize].map(|node| node as usize)
     }
 
     fn tight(&self, sphere: usize) -> Option<f64> {

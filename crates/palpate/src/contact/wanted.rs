@@ -1,5 +1,6 @@
 //! Which contacts a step has: those that were found, matched with those of the last step.
 
+use super::against::Level;
 use super::search::{Search, Vicinity};
 use super::sight::NodeCache;
 use super::{Contact, Law, Other};
@@ -76,6 +77,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) search: &'a mut Search,
     /// Of each device on each object.
     pub(crate) vicinities: &'a mut [Vicinity],
+    /// How coarsely each object meets each obstacle.
+    pub(crate) levels: &'a mut [Level],
     /// Room for nodes, and for modal coordinates.
     pub(crate) near: &'a mut Vec<u32>,
     pub(crate) modes: &'a mut [f64],

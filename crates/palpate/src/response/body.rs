@@ -3,10 +3,17 @@
 use super::dot::{dot3, dot3_single};
 use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
-use crate::surface::{Bands, Bounds, SurfacePoint, SurfaceTree, Visit, band, triangles_around};
+use crate::surface::{Bands, Bounds, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
+
+/// Levels of places: how much farther apart those of each are than those before, of more places than [`MANY`] and of fewer;
+/// and how wide their patches are beside that, for which a cube that lands bounces as high as by its nodes.
+const MOST_LEVELS: usize = 24;
+const MANY: usize = 4096;
+const COARSER: [f64; 2] = [2.0, 1.45];
+const OVERLAP: f64 = 1.5;
 
 /// How displacement is read, and force spread, at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,8 +59,10 @@ pub(crate) struct Acting {
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) recording: Arc<Recording>,
+    /// Those of devices, then those that stand for the nodes of faces in contact, finest first (see `contact::against`).
     pub(crate) patches: Vec<PatchField>,
-    pub(crate) tree: SurfaceTree,
+    devices: usize,
+    tree: SurfaceTree,
     bounds: Bounds,
     /// Mean edge of the triangles at rest [m].
     pub(crate) edge: f64,
@@ -66,22 +75,33 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// With patches of the given radii [m].
-    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64]) -> Self {
-        let tree = SurfaceTree::new(&recording.surface);
+    /// With patches of the given radii [m], and faces that meet something at so many places at most.
+    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], most_places: usize) -> Self {
+        let tree = SurfaceTree::new(&recording.surface.positions, &recording.surface.triangles);
         let shapes = &recording.modes.mode_shapes;
         let distances = ModalDistances::new(&recording, shapes);
         let modal = |i: usize, c: Option<usize>| distances.between(i, c);
-        let bounds = tree.bounds(&recording.surface, modal, |i| residual_size(&recording, i));
-        let patches = radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
+        let bounds = tree.bounds(&recording.surface.triangles, modal, |i| residual_size(&recording, i));
+        let mut patches: Vec<PatchField> =
+            radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
+        let mut apart = edge;
+        let mut count = recording.surface.positions.len();
+        while count > most_places && patches.len() < radii.len() + MOST_LEVELS {
+            apart *= COARSER[usize::from(count <= MANY)];
+            let nodes = thinned(&recording.surface, apart);
+            if nodes.len() < count {
+                count = nodes.len();
+                patches.push(PatchField::about(&recording, &nodes, OVERLAP * apart));
+            }
+        }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {
             around.extend(triangles);
             first_around.push(around.len() as u32);
         }
         let (low, high) = recording.surface.extent();
-        Self { recording, patches, tree, bounds, edge, around, first_around, low, high }
+        Self { recording, patches, devices: radii.len(), tree, bounds, edge, around, first_around, low, high }
     }
 
     /// Whether a place [m, body] is within a reach [m] of the box around the body at rest.
@@ -131,6 +151,39 @@ impl Body {
         patch.map_or(Reading::Point, |at| Reading::Patch(at as u32))
     }
 
+    /// How a face is read: by its nodes at level 0, then by ever fewer places.
+    pub(crate) fn level(&self, level: usize) -> Reading {
+        if level == 0 { Reading::Point } else { Reading::Patch((self.devices + level - 1) as u32) }
+    }
+
+    /// The coarsest of these.
+    pub(crate) fn coarsest(&self) -> usize {
+        self.patches.len() - self.devices
+    }
+
+    /// The tree over the places of a reading, and its triangles.
+    pub(crate) fn tree(&self, reading: Reading) -> (&SurfaceTree, &[[u32; 3]]) {
+        match self.patch(reading).and_then(|patch| patch.some.as_ref()) {
+            Some(some) => (&some.tree, &some.triangles),
+            None => (&self.tree, &self.recording.surface.triangles),
+        }
+    }
+
+    /// The nodes that a reading knows.
+    pub(super) fn places(&self, reading: Reading) -> Vec<u32> {
+        match self.patch(reading).and_then(|patch| patch.some.as_ref()) {
+            Some(some) => some.triangles.iter().map(|corners| corners[0]).collect(),
+            None => (0..self.recording.surface.positions.len() as u32).collect(),
+        }
+    }
+
+    /// Which of these a node is.
+    ///
+    /// # Real time
+    pub(super) fn number(&self, reading: Reading, node: usize) -> usize {
+        self.patch(reading).map_or(node, |patch| patch.number(node))
+    }
+
     fn patch(&self, reading: Reading) -> Option<&PatchField> {
         match reading {
             Reading::Point => None,
@@ -144,10 +197,10 @@ impl Body {
     /// # Real time
     pub(crate) fn displacement(&self, reading: Reading, node: usize, q: &[f64], single: &[f32]) -> DVec3 {
         let (m, shapes) = (self.recording.modes.len(), &self.recording.modes.mode_shapes);
-        let own = 3 * m * node..3 * m * (node + 1);
+        let own = |number: usize| 3 * m * number..3 * m * (number + 1);
         match self.patch(reading) {
-            None => dot3(&shapes[own], q),
-            Some(patch) => dot3_single(&patch.rows[own], single),
+            None => dot3(&shapes[own(node)], q),
+            Some(patch) => dot3_single(&patch.rows[own(patch.number(node))], single),
         }
     }
 
@@ -155,11 +208,15 @@ impl Body {
     ///
     /// # Real time
     pub(crate) fn add_rows(&self, reading: Reading, node: usize, weight: f64, rows: &mut [f64]) {
-        let (own, shapes) = (rows.len() * node..rows.len() * (node + 1), &self.recording.modes.mode_shapes);
+        let length = rows.len();
+        let own = |number: usize| length * number..length * (number + 1);
         match self.patch(reading) {
-            None => rows.iter_mut().zip(&shapes[own]).for_each(|(row, phi)| *row += weight * phi),
+            None => rows
+                .iter_mut()
+                .zip(&self.recording.modes.mode_shapes[own(node)])
+                .for_each(|(row, phi)| *row += weight * phi),
             Some(patch) => {
-                let pairs = rows.iter_mut().zip(&patch.rows[own]);
+                let pairs = rows.iter_mut().zip(&patch.rows[own(patch.number(node))]);
                 pairs.for_each(|(row, phi)| *row += weight * f64::from(*phi));
             }
         }
@@ -225,7 +282,9 @@ impl Body {
             match self.patch(place.reading) {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),
-                Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
+                Some(patch) => {
+                    patch.weights.of(patch.number(corner)).for_each(|(node, w)| give(node, w * weight))
+                }
             }
         }
     }

@@ -94,17 +94,20 @@ impl Response {
         }
     }
 
-    /// Know R[0] between all surface nodes before the first step, if there are not too many; `others` are objects that may
-    /// know it already.
+    /// Know R[0] between all surface nodes, or the places that stand for them, before the first step, where there are not too
+    /// many; `others` are objects that may know it already.
     pub(crate) fn know_nodes<'r>(&mut self, body: &Body, others: impl Iterator<Item = (&'r Body, &'r Self)>) {
         let Self::Modal(modes) = self else { return };
         let same = others.filter(|(other, _)| Arc::ptr_eq(&other.recording, &body.recording));
         let known = |response: &Self| match response {
-            Self::Modal(modes) => modes.nodes.clone(),
+            Self::Modal(modes) => Some(modes.known.clone()),
             Self::Fir(_) => None,
         };
         let same = same.filter_map(|(_, response)| known(response)).next();
-        modes.nodes = same.or_else(|| NodeCompliance::new(body, modes).map(Arc::new));
+        let levels = (0..=body.coarsest()).map(|level| body.level(level));
+        let find = |reading| NodeCompliance::new(body, modes, reading).map(Arc::new);
+        let all = same.unwrap_or_else(|| levels.filter_map(find).collect());
+        modes.known = all;
     }
 
     /// The state at rest of a body with so many surface nodes, with room for so many contact points.

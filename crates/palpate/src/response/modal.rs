@@ -23,8 +23,8 @@ const FLUSH_BELOW: f64 = 1e-150;
 pub(crate) struct SampledModes {
     step_s: f64,
     oscillators: Vec<HeldOscillator>,
-    /// R[0] between nodes, where it is known.
-    pub(super) nodes: Option<Arc<NodeCompliance>>,
+    /// R[0] between the places of readings, where it is known.
+    pub(super) known: Vec<Arc<NodeCompliance>>,
 }
 
 /// State of one object in modal form.
@@ -88,7 +88,7 @@ impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect();
-        Self { step_s, oscillators, nodes: None }
+        Self { step_s, oscillators, known: Vec::new() }
     }
 
     /// Number of modes.
@@ -136,7 +136,7 @@ impl SampledModes {
     /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
     ///
     /// # Real time
-    /// Costs modes × points; points where what nodes do to one another is known.
+    /// Costs modes × points; points where what places do to one another is known.
     pub(crate) fn compliance(
         &self,
         body: &Body,
@@ -149,12 +149,12 @@ impl SampledModes {
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
         let surface = &body.recording.surface;
-        let known = self.nodes.as_ref().filter(|_| place.reading == Reading::Point);
+        let known = self.known.iter().find(|known| known.reading == place.reading);
         let own = surface.corners(&place.point);
         let mut weighed = false;
         for (at, point) in points.iter().enumerate() {
-            if let Some(nodes) = known.filter(|_| point.place.reading == Reading::Point) {
-                give(at, nodes.between(&own, &surface.corners(&point.place.point)));
+            if let Some(known) = known.filter(|known| known.reading == point.place.reading) {
+                give(at, known.between(body, &own, &surface.corners(&point.place.point)));
                 continue;
             }
             if !weighed {

@@ -1,11 +1,11 @@
-//! R[0] between all surface nodes of a body, known before the first step.
+//! R[0] between all surface nodes of a body, or the places that stand for them, known before the first step.
 //!
 //! A face that lands on the floor makes contacts of all its nodes at once. What they do to one another is the paper's
 //! R_cc[0] of equation (9): for a mesh of some size it is computed with the model, and a step looks it up.
 
 use super::dot::dot9;
 use super::modal::SampledModes;
-use super::{Body, Reading};
+use super::{Body, Place, Reading};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DMat3;
@@ -16,48 +16,53 @@ type Corners = [(usize, f64); 3];
 /// Up to so many surface nodes all pairs are kept, 36 bytes times the square of their number.
 const MOST_NODES: usize = 1024;
 
-/// R[0] [m/N, body] between nodes: those not after the row, row by row.
+/// R[0] [m/N, body] between the nodes of a reading: those not after the row, row by row.
 #[derive(Debug)]
 pub(crate) struct NodeCompliance {
+    pub(super) reading: Reading,
     blocks: Vec<DMat3>,
 }
 
 impl NodeCompliance {
     /// Of a body with its modes; none where there are too many nodes.
-    pub(super) fn new(body: &Body, modes: &SampledModes) -> Option<Self> {
-        let nodes = body.recording.surface.positions.len();
+    pub(super) fn new(body: &Body, modes: &SampledModes, reading: Reading) -> Option<Self> {
+        let places = body.places(reading);
+        let nodes = places.len();
         if nodes > MOST_NODES {
             return None;
         }
         let width = 3 * modes.len();
         let mut rows = vec![0.0; nodes * width];
-        for (node, rows) in rows.chunks_exact_mut(width.max(1)).enumerate() {
-            body.add_rows(Reading::Point, node, 1.0, rows);
+        for (node, rows) in places.iter().zip(rows.chunks_exact_mut(width.max(1))) {
+            body.add_rows(reading, *node as usize, 1.0, rows);
         }
-        let of = |node: usize| &rows[node * width..(node + 1) * width];
+        let place = |number: usize| Place { point: body.node_point(places[number] as usize), reading };
+        let of = |number: usize| &rows[number * width..(number + 1) * width];
         let mut weighted = vec![0.0; width];
         let mut blocks = Vec::with_capacity(nodes * (nodes + 1) / 2);
         for a in 0..nodes {
             modes.weigh(of(a), &mut weighted);
-            blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + body.recording.residual.block(a, b)));
+            let residual = |b: usize| body.residual(&place(a), &place(b));
+            blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + residual(b)));
         }
-        Some(Self { blocks })
+        Some(Self { reading, blocks })
     }
 
     /// Displacement at a place per force at another, both by the weights of surface nodes.
     ///
     /// # Real time
-    pub(super) fn between(&self, a: &Corners, b: &Corners) -> DMat3 {
+    pub(super) fn between(&self, body: &Body, a: &Corners, b: &Corners) -> DMat3 {
+        let number = |node: usize| body.number(self.reading, node);
         let mut sum = DMat3::ZERO;
         for &(a, of_a) in a.iter().filter(|corner| corner.1 != 0.0) {
             for &(b, of_b) in b.iter().filter(|corner| corner.1 != 0.0) {
-                sum += self.of_nodes(a, b) * (of_a * of_b);
+                sum += self.of(number(a), number(b)) * (of_a * of_b);
             }
         }
         sum
     }
 
-    fn of_nodes(&self, a: usize, b: usize) -> DMat3 {
+    fn of(&self, a: usize, b: usize) -> DMat3 {
         let of = |row: usize, column: usize| self.blocks[row * (row + 1) / 2 + column];
         if a >= b { of(a, b) } else { of(b, a).transpose() }
     }
@@ -65,7 +70,7 @@ impl NodeCompliance {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Place, Responding, Response, ResponseForm};
+    use super::super::{Responding, Response, ResponseForm};
     use super::*;
     use crate::contact::ContactPoints;
     use crate::recording::Recording;
@@ -77,7 +82,7 @@ mod tests {
     fn what_is_looked_up_is_what_modes_and_residual_compliance_give() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let body = Body::new(recording.clone(), &[]);
+        let body = Body::new(recording.clone(), &[], usize::MAX);
         let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
         let mut looked_up = computed.clone();
         looked_up.know_nodes(&body, core::iter::empty());
@@ -95,7 +100,7 @@ mod tests {
         for (a, b) in blocks(&computed).iter().zip(blocks(&looked_up)) {
             assert!(a.abs_diff_eq(b, 1e-14 * a.x_axis.length()), "{a} {b}");
         }
-        let of = |response: &Response| matches!(response, Response::Modal(modes) if modes.nodes.is_some());
+        let of = |response: &Response| matches!(response, Response::Modal(modes) if !modes.known.is_empty());
         assert!(of(&looked_up) && !of(&computed));
     }
 }

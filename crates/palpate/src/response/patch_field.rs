@@ -1,5 +1,5 @@
-//! What contact patches of one radius see of a body: mode shapes averaged over the patch about every surface node,
-//! and the residual compliance between patches.
+//! What contact patches of one radius see of a body: mode shapes averaged over the patch about every surface node, or
+//! about some that stand for all, and the residual compliance between patches.
 //!
 //! ```text
 //! G_c = Σᵢ wᵢ·Φᵢ        D_c = Σᵢⱼ wᵢ·Sᵢⱼ·wⱼ = A_c·A_cᵀ        K(x, y) = A(x)·ψ(|x − y|/L)·A(y)ᵀ
@@ -10,7 +10,7 @@
 //! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{Bands, Bounds, PatchWeights, SurfacePoint, SurfaceTree, band};
+use crate::surface::{Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -22,24 +22,66 @@ pub(crate) struct PatchField {
     /// a [m].
     pub(crate) radius: f64,
     pub(crate) weights: PatchWeights,
-    /// G [1/√kg], laid out as the mode shapes: (3·node + axis)·m + mode. Single precision is what a search on a fine
+    /// G [1/√kg], laid out as the mode shapes: (3·patch + axis)·m + mode. Single precision is what a search on a fine
     /// mesh reads in half the time.
     pub(crate) rows: Vec<f32>,
-    /// A [√(m/N)], lower triangular, per node.
+    /// A [√(m/N)], lower triangular, per patch.
     roots: Vec<DMat3>,
     /// L [m].
     range: f64,
     pub(crate) bounds: Bounds,
+    /// The nodes that have a patch, where not all have one.
+    pub(crate) some: Option<SomeNodes>,
+}
+
+/// Some of the surface nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct SomeNodes {
+    /// Which of them every surface node is; [`NONE`] for the others.
+    numbers: Vec<u32>,
+    /// Each as a triangle without extent, and the tree over these.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) tree: SurfaceTree,
+}
+
+/// No patch.
+const NONE: u32 = u32::MAX;
+
+impl SomeNodes {
+    pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
+        let mut numbers = vec![NONE; surface.positions.len()];
+        nodes.iter().enumerate().for_each(|(number, &node)| numbers[node as usize] = number as u32);
+        let triangles: Vec<[u32; 3]> = nodes.iter().map(|&node| [node; 3]).collect();
+        let tree = SurfaceTree::new(&surface.positions, &triangles);
+        Self { numbers, triangles, tree }
+    }
 }
 
 /// Pairs of nodes that the range is fitted to.
 const FIT_CENTRES: usize = 24;
 
 impl PatchField {
+    /// About all surface nodes, over whose triangles there is a tree.
     pub(crate) fn new(recording: &Recording, tree: &SurfaceTree, radius: f64) -> Self {
+        let all: Vec<u32> = (0..recording.surface.positions.len() as u32).collect();
+        let field = Self::without_bounds(recording, &all, radius);
+        let bounds = field.find_bounds(recording, tree, &recording.surface.triangles);
+        Self { bounds, ..field }
+    }
+
+    /// About some of them.
+    pub(crate) fn about(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
+        let some = SomeNodes::new(&recording.surface, nodes);
+        let field = Self { some: Some(some), ..Self::without_bounds(recording, nodes, radius) };
+        let some = field.some.as_ref();
+        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.triangles));
+        Self { bounds: bounds.unwrap_or_default(), ..field }
+    }
+
+    fn without_bounds(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
         let (surface, modes) = (&recording.surface, &recording.modes);
-        let (n, m) = (surface.positions.len(), modes.len());
-        let weights = PatchWeights::new(surface, recording.metadata.mesh.order, radius);
+        let (n, m) = (nodes.len(), modes.len());
+        let weights = PatchWeights::new(surface, recording.metadata.mesh.order, radius, nodes);
         let mut rows = Vec::with_capacity(3 * n * m);
         let mut sums = vec![0.0; 3 * m];
         for c in 0..n {
@@ -50,16 +92,7 @@ impl PatchField {
             }
             rows.extend(sums.iter().map(|&sum| sum as f32));
         }
-        let between = |c: usize, d: usize| {
-            let mut sum = DMat3::ZERO;
-            for (i, wi) in weights.of(c) {
-                for (j, wj) in weights.of(d) {
-                    sum += recording.residual.block(i, j) * (wi * wj);
-                }
-            }
-            sum
-        };
-        let mut spread = vec![0.0; n];
+        let mut spread = vec![0.0; surface.positions.len()];
         let own: Vec<DMat3> = (0..n)
             .map(|c| match &recording.residual {
                 // Row by row: most nodes of a large patch are too far apart to answer each other.
@@ -73,19 +106,43 @@ impl PatchField {
                     weights.of(c).for_each(|(node, _)| spread[node] = 0.0);
                     sum
                 }
-                _ => between(c, c),
+                _ => {
+                    let pairs =
+                        weights.of(c).flat_map(|(i, wi)| weights.of(c).map(move |(j, wj)| (i, j, wi * wj)));
+                    pairs.map(|(i, j, w)| recording.residual.block(i, j) * w).sum()
+                }
             })
             .collect();
         let roots = own.iter().map(root).collect();
-        let range = fit_range(recording, radius, &own, between);
-        let field = Self { radius, weights, rows, roots, range, bounds: Bounds::default() };
-        let distances = ModalDistances::new(recording, &field.rows);
-        let bounds = tree.bounds(
-            surface,
-            |i, c| distances.between(i, c),
-            |i| libm::sqrt(trace(&(field.roots[i] * field.roots[i].transpose()))),
-        );
-        Self { bounds, ..field }
+        let places: Vec<DVec3> = nodes.iter().map(|&node| surface.positions[node as usize]).collect();
+        let mut field = vec![DMat3::ZERO; surface.positions.len()];
+        let shares = |c: usize, others: &[usize]| -> Vec<f64> {
+            answer(&recording.residual, weights.of(c), &mut field);
+            let scale = |d: usize| libm::sqrt(trace(&own[c]) * trace(&own[d]));
+            let between = |d: usize| weights.of(d).map(|(j, w)| trace(&field[j]) * w).sum::<f64>();
+            others.iter().map(|&d| between(d) / scale(d)).collect()
+        };
+        let range = fit_range(&places, surface.mean_edge(), radius, shares);
+        Self { radius, weights, rows, roots, range, bounds: Bounds::default(), some: None }
+    }
+
+    fn find_bounds(&self, recording: &Recording, tree: &SurfaceTree, triangles: &[[u32; 3]]) -> Bounds {
+        let distances = ModalDistances::new(recording, &self.rows);
+        tree.bounds(
+            triangles,
+            |i, c| distances.between(self.number(i), c.map(|c| self.number(c))),
+            |i| {
+                let root = self.roots[self.number(i)];
+                libm::sqrt(trace(&(root * root.transpose())))
+            },
+        )
+    }
+
+    /// The patch about a surface node that has one.
+    ///
+    /// # Real time
+    pub(crate) fn number(&self, node: usize) -> usize {
+        self.some.as_ref().map_or(node, |some| some.numbers[node] as usize)
     }
 
     /// A at a surface point.
@@ -93,7 +150,8 @@ impl PatchField {
     /// # Real time
     pub(crate) fn root_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
         let corners = recording.surface.corners(point);
-        corners.iter().map(|&(node, w)| self.roots[node] * w).fold(DMat3::ZERO, |a, b| a + b)
+        let used = corners.iter().filter(|corner| corner.1 != 0.0);
+        used.map(|&(node, w)| self.roots[self.number(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
     /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position, around which it is flat.
@@ -109,7 +167,7 @@ impl PatchField {
     ) -> DVec3 {
         let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
         if distance < self.range {
-            self.roots[node] * pull * NearField::taper(distance / self.range)
+            self.roots[self.number(node)] * pull * NearField::taper(distance / self.range)
         } else {
             DVec3::ZERO
         }
@@ -194,31 +252,41 @@ fn root(matrix: &DMat3) -> DMat3 {
     DMat3::from_cols_array_2d(&lower).transpose()
 }
 
-/// The range with which ψ comes nearest to how S falls off between patches.
+/// What a force that is spread over a patch does to every node by the residual compliance, for each direction: Σᵢ wᵢ·Sᵢⱼ.
+fn answer(residual: &ResidualCompliance, patch: impl Iterator<Item = (usize, f64)>, field: &mut [DMat3]) {
+    field.fill(DMat3::ZERO);
+    for (i, w) in patch {
+        match residual {
+            ResidualCompliance::NearField(near) => near.row(i).for_each(|(j, block)| field[j] += block * w),
+            _ => field.iter_mut().enumerate().for_each(|(j, sum)| *sum += residual.block(i, j) * w),
+        }
+    }
+}
+
+/// The range with which ψ comes nearest to how S falls off between patches about places: `shares(c, others)` tells it of
+/// patch c and others, as shares of what it is in their own places.
 fn fit_range(
-    recording: &Recording,
+    places: &[DVec3],
+    edge: f64,
     radius: f64,
-    own: &[DMat3],
-    between: impl Fn(usize, usize) -> DMat3,
+    mut shares: impl FnMut(usize, &[usize]) -> Vec<f64>,
 ) -> f64 {
-    let surface = &recording.surface;
-    let edge = surface.mean_edge();
     let widest = 6.0 * (radius + edge);
-    let n = surface.positions.len();
+    let n = places.len();
     let mut samples = Vec::new();
     for c in (0..n).step_by((n / FIT_CENTRES).max(1)) {
-        // A few nodes at growing distances.
+        // A few places at growing distances.
+        let distance = |d: usize| (places[d] - places[c]).length();
         let mut wanted = 0.5 * edge;
-        for d in 0..n {
-            let distance = (surface.positions[d] - surface.positions[c]).length();
-            if d != c && distance < widest && distance > wanted {
-                let scale = libm::sqrt(trace(&own[c]) * trace(&own[d]));
-                if scale > 0.0 {
-                    samples.push((distance, trace(&between(c, d)) / scale));
-                }
-                wanted = if distance > 0.9 * widest { 0.5 * edge } else { distance };
+        let mut others = Vec::new();
+        for d in (0..n).filter(|&d| d != c && distance(d) < widest) {
+            if distance(d) > wanted {
+                others.push(d);
+                wanted = if distance(d) > 0.9 * widest { 0.5 * edge } else { distance(d) };
             }
         }
+        let shares = shares(c, &others).into_iter().zip(others).filter(|(share, _)| share.is_finite());
+        samples.extend(shares.map(|(share, d)| (distance(d), share)));
     }
     let error = |range: f64| -> f64 {
         let miss = |&(distance, share): &(f64, f64)| NearField::taper(distance / range) - share;

@@ -6,10 +6,12 @@
 
 mod face;
 mod patch;
+mod thin;
 mod tree;
 mod triangle;
 
 pub(crate) use patch::{PatchWeights, triangles_around};
+pub(crate) use thin::thinned;
 pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, band, low_modes};
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 

@@ -15,7 +15,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Weights of the patches about all surface nodes.
+/// Weights of the patches about surface nodes.
 #[derive(Debug, Clone)]
 pub(crate) struct PatchWeights {
     offsets: Vec<u32>,
@@ -31,8 +31,8 @@ const FINE: f64 = 0.25;
 const MOST_HALVINGS: u32 = 7;
 
 impl PatchWeights {
-    /// On a surface of finite elements of an order.
-    pub(crate) fn new(surface: &Surface, order: u32, radius: f64) -> Self {
+    /// About some nodes of a surface of finite elements of an order.
+    pub(crate) fn new(surface: &Surface, order: u32, radius: f64, centres: &[u32]) -> Self {
         let faces = Faces::new(surface, order);
         let n = surface.positions.len();
         let around = triangles_around(surface);
@@ -42,7 +42,7 @@ impl PatchWeights {
         let mut seen = vec![u32::MAX; surface.triangles.len()];
         let mut known = vec![u32::MAX; n];
         let (mut queue, mut touched) = (Vec::new(), Vec::new());
-        for c in 0..n {
+        for c in centres.iter().map(|&c| c as usize) {
             let centre = surface.positions[c];
             let normal = around[c].iter().map(|&t| normals[t as usize]).sum::<DVec3>().normalize_or_zero();
             queue.clear();
@@ -99,9 +99,9 @@ impl PatchWeights {
         patches
     }
 
-    /// Nodes and weights of the patch about a node; the weights sum to 1.
-    pub(crate) fn of(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
-        let range = self.offsets[node] as usize..self.offsets[node + 1] as usize;
+    /// Nodes and weights of the patch of this number; the weights sum to 1.
+    pub(crate) fn of(&self, number: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
+        let range = self.offsets[number] as usize..self.offsets[number + 1] as usize;
         self.nodes[range.clone()].iter().map(|&n| n as usize).zip(self.weights[range].iter().copied())
     }
 }
@@ -116,7 +116,7 @@ pub(crate) fn triangles_around(surface: &Surface) -> Vec<Vec<u32>> {
 }
 
 /// Twice the area of a triangle, along its normal [m²].
-fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
+pub(super) fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
     area_normal(surface.triangles[triangle].map(|node| surface.positions[node as usize]))
 }
 
@@ -176,7 +176,7 @@ mod tests {
         // ∫k·r²/∫k = a²/4; the hat functions add a sixth of an edge squared per axis, and a bit across the diagonals.
         let (a, n) = (0.3, 40);
         let surface = sheet(n);
-        let patches = PatchWeights::new(&surface, 1, a);
+        let patches = PatchWeights::new(&surface, 1, a, &surface.source_nodes);
         let c = (n / 2 * (n + 1) + n / 2) as usize;
         let (mut sum, mut mean, mut square) = (0.0, DVec3::ZERO, 0.0);
         for (node, w) in patches.of(c) {
@@ -195,7 +195,7 @@ mod tests {
     fn a_small_patch_is_its_node() {
         let surface = sheet(4);
         for radius in [0.0, 1e-5] {
-            let patches = PatchWeights::new(&surface, 1, radius);
+            let patches = PatchWeights::new(&surface, 1, radius, &surface.source_nodes);
             let most = patches.of(12).fold(0.0, |most: f64, (node, w)| if node == 12 { w } else { most });
             assert!(most > 0.999, "{most}");
         }
@@ -226,8 +226,9 @@ mod tests {
         // ∫k·x²/∫k = a²/8, with nothing added by the mesh, however coarse.
         let n = 8;
         let surface = quadratic_sheet(n);
+        let all: Vec<u32> = (0..surface.positions.len() as u32).collect();
         for (a, place) in [(0.4, [4, 4]), (0.3, [4, 5]), (0.25, [5, 4]), (0.2, [5, 5])] {
-            let patches = PatchWeights::new(&surface, 2, a);
+            let patches = PatchWeights::new(&surface, 2, a, &all);
             let c = (place[0] * (n + 1) + place[1]) as usize;
             let centre = surface.positions[c];
             let field = |of: fn(DVec3) -> f64| -> f64 {

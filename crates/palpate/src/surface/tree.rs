@@ -201,29 +201,30 @@ fn widen(of: &mut [f32; BANDS], by: impl Fn(usize) -> f64) {
 }
 
 impl SurfaceTree {
-    pub(crate) fn new(surface: &Surface) -> Self {
-        let mut tree = Self { nodes: Vec::new(), triangles: (0..surface.triangles.len() as u32).collect() };
-        let centres: Vec<DVec3> = (0..surface.triangles.len())
-            .map(|t| surface.triangles[t].iter().map(|&n| surface.positions[n as usize]).sum::<DVec3>() / 3.0)
-            .collect();
-        let count = tree.triangles.len();
+    /// Over triangles between positions [m]; a node alone is a triangle of three times itself.
+    pub(crate) fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        let count = triangles.len();
+        let mut tree = Self { nodes: Vec::new(), triangles: (0..count as u32).collect() };
+        let middle = |corners: &[u32; 3]| corners.iter().map(|&n| positions[n as usize]).sum::<DVec3>() / 3.0;
+        let centres: Vec<DVec3> = triangles.iter().map(middle).collect();
         if count > 0 {
-            tree.build(surface, &centres, 0, count);
+            tree.build((positions, triangles), &centres, 0, count);
         }
         tree
     }
 
-    fn build(&mut self, surface: &Surface, centres: &[DVec3], first: usize, count: usize) {
+    fn build(&mut self, surface: (&[DVec3], &[[u32; 3]]), centres: &[DVec3], first: usize, count: usize) {
+        let (positions, triangles) = surface;
         let below = &mut self.triangles[first..first + count];
-        let corners = |t: &u32| surface.triangles[*t as usize].map(|n| surface.positions[n as usize]);
+        let corners = |t: &u32| triangles[*t as usize].map(|n| positions[n as usize]);
         let points = || below.iter().flat_map(corners);
         let low = points().reduce(DVec3::min).unwrap_or_default();
         let high = points().reduce(DVec3::max).unwrap_or_default();
         let middle = (low + high) * 0.5;
-        let nodes = below.iter().flat_map(|t| surface.triangles[*t as usize]);
-        let off = |node: &u32| (surface.positions[*node as usize] - middle).length_squared();
+        let nodes = below.iter().flat_map(|t| triangles[*t as usize]);
+        let off = |node: &u32| (positions[*node as usize] - middle).length_squared();
         let centre = nodes.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default();
-        let at = surface.positions[centre as usize];
+        let at = positions[centre as usize];
         let radius = points().map(|p| (p - at).length()).fold(0.0, f64::max);
         let place = self.nodes.len();
         self.nodes.push(TreeNode { centre, radius, first: first as u32, count: count as u32, second: 0 });
@@ -244,12 +245,15 @@ impl SurfaceTree {
     /// √(Σ|φᵢ|²/ω²) without c, and `residual(i)` √tr(Sᵢᵢ).
     pub(crate) fn bounds(
         &self,
-        surface: &Surface,
+        triangles: &[[u32; 3]],
         modal: impl Fn(usize, Option<usize>) -> Bands,
         residual: impl Fn(usize) -> f64,
     ) -> Bounds {
-        let own: Vec<(Bands, f32)> =
-            (0..surface.positions.len()).map(|i| (modal(i, None), (residual(i) as f32).next_up())).collect();
+        let nodes = triangles.iter().flatten().max().map_or(0, |node| *node as usize + 1);
+        let mut own: Vec<Option<(Bands, f32)>> = vec![None; nodes];
+        for i in triangles.iter().flatten().map(|node| *node as usize) {
+            own[i].get_or_insert_with(|| (modal(i, None), (residual(i) as f32).next_up()));
+        }
         let mut spreads = vec![Spread::default(); self.nodes.len()];
         // Children come after their parents.
         for at in (0..self.nodes.len()).rev() {
@@ -258,10 +262,11 @@ impl SurfaceTree {
             let mut spread = Spread::default();
             if node.count as usize <= 16 * LEAF {
                 for triangle in self.triangles_of(&node) {
-                    for i in surface.triangles[triangle as usize] {
+                    for i in triangles[triangle as usize] {
                         let i = i as usize;
-                        widen(&mut spread.modal, |band| own[i].0[band]);
-                        spread.residual = spread.residual.max(own[i].1);
+                        let (moves, dent) = own[i].unwrap_or_default();
+                        widen(&mut spread.modal, |band| moves[band]);
+                        spread.residual = spread.residual.max(dent);
                         if i != c {
                             let apart = modal(i, Some(c));
                             widen(&mut spread.apart, |band| apart[band]);

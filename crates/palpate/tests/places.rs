@@ -1,0 +1,148 @@
+//! Faces that meet obstacles at fewer places than they have nodes, on a released sample with a finer surface (a block of
+//! 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
+
+mod refined;
+
+use glam::{DQuat, DVec3};
+use palpate::{
+    DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Output,
+    Pose, Recording, Shape, State, Twist, step,
+};
+use refined::refined;
+use std::sync::Arc;
+
+const H: f64 = 1e-3;
+const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+
+fn block() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    Arc::new(refined(&Recording::from_bytes(bytes).expect("a released recording"), 2))
+}
+
+fn floor(friction: f64) -> Obstacle {
+    Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction }
+}
+
+fn on_a_floor(recording: &Arc<Recording>, most_places: usize, pose: Pose) -> (Model, State) {
+    let parameters = ModelParameters {
+        gravity: GRAVITY,
+        obstacles: vec![floor(0.4)],
+        most_places,
+        ..ModelParameters::default()
+    };
+    let start = ObjectStart { pose, twist: Twist::ZERO };
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start)]).expect("a model");
+    let state = State::new(&model);
+    (model, state)
+}
+
+fn at(position: DVec3) -> Pose {
+    Pose { position, ..Pose::IDENTITY }
+}
+
+/// What a ledger lacks to be closed [J].
+fn open(output: &Output, start: f64) -> f64 {
+    let e = &output.energy;
+    e.stored() - start - (e.input - e.lost())
+}
+
+#[test]
+fn a_block_lies_on_few_places_as_on_all_its_nodes() {
+    let recording = block();
+    let weight = recording.mass() * 9.81;
+    for most in [usize::MAX, 24, 12] {
+        let (model, mut state) = on_a_floor(&recording, most, at(DVec3::Y * 0.0502));
+        let mut force = DVec3::ZERO;
+        for number in 0..6000 {
+            let output = step(&model, &mut state, &Input::default());
+            assert!(output.contacts.len() <= most.min(45));
+            if number >= 5000 {
+                force += output.contacts.iter().map(|c| c.force).sum::<DVec3>() * 1e-3;
+            }
+        }
+        let output = state.output();
+        assert!((force - DVec3::Y * weight).length() < 1e-3 * weight, "{most}: {force}");
+        // It stands on its corners, too.
+        let pose = output.objects[0].pose;
+        let outmost = |side: f64| {
+            output.contacts.iter().map(|c| side * (c.point.x - pose.position.x)).fold(0.0, f64::max)
+        };
+        assert!(outmost(1.0) > 0.099 && outmost(-1.0) > 0.099, "{most}");
+        assert!((most == usize::MAX) == (output.contacts.len() > 24), "{}", output.contacts.len());
+    }
+}
+
+#[test]
+fn places_carry_the_change_of_momentum_and_take_what_gets_lost() {
+    let recording = block();
+    let mass = recording.mass();
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 0.3, 0.8);
+    for pose in [at(DVec3::Y * 0.054), Pose { position: DVec3::Y * 0.14, orientation: turn }] {
+        let (model, mut state) = on_a_floor(&recording, 24, pose);
+        let stored = state.output().energy.stored();
+        let (mut momentum, mut most) = (DVec3::ZERO, 0);
+        for number in 0..2500 {
+            let output = step(&model, &mut state, &Input::default());
+            let force: DVec3 = output.contacts.iter().map(|c| c.force).sum();
+            momentum += (force + GRAVITY * mass) * H;
+            let error = (output.objects[0].twist.linear * mass - momentum).length();
+            assert!(error < 1e-12, "step {number}: {error}");
+            for contact in &output.contacts {
+                let normal = contact.force.dot(-contact.normal);
+                let across = (contact.force + contact.normal * normal).length();
+                assert!(
+                    normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9),
+                    "in the cone: {number} {normal} {across} {:?}",
+                    output.status
+                );
+            }
+            assert!(output.energy.stored() <= stored + 1e-12, "step {number}");
+            assert!(open(output, stored).abs() < 1e-12, "step {number}: {}", open(output, stored));
+            most = most.max(output.contacts.len());
+        }
+        assert!((8..=24).contains(&most), "{most}");
+    }
+}
+
+#[test]
+fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
+    let recording = block();
+    let shapes = [
+        Shape::Sphere { radius: 0.3 },
+        Shape::Sphere { radius: 0.01 },
+        Shape::Box { half_extents: DVec3::new(0.2, 0.02, 0.2) },
+        Shape::Capsule { radius: 0.03, half_length: 0.2 },
+    ];
+    let obstacles: Vec<Obstacle> =
+        shapes.into_iter().map(|shape| Obstacle { shape, pose: Pose::IDENTITY, friction: 0.7 }).collect();
+    let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.03, friction: 0.5, coupling: None };
+    let parameters =
+        ModelParameters { obstacles, devices: vec![finger], most_places: 8, ..ModelParameters::default() };
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
+    let mut state = State::new(&model);
+    let mut most = [0; 4];
+    for number in 0..12_000_u32 {
+        let t = f64::from(number) * H;
+        let centre = state.output().objects[0].pose.position;
+        // They come from all sides, press, and go, one after the other and sometimes two.
+        let obstacles = (0..4).map(|k| {
+            let phase = t * (1.1 + 0.37 * f64::from(k)) + f64::from(k);
+            let way = DVec3::new((3.1 * phase).sin(), (2.3 * phase).cos(), (1.7 * phase).sin());
+            let far = [0.36, 0.09, 0.12, 0.1][k as usize] + 0.06 * (5.0 * phase).sin().max(-0.4);
+            let orientation = DQuat::from_rotation_arc(DVec3::Y, way.normalize());
+            Pose { position: centre + way.normalize() * far, orientation }
+        });
+        let device = DeviceInput::touching(centre + DVec3::new(0.1 * (7.0 * t).sin(), 0.11, 0.0));
+        let input = Input { obstacles: obstacles.collect(), devices: vec![device] };
+        let output = step(&model, &mut state, &input);
+        let energy = &output.energy;
+        assert!(energy.stored() <= energy.input + 1e-9 * (1.0 + energy.input.abs()), "{number}: {energy:?}");
+        assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
+        for (k, most) in most.iter_mut().enumerate() {
+            let its = |c: &&palpate::ContactOutput| c.against == palpate::Against::Obstacle(k);
+            *most = (*most).max(output.contacts.iter().filter(its).count());
+        }
+    }
+    assert!(most.iter().all(|most| *most > 0), "{most:?}");
+}
