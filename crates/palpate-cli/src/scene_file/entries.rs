@@ -15,6 +15,7 @@ pub(super) struct SceneFile {
     pub motion: Option<Spanned<String>>,
     pub rigid_compliance: Option<bool>,
     pub most_contact_points: Option<Spanned<i64>>,
+    pub most_places: Option<Spanned<i64>>,
     #[serde(default)]
     pub object: Vec<ObjectEntry>,
     #[serde(default)]

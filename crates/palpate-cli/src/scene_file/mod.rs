@@ -19,9 +19,10 @@ use palpate_haptics::log::Names;
 use place::Source;
 pub use place::{Carried, read_path};
 use std::collections::HashSet;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use toml::Spanned;
 
 /// A scene that is ready to run.
 pub struct Scene {
@@ -70,6 +71,10 @@ pub const LARGEST: f64 = 1e6;
 /// An object's contact points answer one another: 9·n² numbers, here a gigabyte.
 const MOST_CONTACT_POINTS: i64 = 4096;
 
+/// Places at which an object may meet an obstacle, at most; and so many where steps must be done in time.
+const PLACES: RangeInclusive<i64> = 8..=1_000_000;
+const REALTIME_PLACES: usize = 48;
+
 impl SceneDevice {
     /// Where its path is at a time [s]; at the origin without one.
     pub fn at(&self, t: f64) -> DVec3 {
@@ -105,13 +110,22 @@ impl Scene {
     }
 }
 
+/// What a scene is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// As exact as it can be, however long that takes.
+    Offline,
+    /// Steps that are done in time.
+    RealTime,
+}
+
 /// Read a scene file, its recordings, meshes and paths.
-pub fn read(path: &Path) -> Result<Scene, Failure> {
-    read_carried(path, &Carried::new())
+pub fn read(path: &Path, pace: Pace) -> Result<Scene, Failure> {
+    read_carried(path, &Carried::new(), pace)
 }
 
 /// The same where files are carried along, and lie elsewhere than the scene says.
-pub fn read_carried(path: &Path, carried: &Carried) -> Result<Scene, Failure> {
+pub fn read_carried(path: &Path, carried: &Carried, pace: Pace) -> Result<Scene, Failure> {
     let place = carried.get(path).map_or(path, PathBuf::as_path);
     let bytes = std::fs::read(place).map_err(|e| Failure::file("read the scene", path, &e))?;
     let Ok(text) = String::from_utf8(bytes) else {
@@ -139,7 +153,7 @@ pub fn read_carried(path: &Path, carried: &Carried) -> Result<Scene, Failure> {
         file.object.iter().map(|entry| objects::read_object(&source, entry)).collect();
     let objects = objects?;
     let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
-    let mut parameters = read_rules(&source, &file)?;
+    let mut parameters = read_rules(&source, &file, pace)?;
     for entry in &file.device {
         parameters.devices.push(devices::read_parameters(&source, entry)?);
     }
@@ -173,10 +187,10 @@ pub fn read_carried(path: &Path, carried: &Carried) -> Result<Scene, Failure> {
 
 /// Names stand in CSV files: each once, and without separators.
 fn check_names(source: &Source, file: &SceneFile) -> Result<(), Failure> {
-    let own = |name: &toml::Spanned<String>| (name.get_ref().clone(), name.span());
+    let own = |name: &Spanned<String>| (name.get_ref().clone(), name.span());
     // One without a name is told of at its first line.
-    let or = |name: &Option<toml::Spanned<String>>, kind: &str, number: usize, entry: Range<usize>| {
-        let place = name.as_ref().map_or(entry, toml::Spanned::span);
+    let or = |name: &Option<Spanned<String>>, kind: &str, number: usize, entry: Range<usize>| {
+        let place = name.as_ref().map_or(entry, Spanned::span);
         (obstacles::name_or(name.as_ref(), kind, number), place)
     };
     let objects = file.object.iter().map(|entry| own(&entry.name));
@@ -199,7 +213,7 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), Failure> {
 }
 
 /// What holds for the whole scene, without its devices and obstacles.
-fn read_rules(source: &Source, file: &SceneFile) -> Result<ModelParameters, Failure> {
+fn read_rules(source: &Source, file: &SceneFile, pace: Pace) -> Result<ModelParameters, Failure> {
     let usual = ModelParameters::default();
     let motion = match file.motion.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
         None | Some(("exact", _)) => MotionRule::ExactHeld,
@@ -213,20 +227,34 @@ fn read_rules(source: &Source, file: &SceneFile) -> Result<ModelParameters, Fail
     } else {
         RigidCompliance::Dropped
     };
-    let most_contact_points = match &file.most_contact_points {
-        None => usual.most_contact_points,
-        Some(most) if (1..=MOST_CONTACT_POINTS).contains(most.get_ref()) => *most.get_ref() as usize,
-        Some(most) => {
-            let given = most.get_ref();
-            return source.fail(
-                most.span(),
-                format!("most_contact_points is {given}, expected 1 to {MOST_CONTACT_POINTS}"),
-            );
+    let count = |name: &str, given: &Option<Spanned<i64>>, usual: usize, allowed: RangeInclusive<i64>| {
+        let Some(given) = given else { return Ok(usual) };
+        let (count, span) = (*given.get_ref(), given.span());
+        if allowed.contains(&count) {
+            return Ok(count as usize);
         }
+        let (least, most) = (allowed.start(), allowed.end());
+        source.fail(span, format!("{name} is {count}, expected {least} to {most}"))
     };
+    let usual_places = match pace {
+        Pace::Offline => usual.most_places,
+        Pace::RealTime => REALTIME_PLACES,
+    };
+    let allowed = 1..=MOST_CONTACT_POINTS;
+    let most_contact_points =
+        count("most_contact_points", &file.most_contact_points, usual.most_contact_points, allowed)?;
+    let most_places = count("most_places", &file.most_places, usual_places, PLACES)?;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
     let gravity = DVec3::from_array(file.gravity.0);
-    Ok(ModelParameters { step_s, gravity, motion, rigid_compliance, most_contact_points, ..usual })
+    Ok(ModelParameters {
+        step_s,
+        gravity,
+        motion,
+        rigid_compliance,
+        most_contact_points,
+        most_places,
+        ..usual
+    })
 }
 
 /// Build the model; what it refuses is told of where it stands.
@@ -246,7 +274,7 @@ fn build(
             }
         }
         // Devices, obstacles and gravity have been checked where they stand: what is left to be wrong is the step.
-        source.fail(file.step.as_ref().map_or(0..0, toml::Spanned::span), text)
+        source.fail(file.step.as_ref().map_or(0..0, Spanned::span), text)
     })
 }
 
@@ -254,7 +282,7 @@ fn build(
 fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let recordings = file.object.iter().map(|object| &object.recording);
     let paths = file.device.iter().filter_map(|device| Some(&device.path.as_ref()?.file));
-    let obstacles = file.obstacle.iter().map(toml::Spanned::get_ref);
+    let obstacles = file.obstacle.iter().map(Spanned::get_ref);
     let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
     let files = recordings.chain(paths).chain(meshes).chain(moves);

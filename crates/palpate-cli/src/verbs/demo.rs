@@ -3,6 +3,7 @@
 use crate::Failure;
 use crate::plot::{Curve, plot};
 use crate::progress::{Bars, WithoutRemarks};
+use crate::scene_file::{self, Pace};
 use crate::verbs::run::{self, simulate};
 use crate::verbs::{inspect, print, read_recording, write_whole};
 use clap::Args;
@@ -69,7 +70,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     }
     let scene_path = output.join("shake.toml");
     write_whole(&scene_path, SCENE.as_bytes())?;
-    let scene = crate::scene_file::read(&scene_path)?;
+    let scene = scene_file::read(&scene_path, Pace::Offline)?;
     let options = run::Arguments {
         scene: scene_path.clone(),
         duration: Some(DURATION_S),

@@ -1,7 +1,7 @@
 //! `palpate replay`: a log of a run in real time, repeated and compared.
 
 use crate::Failure;
-use crate::scene_file::{self, Carried, Scene};
+use crate::scene_file::{self, Carried, Pace, Scene};
 use crate::verbs::run::{OutputArguments, Outputs};
 use crate::verbs::{print, print_json};
 use clap::Args;
@@ -118,6 +118,6 @@ fn unpack(reader: &Reader, scene: Option<&Path>) -> Result<(Scene, TempDir), Unp
         written.map_err(|e| Unpacked::Other(Failure::file("unpack", &place, &e)))?;
         carried.insert(name, place);
     }
-    let scene = scene_file::read_carried(scene, &carried).map_err(Unpacked::Other)?;
+    let scene = scene_file::read_carried(scene, &carried, Pace::RealTime).map_err(Unpacked::Other)?;
     Ok((scene, folder))
 }

@@ -10,7 +10,7 @@ use std::time::Instant;
 /// Compute cases with known answers and show the errors and orders of convergence
 ///
 /// Frequencies of cubes and spheres, compliances, a pinch against the solution with all modes, a shaken bar, free flight,
-/// momentum and energy; contact: bounces, friction, presses, Hertz's law, pinched and lifted cubes, stacks, a million
+/// momentum and energy; contact: bounces, faces on few places, friction, presses, Hertz's law, pinched and lifted cubes, stacks, a million
 /// steps of random fingers. Takes some eight minutes in all. Exit status 1 when a check fails.
 #[derive(Args)]
 pub struct Arguments {

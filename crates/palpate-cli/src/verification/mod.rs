@@ -15,6 +15,7 @@ mod impulse;
 mod lift;
 mod motion;
 mod pinch;
+mod places;
 mod press;
 mod random;
 mod scene;
@@ -147,6 +148,11 @@ pub const CASES: &[Case] = &[
         name: "bounce-many-modes",
         about: "the same fall with 1200 modes, as many as the rebound needs at every step",
         run: bounce::bounce_many_modes,
+    },
+    Case {
+        name: "places",
+        about: "cubes and a ball that lie, fall and lean on fewer places than they have nodes",
+        run: places::places,
     },
     Case {
         name: "friction",

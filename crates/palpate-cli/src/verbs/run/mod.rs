@@ -6,7 +6,7 @@ mod realtime_report;
 mod summary;
 
 use crate::Failure;
-use crate::scene_file::{self, Scene, SceneDevice};
+use crate::scene_file::{self, Pace, Scene, SceneDevice};
 use crate::verbs::{print, print_json};
 use clap::Args;
 use glam::DVec3;
@@ -71,7 +71,8 @@ const MOST_STEPS: f64 = 1e8;
 
 /// Run the verb.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let scene = scene_file::read(&arguments.scene)?;
+    let pace = if arguments.realtime.realtime { Pace::RealTime } else { Pace::Offline };
+    let scene = scene_file::read(&arguments.scene, pace)?;
     scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
     if arguments.realtime.realtime {
         return realtime::run(&scene, arguments);
