@@ -32,7 +32,7 @@ pub fn places() -> Result<Vec<Check>, Failure> {
     let calm = Stuff { beta: 4e-3, ..PAPER };
     for cells in [12, 18] {
         let cube = calm.body(box_mesh([0.1; 3], [cells; 3])?, Order::Linear, 200)?;
-        checks.extend(rest(&format!("cube of {cells}³ cells"), &cube, 0.05, &[(USUAL, 0.01), (24, 0.03)])?);
+        checks.extend(rest(&format!("cube of {cells}³ cells"), &cube, 0.05, &[(USUAL, 0.03), (24, 0.06)])?);
     }
     let ball = calm.body(ball_mesh(0.05, 8)?, Order::Linear, 200)?;
     checks.extend(rest("ball", &ball, 0.05, &[(USUAL, 0.03), (24, 0.06)])?);
@@ -41,7 +41,7 @@ pub fn places() -> Result<Vec<Check>, Failure> {
     Ok(checks)
 }
 
-/// How far a body sags on the floor that it lies on, and that the floor carries it.
+/// How far a body sags on the floor that it lies on, where places read some of the sides with the edges, and that the floor carries it.
 fn rest(name: &str, body: &Arc<Recording>, half: f64, cases: &[(usize, f64)]) -> Result<Vec<Check>, Failure> {
     /// The last part of the run, of which the force is a mean.
     const STEPS: u32 = 4000;

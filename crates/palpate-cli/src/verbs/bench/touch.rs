@@ -17,6 +17,10 @@ const FINGER: DeviceParameters =
 /// Half the side of the cubes [m].
 const HALF: f64 = 0.05;
 
+/// All nodes, or few places that stand for them.
+const ALL: usize = usize::MAX;
+const PLACES: usize = 48;
+
 /// How often the finest surface is that of the recorded cube with every triangle cut in four.
 const REFINEMENTS: usize = 3;
 
@@ -39,15 +43,26 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         fingers(recording.clone(), false);
     }
     let floors = [
-        (0.0, 1, "lies on a floor"),
-        (0.05, 1, "falls on a floor from 5 cm, contact steps"),
-        (0.001, 2, "one on another, falls on a floor, contact steps"),
+        (0.0, 1, ALL, "lies on a floor"),
+        (0.0, 1, PLACES, "lies on a floor, 48 places"),
+        (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
+        (0.05, 1, PLACES, "falls on a floor from 5 cm, contact steps, 48 places"),
+        (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
     ];
-    for (height, cubes, what) in floors {
-        // What is to lie still has to lose its energy.
-        let recording = if height == 0.0 { Arc::new(damped(&cube)) } else { cube.clone() };
+    // What is to lie still has to lose its energy.
+    let calm = Arc::new(damped(&cube));
+    for (height, cubes, most_places, what) in floors {
+        let recording = if height == 0.0 { calm.clone() } else { cube.clone() };
         let label = format!("12³ cells, 200 modes, {what}");
-        cases.push((label, Box::new(move |steps| floor_steps(&recording, height, cubes, steps))));
+        let run = move |steps| floor_steps(&recording, (height, cubes, most_places), steps);
+        cases.push((label, Box::new(run)));
+    }
+    for (most_places, what) in
+        [(ALL, "2 fingers move it on a floor"), (PLACES, "2 fingers move it on a floor, 48 places")]
+    {
+        let recording = calm.clone();
+        let label = format!("12³ cells, 200 modes, {what}");
+        cases.push((label, Box::new(move |steps| moving_steps(&recording, most_places, steps))));
     }
     cases.into_iter()
 }
@@ -96,13 +111,10 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
 /// Sorted times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
 fn floor_steps(
     recording: &Arc<Recording>,
-    height: f64,
-    cubes: usize,
+    (height, cubes, most_places): (f64, usize, usize),
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
-    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
-    let parameters =
-        ModelParameters { gravity: DVec3::Y * -9.81, obstacles: vec![floor], ..ModelParameters::default() };
+    let parameters = on_a_floor(most_places);
     let cube = |number: usize| {
         let above = height + number as f64 * (2.0 * HALF + height);
         ModelObject::new(recording.clone(), at_height(HALF + above))
@@ -115,6 +127,41 @@ fn floor_steps(
     for number in 0..settling + steps.min(2000) {
         let time = timed_step(&model, &mut state, &Input::default());
         if number >= settling && !state.output().contacts.is_empty() {
+            times.push(time);
+        }
+    }
+    times.sort_unstable();
+    Ok(times)
+}
+
+/// A floor, with gravity.
+fn on_a_floor(most_places: usize) -> ModelParameters {
+    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
+    let gravity = DVec3::Y * -9.81;
+    ModelParameters { gravity, obstacles: vec![floor], most_places, ..ModelParameters::default() }
+}
+
+/// Sorted times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
+fn moving_steps(recording: &Arc<Recording>, most_places: usize, steps: usize) -> Result<Vec<u32>, Failure> {
+    let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(most_places) };
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
+    let mut state = State::new(&model);
+    // It settles, then it is pressed, then it is moved.
+    let (settled, moved) = (1000, 1500);
+    let mut times = Vec::new();
+    for number in 0..moved + steps.min(20_000) {
+        let t = (number as f64 - f64::from(moved as u32)).max(0.0) * 1e-3;
+        let begun = number.saturating_sub(settled) as f64 * 1e-3;
+        let press = if number < settled { -0.005 } else { 0.003 * (begun / 0.3).min(1.0) };
+        let turn = std::f64::consts::TAU * t;
+        let (ahead, aside) = (0.02 * (1.0 - (0.5 * turn).cos()), 0.02 * (0.8 * turn).sin());
+        let hand = |side: f64| {
+            let reach = side * (HALF + FINGER.tip_radius - press);
+            DeviceInput::touching(DVec3::new(reach + aside, HALF, ahead))
+        };
+        let input = Input { devices: vec![hand(-1.0), hand(1.0)], ..Input::default() };
+        let time = timed_step(&model, &mut state, &input);
+        if number >= moved {
             times.push(time);
         }
     }
