@@ -1,9 +1,9 @@
 //! Force Dimension devices by the DHD library of their SDK, loaded at run time.
 //!
 //! Its frame has x towards the operator, y to the right and z up, in metres and newtons: ours from its is (y, z, x). Calls go
-//! to the device and wait for its answer, some 0.1 ms by USB; they are made by the haptic update itself, as the SDK means
-//! them to be. A device that fails for [`LOST_S`] is closed and opened again as soon as it is back, which takes as long as the
-//! SDK takes. Devices must have been initialised with the vendor's tools: before that they don't know where they are.
+//! to the device and wait for its answer; they are made by the haptic update itself, as the SDK means them to be. A device that
+//! fails for [`LOST_S`] is closed and opened again as soon as it is back, which takes as long as the SDK takes. Devices must have
+//! been initialised with the vendor's tools: before that they don't know where they are.
 
 use super::driver::{Found, pick};
 use super::library::{Vendor, functions};
