@@ -139,15 +139,17 @@ fn what_a_real_device_can_not_be_is_refused_in_words() {
             "--force is -1 N, expected above 0 and below 100",
         ),
     ];
+    let options =
+        [&["--armed"][..], &["--which", "0"], &["--mount-position", "0,0,0"], &["--mount-scale", "1"]];
+    for option in options {
+        let error = workplace.fail(&[&["device", "left", "--path", "left.csv"], option].concat());
+        assert_eq!(error, format!("{} is of a real device: name its --driver", option[0]));
+    }
     for (arguments, expected) in cases {
         let error = workplace.fail(arguments);
         assert!(error.starts_with(expected), "{arguments:?}: {error}");
     }
-    for arguments in [
-        &["device", "left"][..],
-        &["device", "left", "--path", "left.csv", "--driver", "dhd"],
-        &["device", "left", "--path", "left.csv", "--armed"],
-    ] {
+    for arguments in [&["device", "left"][..], &["device", "left", "--path", "left.csv", "--driver", "dhd"]] {
         assert_eq!(workplace.palpate(arguments).status.code(), Some(2), "{arguments:?}");
     }
     let path = "path = { file = \"left.csv\" }";
