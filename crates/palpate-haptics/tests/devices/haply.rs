@@ -182,6 +182,16 @@ impl Hand {
         self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
     }
 
+    /// The next reading, however busy the machine is.
+    fn next(&mut self) -> Reading {
+        let mut next = None;
+        until("a reading", || {
+            next = self.read().ok();
+            next.is_some()
+        });
+        next.expect("it was waited for")
+    }
+
     /// Push until the service has the force.
     fn push(&mut self, service: &Service, force: DVec3, theirs: [f64; 3]) {
         until("the force arrives", || {
@@ -234,8 +244,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
         (world.grip, world.pressed) = ([half.cos(), 0.0, 0.0, half.sin()], true);
     });
     let mut hand = Hand::open(&service);
-    until("a state", || hand.read().is_ok());
-    let reading = hand.read().expect("it reads");
+    let reading = hand.next();
     assert_eq!(reading.position, DVec3::new(0.01, 0.15, 0.12), "to the right, up, towards the user");
     let turned = reading.orientation.expect("it has a grip");
     assert!(turned.angle_between(DQuat::from_rotation_y(2.0 * half)) < 1e-9, "{turned}");
@@ -256,11 +265,15 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
 fn answers_that_tell_nothing_are_silence_until_there_are_others() {
     let service = Service::new();
     let mut hand = Hand::open(&service);
-    until("a state", || hand.read().is_ok());
+    hand.next();
     for mood in [Mood::Garbage, Mood::NoDevice, Mood::Nothing] {
         service.set(|world| world.mood = mood);
-        until("silence", || hand.read().is_err());
-        let why = hand.read().expect_err("silence");
+        let mut why = None;
+        until("silence", || {
+            why = hand.read().err();
+            why.is_some()
+        });
+        let why = why.expect("it was waited for");
         assert!(why.starts_with("haply: nothing was told for 20 ms; last: "), "{why}");
         service.set(|world| world.mood = Mood::States);
         until("it tells again", || hand.read().is_ok());
@@ -271,7 +284,7 @@ fn answers_that_tell_nothing_are_silence_until_there_are_others() {
 fn a_service_that_goes_away_is_found_again() {
     let mut service = Service::new();
     let mut hand = Hand::open(&service);
-    until("a state", || hand.read().is_ok());
+    hand.next();
     service.stop();
     until("it is gone, and said to be", || {
         hand.read().is_err_and(|why| why.contains("no Inverse Service at 127.0.0.1:"))
