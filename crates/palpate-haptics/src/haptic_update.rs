@@ -1,6 +1,7 @@
 //! The haptic update (paper, section 3.2): the device side, at the device's own rate.
 
 use crate::device::{Device, Mount, Traits};
+use crate::error::Error;
 use crate::passivity::PassivityController;
 use crate::port::{DevicePort, Motion};
 use crate::safety::{Safety, SafetyCounts};
@@ -11,6 +12,9 @@ use std::time::Duration;
 /// Motions of which it is remembered when they were told.
 const TOLD: usize = 1024;
 
+/// A device that has told nothing for so long [s] is lost: force passes again at a press of its button only, if it has one.
+const LOST_S: f64 = 0.1;
+
 /// One device's haptic update without its thread: what happens in a cycle.
 pub struct HapticUpdate {
     device: Box<dyn Device>,
@@ -20,12 +24,18 @@ pub struct HapticUpdate {
     passivity: Option<PassivityController>,
     /// Wait for a button before force passes.
     by_button: bool,
+    /// The buttons of the last reading; all of them before the first, so that one that is held does not count as pressed.
+    buttons: u32,
     sequence: u64,
     /// When motions were told [s], by their sequence; the newest that was answered, and how long answers took.
     told: Box<[f64]>,
     answered: u64,
     answers: Spread,
     last: Option<(f64, DVec3)>,
+    /// When the last update was [s].
+    updated: Option<f64>,
+    /// Why a reading or a push failed first.
+    failure: Option<Error>,
     /// The force that the device holds [N, world].
     held: DVec3,
     counts: UpdateCounts,
@@ -69,11 +79,14 @@ impl HapticUpdate {
             safety,
             passivity,
             by_button,
+            buttons: u32::MAX,
             sequence: 0,
             told: vec![0.0; TOLD].into_boxed_slice(),
             answered: 0,
             answers: Spread::default(),
             last: None,
+            updated: None,
+            failure: None,
             held: DVec3::ZERO,
             counts: UpdateCounts::default(),
         }
@@ -99,6 +112,11 @@ impl HapticUpdate {
         counts
     }
 
+    /// Why a reading or a push failed, the first time.
+    pub fn failure(&self) -> Option<&Error> {
+        self.failure.as_ref()
+    }
+
     /// Read the device, tell the force process, push the hand with the newest force as far as it is passive and safe.
     ///
     /// # Real time
@@ -112,13 +130,20 @@ impl HapticUpdate {
             self.answers.record(Duration::from_secs_f64((now_s - told).max(0.0)));
         }
         let age_s = if effort.sequence == 0 { f64::INFINITY } else { now_s - effort.time_s };
-        let Ok(reading) = self.device.read(now_s) else {
-            // Whatever it does with that, it is not pushed.
-            self.counts.failed += 1;
-            let dt = self.last.map_or(0.0, |(time, _)| now_s - time);
-            let force = self.safety.limit(effort.force, f64::INFINITY, 0.0, dt);
-            self.push(force, now_s);
-            return;
+        let since_update = self.updated.replace(now_s).map_or(0.0, |time| now_s - time);
+        let reading = match self.device.read(now_s) {
+            Ok(reading) => reading,
+            Err(error) => {
+                // Whatever it does with that, it is not pushed.
+                self.failed(error);
+                if self.by_button && self.last.is_none_or(|(time, _)| now_s - time > LOST_S) {
+                    self.safety.arm(false);
+                    self.buttons = u32::MAX;
+                }
+                let force = self.safety.limit(effort.force, f64::INFINITY, 0.0, since_update);
+                self.push(force, now_s);
+                return;
+            }
         };
         let position = self.mount.world_from_device(reading.position);
         if position.is_finite() {
@@ -133,9 +158,10 @@ impl HapticUpdate {
                 buttons: reading.buttons,
             });
         }
-        if self.by_button && reading.buttons != 0 {
+        if self.by_button && reading.buttons & !self.buttons != 0 {
             self.safety.arm(true);
         }
+        self.buttons = reading.buttons;
         let before = self.last.replace((now_s, position));
         let (dt, moved) = before.map_or((0.0, DVec3::ZERO), |(time, last)| (now_s - time, position - last));
         if moved.is_finite() {
@@ -146,7 +172,7 @@ impl HapticUpdate {
             Some(passivity) => passivity.control(self.sequence, position, &effort, dt),
             None => effort.force,
         };
-        let force = self.safety.limit(wanted, age_s, speed, dt);
+        let force = self.safety.limit(wanted, age_s, speed, since_update);
         self.push(force, now_s);
     }
 
@@ -161,7 +187,13 @@ impl HapticUpdate {
         }
         self.held = force;
         self.counts.force_max_n = self.counts.force_max_n.max(force.length());
-        let sent = self.device.push(self.mount.device_force(force), now_s);
-        self.counts.failed += u64::from(sent.is_err());
+        if let Err(error) = self.device.push(self.mount.device_force(force), now_s) {
+            self.failed(error);
+        }
+    }
+
+    fn failed(&mut self, error: Error) {
+        self.counts.failed += 1;
+        self.failure.get_or_insert(error);
     }
 }

@@ -104,6 +104,8 @@ pub struct DeviceReport {
     pub timing: Timing,
     /// How long it took from a motion to an effort that answers it.
     pub answers: Spread,
+    /// Why a reading or a push failed, the first time.
+    pub failure: Option<Error>,
 }
 
 /// Sets flags when it goes.
@@ -317,7 +319,8 @@ pub fn run_update(
     }
     update.let_go(clock.now_s());
     let answers = update.answers().clone();
-    DeviceReport { traits: update.traits(), counts: update.counts(), granted, timing, answers }
+    let failure = update.failure().cloned();
+    DeviceReport { traits: update.traits(), counts: update.counts(), granted, timing, answers, failure }
 }
 
 /// A haptic update and its rate for every device that is here, and the seats of all in the force process.

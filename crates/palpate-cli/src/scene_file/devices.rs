@@ -1,6 +1,7 @@
 //! `[[device]]`: hands that hold a point, and tips that touch.
 
 use super::SceneDevice;
+use super::drivers::read_real;
 use super::entries::{AttachEntry, CouplingEntry, DeviceEntry, SimulatedEntry};
 use super::place::{Quantity, Source};
 use crate::Failure;
@@ -68,11 +69,13 @@ pub(super) fn read_device(
             "a linked device has its path, or its hand, in the process that it is in: leave path and simulated out",
         );
     }
+    let real = read_real(source, device)?;
     let path = match (&device.path, linked) {
-        (None, None) => {
+        (None, None) if real.is_none() => {
             return source.fail(
                 device.name.span(),
-                "the device needs path = { file = \"…\" }, or linked = true if it is in another process",
+                "the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, or linked = true if \
+                 it is in another process",
             );
         }
         (entry, _) => {
@@ -80,7 +83,7 @@ pub(super) fn read_device(
         }
     };
     let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
-    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated };
+    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real };
     remarks.extend(far_start(&device, objects));
     remarks.extend(small_patches(&device, objects, object_names));
     Ok(device)

@@ -107,6 +107,27 @@ pub(super) struct DeviceEntry {
     pub friction: Option<Spanned<f64>>,
     pub coupling: Option<CouplingEntry>,
     pub simulated: Option<SimulatedEntry>,
+    pub driver: Option<Spanned<DriverEntry>>,
+    pub mount: Option<Spanned<MountEntry>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DriverEntry {
+    pub kind: Spanned<String>,
+    /// A number or a name.
+    pub which: Option<Spanned<toml::Value>>,
+    pub force: Option<Spanned<f64>>,
+    pub armed: Option<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MountEntry {
+    #[serde(default)]
+    pub position: Numbers<3>,
+    pub orientation: Option<Spanned<Numbers<4>>>,
+    pub scale: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]

@@ -1,6 +1,7 @@
 //! Scene files: TOML in, model, devices and obstacles out. Every error names the file and the line.
 
 mod devices;
+mod drivers;
 mod entries;
 mod objects;
 mod obstacles;
@@ -8,6 +9,7 @@ mod place;
 
 use crate::Failure;
 pub use devices::{known_device, known_grip};
+pub use drivers::{RealDevice, STRONGEST_N, known_driver};
 use entries::SceneFile;
 use glam::DVec3;
 use palpate::{
@@ -40,7 +42,7 @@ pub struct Scene {
     pub inputs: Vec<PathBuf>,
 }
 
-/// A device that follows a path.
+/// A device: it follows a path, or is a real one, or in another process.
 pub struct SceneDevice {
     /// Its name.
     pub name: String,
@@ -48,10 +50,13 @@ pub struct SceneDevice {
     pub mode: DeviceMode,
     /// What it is.
     pub parameters: DeviceParameters,
-    /// Where it is over time; with a simulated hand, where that wants to be. None for a device in another process.
+    /// Where it is over time; with a simulated hand, where that wants to be. None for a real device, and for one in another
+    /// process.
     pub path: Option<MotionPath>,
     /// The device and the hand that follow the path as far as forces let them.
     pub simulated: Option<(Traits, Hand)>,
+    /// The real device that it is.
+    pub real: Option<RealDevice>,
 }
 
 /// A plane or an obstacle.

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod demo;
 pub mod device;
+pub mod devices;
 pub mod inspect;
 pub mod record;
 pub mod replay;

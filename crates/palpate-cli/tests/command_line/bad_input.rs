@@ -31,7 +31,8 @@ fn unknown_keys_are_errors_with_their_line() {
             "mode = \"held\"",
             "mode = \"held\"\nforce = 1",
             11,
-            "`name`, `mode`, `attach`, `path`, `linked`, `tip_radius`, `patch_radius`, `friction`, `coupling`, `simulated`",
+            "`name`, `mode`, `attach`, `path`, `linked`, `tip_radius`, `patch_radius`, `friction`, `coupling`, `simulated`, \
+             `driver`, `mount`",
         ),
         ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "`file`"),
     ] {

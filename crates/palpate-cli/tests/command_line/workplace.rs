@@ -8,6 +8,7 @@ use tempfile::TempDir;
 /// A folder of its own that goes when the test ends.
 pub struct Workplace {
     folder: TempDir,
+    variables: Vec<(String, String)>,
 }
 
 /// What a cube of 3×3×3 cells is recorded with; the output comes last.
@@ -53,7 +54,12 @@ path = { file = "right.csv" }
 impl Workplace {
     /// An empty folder.
     pub fn new() -> Self {
-        Self { folder: TempDir::new().expect("a temporary folder") }
+        Self { folder: TempDir::new().expect("a temporary folder"), variables: Vec::new() }
+    }
+
+    /// Give `palpate` an environment variable.
+    pub fn set(&mut self, name: &str, value: &str) {
+        self.variables.push((name.to_string(), value.to_string()));
     }
 
     /// A folder with `cube.palp`, `scene.toml` and its paths `left.csv` and `right.csv`.
@@ -105,6 +111,7 @@ impl Workplace {
             .current_dir(self.folder.path())
             .env("HOME", self.folder.path())
             .env("XDG_CACHE_HOME", self.path("cache"))
+            .envs(self.variables.iter().map(|(name, value)| (name, value)))
             .output()
             .expect("the command starts")
     }

@@ -1,16 +1,23 @@
 //! Devices behind one small interface: a position in, a force out.
 //!
 //! Every driver speaks SI units in the device's frame as palpate takes it: x to the right of the user, y up, z towards the
-//! user. A [`Mount`] says where that frame is in the world.
+//! user. A [`Mount`] says where that frame is in the world. A [`Driver`] speaks to a real device, through its maker's software.
 
+mod dhd;
+mod driver;
+mod exchange;
+mod haply;
+mod library;
+mod openhaptics;
 mod scripted;
 mod simulated;
 
+pub use driver::{Driver, Found, discover};
 pub use scripted::Scripted;
 pub use simulated::{Hand, Simulated};
 
 use crate::error::Error;
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use palpate::Pose;
 
 /// What a device reads.
@@ -141,6 +148,28 @@ impl Mount {
     }
 }
 
+/// How a handle is turned, from its axes in a vendor's frame. The handle's own axes are renamed alike, so that one that is not
+/// turned there is not turned here. None for what is no rotation.
+fn handle_turned(axes: DMat3, ours_from_theirs: fn(DVec3) -> DVec3) -> Option<DQuat> {
+    let square = axes * axes.transpose() - DMat3::IDENTITY;
+    let rotation = square.to_cols_array().iter().all(|x| x.abs() < NO_ROTATION) && axes.determinant() > 0.0;
+    if !rotation {
+        return None;
+    }
+    let turned = DQuat::from_mat3(&axes);
+    quaternion_turned(DVec3::new(turned.x, turned.y, turned.z), turned.w, ours_from_theirs)
+}
+
+/// The same from a quaternion's vector and scalar.
+fn quaternion_turned(vector: DVec3, scalar: f64, ours_from_theirs: fn(DVec3) -> DVec3) -> Option<DQuat> {
+    let turned = DQuat::from_vec4(ours_from_theirs(vector).extend(scalar));
+    let length = turned.length();
+    ((length - 1.0).abs() < NO_ROTATION).then(|| turned / length)
+}
+
+/// Farther from a rotation than this (numbers of single precision, and sensors, are off a little) is garbage.
+const NO_ROTATION: f64 = 1e-2;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,6 +182,24 @@ mod tests {
         assert!((place - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-15, "{place}");
         let force = mount.device_force(DVec3::Y);
         assert!((force - DVec3::X).length() < 1e-15, "{force}");
+    }
+
+    #[test]
+    fn axes_that_are_renamed_turn_handles_alike_and_garbage_does_not() {
+        // A quarter turn about their x, which is our z.
+        let turned = handle_turned(DMat3::from_rotation_x(1.0), |v| DVec3::new(v.y, v.z, v.x));
+        assert!(
+            turned.is_some_and(|turned| turned.angle_between(DQuat::from_rotation_z(1.0)) < 1e-12),
+            "{turned:?}"
+        );
+        let garbage = [
+            DMat3::ZERO,
+            DMat3::NAN,
+            DMat3::IDENTITY * 2.0,
+            DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)),
+        ];
+        assert!(garbage.into_iter().all(|axes| handle_turned(axes, |v| v).is_none()));
+        assert_eq!(quaternion_turned(DVec3::NAN, 1.0, |v| v), None);
     }
 
     #[test]

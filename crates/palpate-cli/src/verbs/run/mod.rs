@@ -1,5 +1,6 @@
 //! `palpate run`: a scene, headless, as fast as it goes or in real time.
 
+mod attach;
 mod outputs;
 mod realtime;
 mod realtime_report;
@@ -8,12 +9,13 @@ mod summary;
 use crate::Failure;
 use crate::scene_file::{self, Pace, Scene, SceneDevice};
 use crate::verbs::{print, print_json};
+pub use attach::{attach, attach_real};
 use clap::Args;
 use glam::DVec3;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
-pub use realtime::{RealtimeArguments, attach, read_secret};
+pub use realtime::{RealtimeArguments, read_secret};
 pub use realtime_report::{device_line, percentiles, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -84,10 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Run a scene to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
-    for SceneDevice { name, path, simulated, .. } in &scene.devices {
-        let what = match (path, simulated) {
-            (None, _) => "comes over a link",
-            (_, Some(_)) => "is held by a simulated hand",
+    for SceneDevice { name, path, simulated, real, .. } in &scene.devices {
+        let what = match (real, path, simulated) {
+            (Some(_), ..) => "is held by a real hand",
+            (None, None, _) => "comes over a link",
+            (None, _, Some(_)) => "is held by a simulated hand",
             _ => continue,
         };
         return Err(Failure(format!("the device {name:?} {what}, which lives in real time: add --realtime")));

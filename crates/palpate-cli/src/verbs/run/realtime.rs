@@ -1,6 +1,7 @@
-//! A scene in real time: the processes of `palpate-haptics`, with devices that follow the scene's paths or are held by
-//! simulated hands.
+//! A scene in real time: the processes of `palpate-haptics`, with devices that follow the scene's paths, are held by simulated
+//! hands, or by real ones.
 
+use super::attach::{attach, attach_real};
 use super::realtime_report::{json, text};
 use super::{Arguments, count_steps};
 use crate::Failure;
@@ -9,13 +10,10 @@ use crate::verbs::{print, print_json};
 use crate::whole_file::{WholeFile, stop_on_interrupt};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate::{DeviceMode, Pose, State};
-use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated, Traits};
+use palpate::{Pose, State};
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogHand, LogWriter};
-use palpate_haptics::{
-    Attached, DevicePort, MotionPath, Mover, Report, SafetyLimits, Scheduling, Session, SessionDevice, port,
-};
+use palpate_haptics::{DevicePort, Mover, Report, Scheduling, Session, SessionDevice, port};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
@@ -97,18 +95,21 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let start = Instant::now();
     let mut linked = Vec::new();
-    let mut seat = |device: &SceneDevice| match &device.path {
-        Some(path) => {
-            let (rate, not_passive) = (options.device_rate, options.not_passive);
-            SessionDevice::Here(attach(path.clone(), device.simulated, device.mode, rate, not_passive))
+    let (rate, not_passive) = (options.device_rate, options.not_passive);
+    let seat = |device: &SceneDevice| match (&device.real, &device.path) {
+        (Some(real), _) => attach_real(real, device.mode, rate, not_passive).map(SessionDevice::Here),
+        (None, Some(path)) => {
+            let attached = attach(path.clone(), device.simulated, device.mode, rate, not_passive);
+            Ok(SessionDevice::Here(attached))
         }
-        None => {
+        (None, None) => {
             let (device_port, force_port) = port();
             linked.push((device.name.clone(), device_port));
-            SessionDevice::Linked(force_port, device.mode)
+            Ok(SessionDevice::Linked(force_port, device.mode))
         }
     };
-    let devices = scene.devices.iter().map(&mut seat).collect();
+    let devices: Result<Vec<_>, Failure> = scene.devices.iter().map(seat).collect();
+    let devices = devices?;
     let server = listen(options, linked, (start, scene.model.parameters().step_s))?;
     let session = Session {
         model: scene.model.clone(),
@@ -183,30 +184,6 @@ pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     let Some(file) = file else { return Ok(Secret::none()) };
     let text = std::fs::read_to_string(file).map_err(|e| Failure::file("read the secret", file, &e))?;
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
-}
-
-/// A device that follows a path, or whose simulated hand does.
-pub fn attach(
-    path: MotionPath,
-    simulated: Option<(Traits, Hand)>,
-    mode: DeviceMode,
-    rate_hz: f64,
-    not_passive: bool,
-) -> Attached {
-    let (device, limits): (Box<dyn Device>, _) = match simulated {
-        Some((traits, hand)) => {
-            let limits = SafetyLimits { force_n: traits.force_n, ..SafetyLimits::default() };
-            (Box::new(Simulated::new(traits, hand, path)), limits)
-        }
-        // A path feels nothing: whatever its force is, nobody has to be kept from it.
-        None => {
-            let (force_n, slew_n_s, speed_m_s) = (f64::MAX, f64::MAX, f64::MAX);
-            let limits = SafetyLimits { force_n, slew_n_s, speed_m_s, ..SafetyLimits::default() };
-            (Box::new(Scripted::new(path)), limits)
-        }
-    };
-    let passive = simulated.is_some() && !not_passive;
-    Attached { device, mode, mount: Mount::default(), rate_hz, limits, passive, by_button: false }
 }
 
 fn movers(scene: &Scene) -> Vec<Mover> {

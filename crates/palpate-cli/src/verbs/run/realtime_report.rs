@@ -35,6 +35,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "given_j": counts.given_j,
             "updates": counts.updates,
             "failed": counts.failed,
+            "failure": own.failure.as_ref().map(ToString::to_string),
             "timing": timing(&own.timing),
             "answer_us": percentiles(own.answers.percentiles_us()),
             "passivity": { "acted": counts.passivity_acted, "missing_max_j": counts.passivity_worst_j },
@@ -153,10 +154,14 @@ pub fn device_line(own: &DeviceReport) -> String {
     ];
     let met = faults.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
     let met: Vec<String> = met.collect();
-    out + &if met.is_empty() {
+    out += &if met.is_empty() {
         "; safety met nothing".to_string()
     } else {
         format!("; safety: {}", met.join(", "))
+    };
+    match &own.failure {
+        Some(failure) => out + &format!("; the first that failed: {failure}"),
+        None => out,
     }
 }
 

@@ -1,15 +1,18 @@
 //! `palpate device`: a device here, for a scene in another process or on another machine.
 
+mod real;
+
 use crate::Failure;
 use crate::scene_file::{known_device, known_grip, read_path};
-use crate::verbs::run::{attach, device_line, percentiles, read_secret, timing};
+use crate::verbs::run::{attach, attach_real, device_line, percentiles, read_secret, timing};
 use crate::verbs::{print, print_json};
 use crate::whole_file::stop_on_interrupt;
 use clap::Args;
 use palpate::DeviceMode;
 use palpate_haptics::device::{Hand, Traits};
 use palpate_haptics::link::{LinkClient, LinkState};
-use palpate_haptics::{Clock, Columns, DeviceReport, Scheduling, run_update};
+use palpate_haptics::{Attached, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_update};
+use real::RealArguments;
 use serde_json::json;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -25,6 +28,7 @@ use std::time::{Duration, Instant};
 #[command(after_help = "On one machine:
   palpate run scene.toml --realtime --duration 60
   palpate device left --path left.csv --simulated touch
+  palpate device left --driver haply --mount-position 0,-0.15,0.1 --mount-scale 2
 Between machines, with a secret that both know:
   palpate run scene.toml --realtime --listen 0.0.0.0:7402 --secret secret.txt
   palpate device left --path left.csv --connect 192.168.1.20:7402 --secret secret.txt")]
@@ -35,18 +39,22 @@ pub struct Arguments {
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
     pub connect: SocketAddr,
     /// Where the hand goes: t,x,y,z in s and m, world
-    #[arg(long, value_name = "FILE.csv")]
-    pub path: PathBuf,
+    #[arg(long, value_name = "FILE.csv", required_unless_present = "driver")]
+    pub path: Option<PathBuf>,
     /// A simulated device in a simulated hand that wants to be where the path is: touch, omega.3 or inverse3
     #[arg(long, value_name = "DEVICE")]
     pub simulated: Option<String>,
     /// How the simulated hand holds it: firm, light or fingertip
     #[arg(long, value_name = "GRIP", requires = "simulated")]
     pub grip: Option<String>,
+    /// A real device
+    #[command(flatten)]
+    pub real: RealArguments,
     /// Updates per second [Hz]
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
     pub rate: f64,
-    /// How long [s], from when the link is there; by default to the end of the path
+    /// How long [s], from when the link is there; by default to the end of the path, and with a real device until
+    /// Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// How long a scene is looked for [s]
@@ -69,17 +77,27 @@ const PRIORITY: u8 = 70;
 /// Between two looks at the link.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// What moves the device.
+enum Source {
+    Path(MotionPath, Option<(Traits, Hand)>),
+    Real(Box<Attached>),
+}
+
 /// Run the verb.
 pub fn device(arguments: &Arguments) -> Result<(), Failure> {
-    let path = read_path(&arguments.path, Columns::Position)?;
-    let duration = arguments.duration.unwrap_or(path.end());
-    if !(duration > 0.0 && duration < 1e8) {
-        return Err(Failure(format!("the duration is {duration} s, expected above 0: --duration gives one")));
-    }
     if !(50.0..=5000.0).contains(&arguments.rate) {
         return Err(Failure(format!("--rate is {} Hz, expected 50 to 5000", arguments.rate)));
     }
-    let simulated = simulated(arguments)?;
+    // The scene says what it does there.
+    let (mode, rate, not_passive) = (DeviceMode::Touch, arguments.rate, arguments.not_passive);
+    let source = match (arguments.real.real()?, &arguments.path) {
+        (Some(real), _) => Source::Real(Box::new(attach_real(&real, mode, rate, not_passive)?)),
+        (None, Some(path)) => Source::Path(read_path(path, Columns::Position)?, simulated(arguments)?),
+        (None, None) => {
+            return Err(Failure("there is no --path and no --driver: one of them is needed".into()));
+        }
+    };
+    let duration = duration(arguments, &source)?;
     let start = Instant::now();
     let secret = read_secret(arguments.secret.as_deref())?;
     let (port, client) = LinkClient::new(arguments.connect, &secret, &arguments.name, start)?;
@@ -87,9 +105,10 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     find(&client, arguments, start, stop)?;
     // The hand sets out when there is something to touch.
     let found = start.elapsed().as_secs_f64();
-    // The scene says what it does there.
-    let mode = DeviceMode::Touch;
-    let attached = attach(path.later(found), simulated, mode, arguments.rate, arguments.not_passive);
+    let attached = match source {
+        Source::Path(path, simulated) => attach(path.later(found), simulated, mode, rate, not_passive),
+        Source::Real(attached) => *attached,
+    };
     let update = attached.update(port);
     let (clock, ended) = (Clock::new(start, 1.0 / arguments.rate), AtomicBool::new(false));
     let scheduling = Scheduling { priority: Some(PRIORITY), core: None };
@@ -106,6 +125,20 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         print(&text_of(arguments, &report))
     }
+}
+
+/// How long [s] it goes on.
+fn duration(arguments: &Arguments, source: &Source) -> Result<f64, Failure> {
+    let end = match source {
+        Source::Path(path, _) => path.end(),
+        Source::Real(_) if arguments.duration.is_none() => return Ok(f64::INFINITY),
+        Source::Real(_) => f64::NAN,
+    };
+    let duration = arguments.duration.unwrap_or(end);
+    if duration > 0.0 && duration < 1e8 {
+        return Ok(duration);
+    }
+    Err(Failure(format!("the duration is {duration} s, expected above 0: --duration gives one")))
 }
 
 /// The simulated device and hand that are asked for.
@@ -178,6 +211,8 @@ fn json(arguments: &Arguments, report: &DeviceReport, linked_s: f64) -> serde_js
         "updates": report.counts.updates,
         "force_max_n": report.counts.force_max_n,
         "given_j": report.counts.given_j,
+        "failed": report.counts.failed,
+        "failure": report.failure.as_ref().map(ToString::to_string),
         "granted": report.granted.to_string(),
         "timing": timing(&report.timing),
         "answer_us": percentiles(report.answers.percentiles_us()),

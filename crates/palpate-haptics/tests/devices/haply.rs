@@ -1,0 +1,299 @@
+//! Haply's Inverse Service: axes, its one answer per message, and a service that goes away and comes back.
+
+use super::standin::until;
+use glam::{DQuat, DVec3};
+use palpate_haptics::device::{Device, Driver, Reading};
+use serde_json::{Value, json};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tungstenite::{Error, Message, WebSocket};
+
+/// What the service answers.
+#[derive(Clone, Copy, PartialEq)]
+enum Mood {
+    States,
+    Garbage,
+    Nothing,
+    NoDevice,
+}
+
+/// What the service knows, and what it was told.
+struct World {
+    mood: Mood,
+    basis: &'static str,
+    cursor: [f64; 3],
+    /// w, x, y, z.
+    grip: [f64; 4],
+    pressed: bool,
+    force: [f64; 3],
+    sessions: Vec<Value>,
+    messages: u64,
+}
+
+/// A stand-in for the service: on connection an inventory, then one state for each message (version 3.5; X to the right, Y
+/// forward, Z up; m, N).
+struct Service {
+    address: SocketAddr,
+    world: Arc<Mutex<World>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Service {
+    fn new() -> Self {
+        let world = World {
+            mood: Mood::States,
+            basis: "XYZ",
+            cursor: [0.01, -0.12, 0.15],
+            grip: [1.0, 0.0, 0.0, 0.0],
+            pressed: false,
+            force: [f64::NAN; 3],
+            sessions: Vec::new(),
+            messages: 0,
+        };
+        Self::at("127.0.0.1:0", Arc::new(Mutex::new(world)))
+    }
+
+    fn at(address: &str, world: Arc<Mutex<World>>) -> Self {
+        let listener = TcpListener::bind(address).expect("a port");
+        let address = listener.local_addr().expect("an address");
+        listener.set_nonblocking(true).expect("a listener");
+        let stop = Arc::new(AtomicBool::new(false));
+        let thread = std::thread::spawn({
+            let (world, stop) = (world.clone(), stop.clone());
+            move || {
+                std::thread::scope(|scope| {
+                    while !stop.load(Ordering::SeqCst) {
+                        if let Ok((stream, _)) = listener.accept() {
+                            let (world, stop) = (&*world, &*stop);
+                            scope.spawn(move || serve(stream, world, stop));
+                        }
+                        std::thread::sleep(Duration::from_millis(1));
+                    }
+                });
+            }
+        });
+        Self { address, world, stop, thread: Some(thread) }
+    }
+
+    fn place(&self) -> String {
+        format!("ws://{}", self.address)
+    }
+
+    fn set(&self, change: impl FnOnce(&mut World)) {
+        change(&mut self.world.lock().expect("no panic"));
+    }
+
+    fn force(&self) -> [f64; 3] {
+        self.world.lock().expect("no panic").force
+    }
+
+    /// Stop, with all connections.
+    fn stop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        self.thread.take().map(JoinHandle::join);
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+fn state(world: &World, whole: bool) -> Value {
+    let [x, y, z] = world.cursor;
+    let [w, i, j, k] = world.grip;
+    let mut inverse3 = json!({
+        "device_id": "049D",
+        "state": { "cursor_position": { "x": x, "y": y, "z": z }, "control_mode": "idle" },
+        "status": { "ready": true },
+    });
+    if whole {
+        inverse3["config"] = json!({ "type": "inverse3", "basis": { "permutation": world.basis } });
+    }
+    let devices = if world.mood == Mood::NoDevice { json!([]) } else { json!([inverse3]) };
+    json!({
+        "session_id": 7,
+        "inverse3": devices,
+        "wireless_verse_grip": [{
+            "device_id": "61548",
+            "state": {
+                "orientation": { "w": w, "x": i, "y": j, "z": k },
+                "buttons": { "a": false, "b": world.pressed, "c": false },
+            },
+        }],
+    })
+}
+
+fn serve(stream: TcpStream, world: &Mutex<World>, stop: &AtomicBool) {
+    stream.set_nonblocking(false).expect("a socket");
+    stream.set_read_timeout(Some(Duration::from_millis(500))).expect("a socket");
+    let Ok(mut socket) = tungstenite::accept(stream) else { return };
+    socket.get_ref().set_read_timeout(Some(Duration::from_millis(5))).expect("a socket");
+    let inventory = state(&world.lock().expect("no panic"), true);
+    let _ = socket.send(Message::text(inventory.to_string()));
+    while !stop.load(Ordering::SeqCst) {
+        match socket.read() {
+            Ok(Message::Text(text)) => answer(&mut socket, text.as_str(), world),
+            Ok(_) => {}
+            Err(Error::Io(error)) if error.kind() == std::io::ErrorKind::WouldBlock => {}
+            Err(_) => return,
+        }
+    }
+}
+
+fn answer(socket: &mut WebSocket<TcpStream>, text: &str, world: &Mutex<World>) {
+    let mut world = world.lock().expect("no panic");
+    let message: Value = serde_json::from_str(text).expect("JSON");
+    let device = &message["inverse3"][0];
+    assert_eq!(device["device_id"], "049D");
+    let force = &device["commands"]["set_cursor_force"]["vector"];
+    world.force = ["x", "y", "z"].map(|axis| force[axis].as_f64().expect("a number"));
+    world.messages += 1;
+    if let Some(session) = message.get("session") {
+        let first = (world.messages, session.clone());
+        world.sessions.push(json!(first));
+    }
+    let answer = match world.mood {
+        Mood::Nothing => return,
+        Mood::Garbage => "{\"inverse3\": [{\"device_id\": 5".to_string(),
+        Mood::States | Mood::NoDevice => state(&world, false).to_string(),
+    };
+    let _ = socket.send(Message::text(answer));
+}
+
+/// A device with a clock.
+struct Hand {
+    device: Box<dyn Device>,
+    start: Instant,
+}
+
+impl Hand {
+    fn open(service: &Service) -> Self {
+        let device = Driver::Haply.open("0", Some(&service.place())).expect("a device").1;
+        Self { device, start: Instant::now() }
+    }
+
+    fn read(&mut self) -> Result<Reading, String> {
+        self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    }
+
+    /// The next reading, however busy the machine is.
+    fn next(&mut self) -> Reading {
+        let mut next = None;
+        until("a reading", || {
+            next = self.read().ok();
+            next.is_some()
+        });
+        next.expect("it was waited for")
+    }
+
+    /// Push until the service has the force.
+    fn push(&mut self, service: &Service, force: DVec3, theirs: [f64; 3]) {
+        until("the force arrives", || {
+            self.device.push(force, 0.0).expect("it pushes");
+            service.force() == theirs
+        });
+    }
+}
+
+#[test]
+fn what_is_there_is_told() {
+    let service = Service::new();
+    let found = Driver::Haply.find(Some(&service.place())).expect("a device");
+    assert_eq!(found.iter().map(ToString::to_string).collect::<Vec<_>>(), ["0: inverse3 (049D)"]);
+    let device = Driver::Haply.open("049D", Some(&service.address.to_string())).expect("by its name").1;
+    assert_eq!((device.traits().kind, device.traits().force_n), ("haply", 10.0));
+    drop(device);
+    service.set(|world| world.basis = "XZY");
+    let turned = Driver::Haply.open("0", Some(&service.place())).err().expect("other axes").to_string();
+    assert!(
+        turned.starts_with("haply: 0: inverse3 (049D) can't be had: the service turns its axes to XZY"),
+        "{turned}"
+    );
+    service.set(|world| world.mood = Mood::NoDevice);
+    let error = Driver::Haply.find(Some(&service.place())).expect_err("none").to_string();
+    assert!(error.starts_with("haply: the Inverse Service has no Inverse3"), "{error}");
+}
+
+#[test]
+fn without_a_service_it_says_where_it_was_looked_for_and_what_to_do() {
+    let nobody =
+        TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port");
+    let error = Driver::Haply.find(Some(&nobody.to_string())).expect_err("nobody is there").to_string();
+    assert!(error.starts_with(&format!("haply: no Inverse Service at {nobody} (")), "{error}");
+    assert!(error.contains("install and start Haply's Inverse Service"), "{error}");
+    assert!(error.ends_with("or give its address in the environment variable PALPATE_HAPLY"), "{error}");
+    // Somebody else's server.
+    let other = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = other.local_addr().expect("an address").to_string();
+    let error = Driver::Haply.find(Some(&address)).expect_err("it does not answer").to_string();
+    assert!(error.contains("it does not speak WebSocket"), "{error}");
+}
+
+#[test]
+fn places_forces_turns_and_buttons_are_in_our_frame() {
+    let service = Service::new();
+    // A quarter turn about their z, which points up.
+    let half = std::f64::consts::FRAC_PI_4;
+    service.set(|world| {
+        (world.grip, world.pressed) = ([half.cos(), 0.0, 0.0, half.sin()], true);
+    });
+    let mut hand = Hand::open(&service);
+    let reading = hand.next();
+    assert_eq!(reading.position, DVec3::new(0.01, 0.15, 0.12), "to the right, up, towards the user");
+    let turned = reading.orientation.expect("it has a grip");
+    assert!(turned.angle_between(DQuat::from_rotation_y(2.0 * half)) < 1e-9, "{turned}");
+    assert_eq!(reading.buttons, 0b10);
+    hand.push(&service, DVec3::new(1.0, 2.0, 3.0), [1.0, -3.0, 2.0]);
+    hand.push(&service, DVec3::new(f64::NAN, 2.0, 3.0), [0.0; 3]);
+    // Nobody pushes any more: whoever did may have died.
+    hand.push(&service, DVec3::X, [1.0, 0.0, 0.0]);
+    until("the force goes", || service.force() == [0.0; 3]);
+    hand.push(&service, DVec3::X, [1.0, 0.0, 0.0]);
+    drop(hand);
+    assert_eq!(service.force(), [0.0; 3], "it is left without force");
+    let sessions = service.world.lock().expect("no panic").sessions.clone();
+    assert_eq!(sessions, [json!([1, { "configure": { "profile": { "name": "palpate:device" } } }])]);
+}
+
+#[test]
+fn answers_that_tell_nothing_are_silence_until_there_are_others() {
+    let service = Service::new();
+    let mut hand = Hand::open(&service);
+    hand.next();
+    for mood in [Mood::Garbage, Mood::NoDevice, Mood::Nothing] {
+        service.set(|world| world.mood = mood);
+        let mut why = None;
+        until("silence", || {
+            why = hand.read().err();
+            why.is_some()
+        });
+        let why = why.expect("it was waited for");
+        assert!(why.starts_with("haply: nothing was told for 20 ms; last: "), "{why}");
+        service.set(|world| world.mood = Mood::States);
+        until("it tells again", || hand.read().is_ok());
+    }
+}
+
+#[test]
+fn a_service_that_goes_away_is_found_again() {
+    let mut service = Service::new();
+    let mut hand = Hand::open(&service);
+    hand.next();
+    service.stop();
+    until("it is gone, and said to be", || {
+        hand.read().is_err_and(|why| why.contains("no Inverse Service at 127.0.0.1:"))
+    });
+    let again = Service::at(&service.address.to_string(), service.world.clone());
+    again.set(|world| world.cursor = [0.0, 0.0, 0.1]);
+    until("it is found", || hand.read().is_ok_and(|reading| reading.position == DVec3::new(0.0, 0.1, 0.0)));
+    hand.push(&again, DVec3::Y, [0.0, 0.0, 1.0]);
+    // One that has gone for good holds up nobody who leaves.
+    drop(again);
+    drop(hand);
+}

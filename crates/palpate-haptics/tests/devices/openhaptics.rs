@@ -1,0 +1,170 @@
+//! OpenHaptics: units, frames of the scheduler, errors, and several devices on one scheduler.
+
+use super::standin::{Standin, until};
+use glam::{DQuat, DVec3};
+use palpate_haptics::device::{Device, Driver, Reading};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+type Transform = extern "C" fn(usize, &[f64; 16]);
+type Press = extern "C" fn(usize, i32);
+type Code = extern "C" fn(u32);
+type Switch = extern "C" fn(bool);
+type InUse = extern "C" fn() -> bool;
+type Pushed = extern "C" fn(usize) -> bool;
+
+/// The handle at a place [mm], turned by a quarter about the axis towards the user: its x points up.
+fn at(x: f64, y: f64, z: f64) -> [f64; 16] {
+    [0., 1., 0., 0., -1., 0., 0., 0., 0., 0., 1., 0., x, y, z, 1.]
+}
+
+/// One library serves a process, with one scheduler: tests that share a process take turns.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn standin() -> (MutexGuard<'static, ()>, Standin) {
+    (ALONE.lock().unwrap_or_else(PoisonError::into_inner), Standin::new("libhd"))
+}
+
+/// A device with a clock.
+struct Hand {
+    device: Box<dyn Device>,
+    start: Instant,
+}
+
+impl Hand {
+    fn open(standin: &Standin, which: &str) -> Self {
+        let device = Driver::OpenHaptics.open(which, Some(standin.place())).expect("a device").1;
+        Self { device, start: Instant::now() }
+    }
+
+    fn read(&mut self) -> Result<Reading, String> {
+        self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    }
+
+    /// The next reading, however busy the machine is.
+    fn next(&mut self) -> Reading {
+        let mut next = None;
+        until("a reading", || {
+            next = self.read().ok();
+            next.is_some()
+        });
+        next.expect("it was waited for")
+    }
+
+    fn push(&mut self, force: DVec3) -> Result<(), String> {
+        self.device.push(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() {
+    let (_alone, standin) = standin();
+    let found = Driver::OpenHaptics.find(Some(standin.place())).expect("a device");
+    assert_eq!(format!("{}, {:?} N", found[0], found[0].force_n), "0: Touch (2016-015-00123), Some(0.88) N");
+    assert!(!standin.function::<InUse>("standin_in_use")(), "it is left again");
+    let hand = Hand::open(&standin, "0");
+    assert_eq!(hand.device.traits().force_n, 0.88);
+    drop(hand);
+    standin.function::<Switch>("standin_plug")(false);
+    let error = Driver::OpenHaptics.find(Some(standin.place())).expect_err("none").to_string();
+    assert_eq!(error, "openhaptics: the default device can't be had: Communication error (error 0x0302)");
+}
+
+#[test]
+fn places_forces_turns_and_buttons_are_in_our_frame() {
+    let (_alone, standin) = standin();
+    standin.function::<Transform>("standin_transform")(0, &at(10.0, 20.0, -30.0));
+    standin.function::<Press>("standin_press")(0, 0b10);
+    let mut hand = Hand::open(&standin, "0");
+    let reading = hand.next();
+    assert!((reading.position - DVec3::new(0.01, 0.02, -0.03)).length() < 1e-15, "{}", reading.position);
+    let turned = reading.orientation.expect("it tells");
+    assert!(turned.angle_between(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2)) < 1e-9, "{turned}");
+    assert_eq!(reading.buttons, 0b10);
+    until("the force arrives", || {
+        hand.push(DVec3::new(0.1, 0.2, 0.3)).expect("it pushes");
+        standin.force(0) == [0.1, 0.2, 0.3]
+    });
+    // Nobody pushes any more: whoever did may have died.
+    until("the force goes", || standin.force(0) == [0.0; 3]);
+}
+
+#[test]
+fn a_device_is_opened_once_and_left_without_force() {
+    let (_alone, standin) = standin();
+    let mut hand = Hand::open(&standin, "0");
+    let twice = Driver::OpenHaptics.open("0", Some(standin.place())).err().expect("it is taken").to_string();
+    assert_eq!(
+        twice,
+        "openhaptics: the default device can't be had: Device already initiated (error 0x0301)"
+    );
+    let stranger = Driver::OpenHaptics.open("Right", Some(standin.place())).err().expect("no such device");
+    assert_eq!(
+        stranger.to_string(),
+        "openhaptics: the device \"Right\" can't be had: Communication error (error 0x0302)"
+    );
+    until("frames go on after both", || hand.read().is_ok());
+    until("the force arrives", || {
+        hand.push(DVec3::X).expect("it pushes");
+        standin.force(0) == [1.0, 0.0, 0.0]
+    });
+    drop(hand);
+    assert_eq!(standin.force(0), [0.0; 3]);
+    assert!(!standin.function::<InUse>("standin_in_use")(), "nothing is open, on, scheduled or running");
+}
+
+#[test]
+fn two_devices_share_the_scheduler_and_one_goes_on_when_the_other_is_left() {
+    let (_alone, standin) = standin();
+    standin.function::<Transform>("standin_transform")(1, &at(1000.0, 0.0, 0.0));
+    let (mut first, mut second) = (Hand::open(&standin, "0"), Hand::open(&standin, "Left"));
+    until("frames of both", || first.read().is_ok() && second.read().is_ok());
+    assert_eq!(second.next().position, DVec3::X);
+    until("both push", || {
+        first.push(DVec3::X).and(second.push(DVec3::Y)).expect("they push");
+        standin.force(0) == [1.0, 0.0, 0.0] && standin.force(1) == [0.0, 1.0, 0.0]
+    });
+    drop(first);
+    assert_eq!(standin.force(0), [0.0; 3]);
+    until("the second goes on", || {
+        second.push(DVec3::Z).expect("it pushes");
+        second.read().is_ok() && standin.force(1) == [0.0, 0.0, 1.0]
+    });
+}
+
+#[test]
+fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
+    let (_alone, standin) = standin();
+    let fault = standin.function::<Code>("standin_fault");
+    let mut hand = Hand::open(&standin, "0");
+    hand.next();
+    fault(0x0200);
+    let warm = Err("openhaptics: the force was not given: Warm motors (error 0x0200)".to_string());
+    until("motors are warm", || hand.push(DVec3::X) == warm);
+    hand.next();
+    fault(0x0302);
+    let gone = "openhaptics: the device does not tell where it is: Communication error (error 0x0302)";
+    until("it is pulled out", || hand.read() == Err(gone.to_string()));
+    assert_eq!(hand.push(DVec3::X), Ok(()));
+    assert_eq!(standin.force(0), [0.0; 3]);
+    fault(0);
+    until("it is back", || hand.read().is_ok());
+    standin.function::<Switch>("standin_hang")(true);
+    until("no frames", || hand.read() == Err("openhaptics: the scheduler makes no frames".to_string()));
+    drop(hand);
+    assert!(!standin.function::<InUse>("standin_in_use")(), "also left while it hangs");
+}
+
+#[test]
+fn numbers_that_are_none_are_told_and_never_pushed() {
+    let (_alone, standin) = standin();
+    let mut hand = Hand::open(&standin, "0");
+    standin.function::<Transform>("standin_transform")(0, &[f64::NAN; 16]);
+    until("garbage", || hand.next().position.is_nan());
+    assert_eq!(hand.next().orientation, None);
+    for _ in 0..20 {
+        hand.push(DVec3::new(f64::NAN, 1.0, 1.0)).expect("it pushes");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(!standin.function::<Pushed>("standin_pushed")(0));
+}

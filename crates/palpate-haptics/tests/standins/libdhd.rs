@@ -1,0 +1,200 @@
+//! A stand-in for Force Dimension's libdhd.so: the calls that the driver makes, with the published units and axes (m, N; x
+//! towards the operator, y to the right, z up) and results (0 or more for done, below 0 for an error that dhdErrorGetLastStr
+//! tells of). Functions called standin_… are for tests.
+
+#![allow(non_snake_case)]
+
+use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+#[derive(Clone, Copy)]
+struct One {
+    open: bool,
+    forces_on: bool,
+    position: [f64; 3],
+    frame: [[f64; 3]; 3],
+    buttons: c_uint,
+    force: [f64; 3],
+    serial: c_ushort,
+}
+
+struct World {
+    present: usize,
+    failing: bool,
+    max_force: f64,
+    devices: [One; 2],
+    error: &'static std::ffi::CStr,
+}
+
+const UNTURNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+const fn one(serial: c_ushort) -> One {
+    One { open: false, forces_on: false, position: [0.0; 3], frame: UNTURNED, buttons: 0, force: [0.0; 3], serial }
+}
+
+static WORLD: Mutex<World> = Mutex::new(World {
+    present: 1,
+    failing: false,
+    max_force: -1.0,
+    devices: [one(301), one(702)],
+    error: c"no error",
+});
+
+fn world() -> MutexGuard<'static, World> {
+    WORLD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl World {
+    fn fail(&mut self, error: &'static std::ffi::CStr) -> c_int {
+        self.error = error;
+        -1
+    }
+
+    /// Do something with an open device that is there.
+    fn on(&mut self, id: c_char, act: impl FnOnce(&mut One)) -> c_int {
+        let at = id as usize;
+        if at >= self.present || self.failing {
+            return self.fail(c"communication error");
+        }
+        if !self.devices[at].open {
+            return self.fail(c"no device found");
+        }
+        act(&mut self.devices[at]);
+        0
+    }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdGetDeviceCount() -> c_int {
+    world().present as c_int
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdOpenID(index: c_char) -> c_int {
+    let mut world = world();
+    let at = index as usize;
+    if at >= world.present {
+        return world.fail(c"no device found");
+    }
+    if world.devices[at].open {
+        return world.fail(c"device is already in use");
+    }
+    world.devices[at].open = true;
+    index as c_int
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdClose(id: c_char) -> c_int {
+    let one = &mut world().devices[id as usize];
+    one.open = false;
+    one.forces_on = false;
+    0
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdGetSystemName(id: c_char) -> *const c_char {
+    [c"omega.3", c"omega.7"][id as usize].as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dhdGetSerialNumber(serial: *mut c_ushort, id: c_char) -> c_int {
+    // SAFETY: the caller's place.
+    world().on(id, |one| unsafe { *serial = one.serial })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdHasWrist(id: c_char) -> bool {
+    id == 1
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdGetMaxForce(_: c_char) -> c_double {
+    world().max_force
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdEnableForce(on: c_uchar, id: c_char) -> c_int {
+    world().on(id, |one| one.forces_on = on != 0)
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dhdGetPosition(x: *mut c_double, y: *mut c_double, z: *mut c_double, id: c_char) -> c_int {
+    // SAFETY: the caller's places.
+    world().on(id, |one| unsafe { (*x, *y, *z) = one.position.into() })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dhdGetOrientationFrame(rows: *mut [[c_double; 3]; 3], id: c_char) -> c_int {
+    // SAFETY: the caller's place.
+    world().on(id, |one| unsafe { *rows = one.frame })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdGetButtonMask(id: c_char) -> c_uint {
+    world().devices[id as usize].buttons
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdSetForceAndTorqueAndGripperForce(
+    x: c_double,
+    y: c_double,
+    z: c_double,
+    tx: c_double,
+    ty: c_double,
+    tz: c_double,
+    grip: c_double,
+    id: c_char,
+) -> c_int {
+    assert_eq!((tx, ty, tz, grip), (0.0, 0.0, 0.0, 0.0));
+    world().on(id, |one| one.force = if one.forces_on { [x, y, z] } else { [f64::NAN; 3] })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdErrorGetLastStr() -> *const c_char {
+    world().error.as_ptr()
+}
+
+/// Where a hand holds a device.
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_place(id: usize, x: f64, y: f64, z: f64) {
+    world().devices[id].position = [x, y, z];
+}
+
+/// How it turns the handle, row by row.
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_turn(id: usize, rows: &[[f64; 3]; 3]) {
+    world().devices[id].frame = *rows;
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_press(id: usize, buttons: c_uint) {
+    world().devices[id].buttons = buttons;
+}
+
+/// How many devices are plugged in; those that are pulled out are closed by nobody.
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_plug(count: usize) {
+    world().present = count;
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_limit(force: f64) {
+    world().max_force = force;
+}
+
+/// Whether calls fail though the device is there.
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_fail(failing: bool) {
+    world().failing = failing;
+}
+
+/// The force that a device gives; not a number for one that was set before forces were on.
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_force(id: usize, force: &mut [f64; 3]) {
+    *force = world().devices[id].force;
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_is_open(id: usize) -> bool {
+    world().devices[id].open
+}
