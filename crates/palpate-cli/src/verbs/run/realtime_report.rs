@@ -60,6 +60,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         "force_process": timing(&report.force),
         "deformation_process": timing(&report.pictures),
         "unsolved_steps": report.unsolved,
+        "most_places": scene.model.parameters().most_places,
         "devices": devices.collect::<Vec<_>>(),
         "objects": objects.collect::<Vec<_>>(),
         "links": links.map(|links| json!({
@@ -111,6 +112,13 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
         out += &format!(
             "  links        {connected} devices came, {refused} were refused; {motions} motions, {old} late or doubled, \
              {garbage} no motions\n"
+        );
+    }
+    let parameters = scene.model.parameters();
+    if !parameters.obstacles.is_empty() {
+        out += &format!(
+            "  contacts     objects meet obstacles at {} places at most (most_places)\n",
+            parameters.most_places
         );
     }
     if report.unsolved > 0 {
