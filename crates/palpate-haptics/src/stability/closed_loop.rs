@@ -132,6 +132,17 @@ impl ClosedLoop {
         let none = Coupling { stiffness: 0.0, damping: 0.0 };
         let ranges = self.stable_ranges(none, coupling, MOST);
         let [least_gain, gain] = ranges.into_iter().find(|[low, high]| *low <= 1.0 && *high >= 1.0)?;
+        let [phase_rad, delay_s] = self.lag_margins(coupling);
+        Some(Margins { gain, least_gain, phase_rad, delay_s })
+    }
+
+    /// Delay [s] that may come on top of a stable coupling.
+    pub fn delay_margin_s(&self, coupling: Coupling) -> f64 {
+        self.lag_margins(coupling)[1]
+    }
+
+    /// Phase [rad] and delay [s] that the device's loop may lose.
+    fn lag_margins(&self, coupling: Coupling) -> [f64; 2] {
         let (mut phase_rad, mut delay_s) = (PI, f64::INFINITY);
         let size = |sample: &Sample| self.loop_gain(sample, coupling).norm() - 1.0;
         for pair in self.samples.windows(2) {
@@ -143,7 +154,7 @@ impl ClosedLoop {
             phase_rad = phase_rad.min(phase);
             delay_s = delay_s.min(phase / crossing.angle * self.timing.step_s);
         }
-        Some(Margins { gain, least_gain, phase_rad, delay_s })
+        [phase_rad, delay_s]
     }
 
     /// The damping [N·s/m] that a device needs so that a coupling is passive with any hand.

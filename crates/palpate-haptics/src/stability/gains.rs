@@ -1,7 +1,8 @@
 //! The coupling to begin with: as stiff as the object makes sense of, and as all hands leave a margin for.
 
 use super::closed_loop::{ClosedLoop, Margins};
-use palpate::Coupling;
+use super::place::{PlaceResponse, normal_at};
+use palpate::{Coupling, Recording, SurfacePoint};
 
 /// A coupling that takes less than this share of what the object gives within a step is not felt as softer.
 const SHARE: f64 = 0.1;
@@ -20,6 +21,9 @@ const HALVINGS: u32 = 11;
 const TRIED: u32 = 12;
 const LEAST: f64 = 0.2;
 const MOST: f64 = 50.0;
+
+/// Places of a surface that are looked at for the stiffest.
+const MOST_PLACES: usize = 200;
 
 /// What limits a stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +46,7 @@ pub struct DefaultCoupling {
 }
 
 /// The stiffest coupling that all loops (hands, directions) bear with twice the gains, and also with twice the age of what
-/// a force answers; at most 10/R\[0\] with R\[0\] = `within_step` [m/N]. Of the dampings the one that leaves most to spare.
+/// a force answers; at most 10/R\[0\] with R\[0\] = `within_step` [m/N]. Of the dampings the one that leaves most delay to spare.
 /// None if there is no such coupling.
 pub fn default_coupling(loops: &[ClosedLoop], within_step: f64) -> Option<DefaultCoupling> {
     let stiffest = 1.0 / (SHARE * within_step);
@@ -63,25 +67,28 @@ pub fn default_coupling(loops: &[ClosedLoop], within_step: f64) -> Option<Defaul
 
 /// Of a stiffness, the damping with the most margin; none if it is too little.
 fn with_margin(loops: &[ClosedLoop], stiffness: f64) -> Option<Coupling> {
-    let [low, high] = common_damping(loops, stiffness)?;
+    let [low, high] = stable_damping(loops, stiffness)?;
     let age_s = loops.iter().map(|closed| closed.timing().age_s()).fold(0.0, f64::max);
     // Evenly by ratio, from a share of what would make up for the age.
     let (low, high) = (low.max(LEAST * age_s * stiffness), high.min(MOST * age_s * stiffness));
     let tried = (1..TRIED).map(|k| low * (high / low).powf(f64::from(k) / f64::from(TRIED)));
-    let all = tried.filter_map(|damping| {
-        let coupling = Coupling { stiffness, damping };
-        let margins = worst_margins(loops, coupling)?;
-        let spare = (margins.gain / MARGIN)
-            .min(1.0 / (MARGIN * margins.least_gain))
-            .min(margins.delay_s / ((MARGIN - 1.0) * age_s));
-        Some((spare, coupling))
-    });
+    let spare = |coupling: Coupling| {
+        let scaled =
+            |by: f64| Coupling { stiffness: by * coupling.stiffness, damping: by * coupling.damping };
+        let bears = |by: f64| loops.iter().all(|closed| closed.is_stable(scaled(by)));
+        let all = [1.0 / MARGIN, 1.0, MARGIN.sqrt(), MARGIN].into_iter().all(bears);
+        let delay_s =
+            loops.iter().map(|closed| closed.delay_margin_s(coupling)).fold(f64::INFINITY, f64::min);
+        if all { delay_s / ((MARGIN - 1.0) * age_s) } else { 0.0 }
+    };
+    let all =
+        tried.map(|damping| Coupling { stiffness, damping }).map(|coupling| (spare(coupling), coupling));
     let best = all.filter(|(spare, _)| *spare >= 1.0).max_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, coupling)| coupling)
 }
 
-/// The widest range of dampings with which a stiffness is stable in all loops.
-fn common_damping(loops: &[ClosedLoop], stiffness: f64) -> Option<[f64; 2]> {
+/// The widest range of dampings [N·s/m] with which a stiffness [N/m] is stable in all loops; none if there is none.
+pub fn stable_damping(loops: &[ClosedLoop], stiffness: f64) -> Option<[f64; 2]> {
     let mut common = vec![[0.0, MOST_DAMPING]];
     for closed in loops {
         let own = closed.stable_damping(stiffness, MOST_DAMPING);
@@ -89,6 +96,33 @@ fn common_damping(loops: &[ClosedLoop], stiffness: f64) -> Option<[f64; 2]> {
         common = pairs.filter(|[low, high]| low < high).collect();
     }
     common.into_iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+}
+
+/// The stiffness [N/m] from which on no damping is enough in all loops; none if there is no such up to `most`.
+pub fn unstable_from(loops: &[ClosedLoop], most: f64) -> Option<f64> {
+    if stable_damping(loops, most).is_some() {
+        return None;
+    }
+    let (mut good, mut bad) = (most * SOFTEST * SOFTEST, most);
+    for _ in 0..2 * HALVINGS {
+        let middle = (good * bad).sqrt();
+        *(if stable_damping(loops, middle).is_some() { &mut good } else { &mut bad }) = middle;
+    }
+    Some(bad)
+}
+
+/// The stiffest place of a body: where the surface gives least along its normal within a step [s].
+pub fn stiffest_place(recording: &Recording, patch_radius: f64, step_s: f64) -> Option<SurfacePoint> {
+    let surface = &recording.surface;
+    let every = surface.triangles.len().div_ceil(MOST_PLACES).max(1);
+    let places = (0..surface.triangles.len()).step_by(every);
+    let places = places.map(|triangle| SurfacePoint { triangle: triangle as u32, weights: [1.0, 0.0, 0.0] });
+    let gives = |point: &SurfacePoint| {
+        PlaceResponse::new(recording, point, patch_radius, normal_at(surface, point)).within_step(step_s)
+    };
+    // Fixed nodes don't give at all: there is nothing to feel of the body.
+    let movable = places.filter(|point| recording.is_movable(point));
+    movable.map(|point| (gives(&point), point)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
 }
 
 /// The least of each margin over the loops; none if one is not stable.
@@ -122,9 +156,8 @@ fn two_digits(value: f64, round: fn(f64) -> f64) -> f64 {
 mod tests {
     use super::*;
     use crate::device::{Hand, Traits};
-    use crate::stability::{LoopTiming, PlaceResponse, normal_at};
+    use crate::stability::LoopTiming;
     use glam::DVec3;
-    use palpate::Recording;
 
     fn recording() -> Recording {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");

@@ -25,5 +25,5 @@ mod place;
 mod sampled;
 
 pub use closed_loop::{ClosedLoop, LoopTiming, Margins};
-pub use gains::{DefaultCoupling, Limit, default_coupling};
+pub use gains::{DefaultCoupling, Limit, default_coupling, stable_damping, stiffest_place, unstable_from};
 pub use place::{PlaceResponse, normal_at};

@@ -73,6 +73,7 @@ const MOST_STEPS: f64 = 1e8;
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = scene_file::read(&arguments.scene)?;
     scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
+    scene.choices.iter().for_each(|choice| crate::tell(choice));
     if arguments.realtime.realtime {
         return realtime::run(&scene, arguments);
     }
