@@ -8,7 +8,7 @@ use palpate::Coupling;
 use std::f64::consts::{PI, TAU};
 
 /// What grows by e in more than this [s] counts as stable: the circle is that much wider than 1.
-const SLOWEST_S: f64 = 1000.0;
+pub const SLOWEST_S: f64 = 1000.0;
 
 /// Between samples the response changes by less than this share, and turns by less than this angle [rad].
 const CHANGE: f64 = 0.3;

@@ -24,6 +24,6 @@ mod gains;
 mod place;
 mod sampled;
 
-pub use closed_loop::{ClosedLoop, LoopTiming, Margins};
+pub use closed_loop::{ClosedLoop, LoopTiming, Margins, SLOWEST_S};
 pub use gains::{DefaultCoupling, Limit, default_coupling, stable_damping, stiffest_place, unstable_from};
 pub use place::{PlaceResponse, normal_at};
