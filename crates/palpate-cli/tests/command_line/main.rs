@@ -3,6 +3,7 @@
 mod bad_contact_scenes;
 mod bad_input;
 mod contacts;
+mod couplings;
 mod realtime;
 mod results;
 mod stores;
