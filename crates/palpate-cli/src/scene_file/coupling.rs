@@ -54,7 +54,8 @@ pub(super) fn choose(
 ) -> Result<Option<(Coupling, String)>, Failure> {
     let Some(choice) = device.coupling.as_ref() else { return Ok(None) };
     // A step out of its range is told of by the model.
-    if !matches!(choice.get_ref(), CouplingChoice::Word(_)) || !(step_s > 0.0 && step_s <= 1.0) {
+    let automatic = matches!(choice.get_ref(), CouplingChoice::Word(_));
+    if !(automatic && step_s > 0.0 && step_s <= 1.0) {
         return Ok(None);
     }
     let (traits, hands) = match &device.simulated {
