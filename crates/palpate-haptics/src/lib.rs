@@ -28,6 +28,7 @@ mod port;
 mod safety;
 mod scheduling;
 mod session;
+pub mod stability;
 mod timing;
 
 pub use clock::Clock;

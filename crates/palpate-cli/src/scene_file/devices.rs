@@ -1,8 +1,9 @@
 //! `[[device]]`: hands that hold a point, and tips that touch.
 
 use super::SceneDevice;
+use super::coupling;
 use super::drivers::read_real;
-use super::entries::{AttachEntry, CouplingEntry, DeviceEntry, SimulatedEntry};
+use super::entries::{AttachEntry, DeviceEntry, SimulatedEntry};
 use super::place::{Quantity, Source};
 use crate::Failure;
 use glam::DVec3;
@@ -21,12 +22,12 @@ const FAR_START: f64 = 0.01;
 const SMOOTH_PATCH: f64 = 3.0;
 const SMOOTH_PATCH_LINEAR: f64 = 6.0;
 
-/// Stiffness [N/m] and damping [N·s/m] are below this.
-const STIFFEST: f64 = 1e18;
-
 /// What a device is, and whether its keys go together; what it holds and where it goes is read later.
 pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParameters, Failure> {
-    let coupling = device.coupling.as_ref().map(|entry| read_coupling(source, entry)).transpose()?;
+    let coupling = match device.coupling.as_ref() {
+        Some(choice) => coupling::read_gains(source, choice)?,
+        None => None,
+    };
     match (device.mode.get_ref().as_str(), &device.attach) {
         ("held", Some(_)) => {
             refuse_touch_keys(source, device)?;
@@ -89,7 +90,7 @@ pub(super) fn read_device(
     Ok(device)
 }
 
-fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), Failure> {
+pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), Failure> {
     let traits = known_device(entry.device.get_ref());
     let traits = traits.or_else(|what| source.fail(entry.device.span(), what))?;
     let hand = match &entry.grip {
@@ -113,15 +114,6 @@ pub fn known_grip(name: &str) -> Result<Hand, String> {
         "fingertip" => Ok(Hand::FINGERTIP),
         other => Err(format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\"")),
     }
-}
-
-fn read_coupling(source: &Source, entry: &CouplingEntry) -> Result<Coupling, Failure> {
-    let stiffness = Quantity { key: "stiffness", unit: " N/m", below: STIFFEST };
-    let damping = Quantity { key: "damping", unit: " N·s/m", below: STIFFEST };
-    Ok(Coupling {
-        stiffness: source.positive(&entry.stiffness, stiffness)?,
-        damping: entry.damping.as_ref().map_or(Ok(0.0), |number| source.not_negative(number, damping))?,
-    })
 }
 
 fn touch_parameters(

@@ -1,7 +1,8 @@
 //! The keys of a scene file, as serde reads them.
 
 use super::LARGEST;
-use serde::de::Error;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 use toml::Spanned;
@@ -105,7 +106,7 @@ pub(super) struct DeviceEntry {
     pub tip_radius: Option<Spanned<f64>>,
     pub patch_radius: Option<Spanned<f64>>,
     pub friction: Option<Spanned<f64>>,
-    pub coupling: Option<CouplingEntry>,
+    pub coupling: Option<Spanned<CouplingChoice>>,
     pub simulated: Option<SimulatedEntry>,
     pub driver: Option<Spanned<DriverEntry>>,
     pub mount: Option<Spanned<MountEntry>>,
@@ -142,6 +143,34 @@ pub(super) struct SimulatedEntry {
 pub(super) struct AttachEntry {
     pub object: Spanned<String>,
     pub point: Spanned<Numbers<3>>,
+}
+
+/// `coupling = "auto"`, or gains.
+pub(super) enum CouplingChoice {
+    Word(String),
+    Gains(CouplingEntry),
+}
+
+impl<'de> Deserialize<'de> for CouplingChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choice;
+        impl<'de> Visitor<'de> for Choice {
+            type Value = CouplingChoice;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("{ stiffness = …, damping = … } or \"auto\"")
+            }
+
+            fn visit_str<E: Error>(self, word: &str) -> Result<Self::Value, E> {
+                Ok(CouplingChoice::Word(word.into()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                CouplingEntry::deserialize(MapAccessDeserializer::new(map)).map(CouplingChoice::Gains)
+            }
+        }
+        deserializer.deserialize_any(Choice)
+    }
 }
 
 #[derive(Deserialize)]

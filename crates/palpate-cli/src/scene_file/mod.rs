@@ -1,5 +1,6 @@
 //! Scene files: TOML in, model, devices and obstacles out. Every error names the file and the line.
 
+mod coupling;
 mod devices;
 mod drivers;
 mod entries;
@@ -38,6 +39,8 @@ pub struct Scene {
     pub obstacles: Vec<SceneObstacle>,
     /// Things the user should know.
     pub remarks: Vec<String>,
+    /// What was chosen for the user.
+    pub choices: Vec<String>,
     /// The files that the scene was read from.
     pub inputs: Vec<PathBuf>,
 }
@@ -153,14 +156,22 @@ pub fn read_carried(path: &Path, carried: &Carried, pace: Pace) -> Result<Scene,
     }
     check_names(&source, &file)?;
 
-    let mut remarks = Vec::new();
+    let (mut remarks, mut choices) = (Vec::new(), Vec::new());
     let objects: Result<Vec<_>, _> =
         file.object.iter().map(|entry| objects::read_object(&source, entry)).collect();
     let objects = objects?;
     let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
     let mut parameters = read_rules(&source, &file, pace)?;
     for entry in &file.device {
-        parameters.devices.push(devices::read_parameters(&source, entry)?);
+        let mut device = devices::read_parameters(&source, entry)?;
+        let step_s = parameters.step_s;
+        if let Some((coupling, line)) =
+            coupling::choose(&source, entry, &device, step_s, &objects, &object_names)?
+        {
+            device.coupling = Some(coupling);
+            choices.push(line);
+        }
+        parameters.devices.push(device);
     }
     let mut obstacles = Vec::new();
     for (number, entry) in file.plane.iter().enumerate() {
@@ -183,7 +194,8 @@ pub fn read_carried(path: &Path, carried: &Carried, pace: Pace) -> Result<Scene,
     remarks.extend(objects::doubtful_recordings(&objects, &object_names));
     let nothing_meets: Vec<String> = objects::tables_that_meet_nothing(&objects, &object_names).collect();
     let inputs = inputs(&source, &file);
-    let mut scene = Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, inputs };
+    let mut scene =
+        Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, choices, inputs };
     if scene.has_touch() {
         scene.remarks.extend(nothing_meets);
     }

@@ -5,6 +5,7 @@
 
 mod adversarial;
 mod bounce;
+mod closed_loop;
 mod compliance;
 mod drop;
 mod frequencies;
@@ -184,6 +185,11 @@ pub const CASES: &[Case] = &[
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",
         run: grip::fingers_hold,
+    },
+    Case {
+        name: "closed-loop",
+        about: "device, hand, rate and delay: where the loop begins to swing, and what the controller leaves of it",
+        run: closed_loop::study,
     },
     Case {
         name: "adversarial",

@@ -3,6 +3,7 @@
 mod bad_contact_scenes;
 mod bad_input;
 mod contacts;
+mod couplings;
 mod devices;
 mod realtime;
 mod results;

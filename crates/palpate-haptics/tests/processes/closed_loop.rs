@@ -43,8 +43,8 @@ fn pinch(stiffness: f64, controlled: bool) -> (Vec<UpdateCounts>, f64) {
 }
 
 #[test]
-fn ports_that_are_controlled_give_no_more_energy_and_stiff_ones_far_less() {
-    for stiffness in [50.0, 200.0, 2000.0, 20_000.0] {
+fn ports_that_are_controlled_give_no_more_energy_and_stiff_ones_hardly_any() {
+    for stiffness in [50.0, 200.0, 2000.0, 5000.0, 20_000.0] {
         let (_, free) = pinch(stiffness, false);
         let (counts, controlled) = pinch(stiffness, true);
         assert!(controlled <= free * 1.001, "{stiffness} N/m: {controlled} J, {free} J without");
@@ -53,9 +53,10 @@ fn ports_that_are_controlled_give_no_more_energy_and_stiff_ones_far_less() {
             assert!(free < 1e-5 && acted < 10, "a soft one is passive by its damper: {free} J, {acted}");
         }
         if stiffness > 1000.0 {
-            // Without, they swing as far as the safety lets them.
+            // Without, they swing as far as the safety lets them. The most that is left is from the first swing,
+            // before anything is known of the port; the stiffest has the most of it.
             assert!(free > 5e-3, "{stiffness} N/m: {free} J");
-            assert!(controlled < 0.25 * free, "{stiffness} N/m: {controlled} J, {free} J without");
+            assert!(controlled < 0.015 * free, "{stiffness} N/m: {controlled} J, {free} J without");
         }
     }
 }

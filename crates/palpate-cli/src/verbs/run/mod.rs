@@ -76,6 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let pace = if arguments.realtime.realtime { Pace::RealTime } else { Pace::Offline };
     let scene = scene_file::read(&arguments.scene, pace)?;
     scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
+    scene.choices.iter().for_each(|choice| crate::tell(choice));
     if arguments.realtime.realtime {
         return realtime::run(&scene, arguments);
     }

@@ -1,4 +1,6 @@
-//! `palpate inspect`: what is in a recording.
+//! `palpate inspect`: what is in a recording, and which coupling a device can have on it.
+
+mod stability;
 
 use crate::Failure;
 use crate::progress::Bars;
@@ -8,13 +10,21 @@ use palpate::{Certificate, Damping, Material, Recording, ResidualCompliance, Sup
 use palpate_fem::progress::Progress;
 use palpate_store::{Location, TableStore};
 use serde_json::{Value, json};
+pub use stability::{ANY_HAND, StabilityArguments};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Show what is in a recording, with its force-error certificate, or in a store of impulse responses
 ///
-/// Of a store it tells which shards are there and which are missing, and checks those that are there.
+/// Of a store it tells which shards are there and which are missing, and checks those that are there. With --device it tells which
+/// virtual coupling (scene key `coupling`) is stable for that device on this object at a rate, with a delay, in a hand; by how
+/// much; where it begins to swing; and the default, the stiffest with twice the gains and twice the delay to spare.
 #[derive(Args)]
+#[command(after_help = "Examples:
+  palpate inspect cube.palp
+  palpate inspect cube.palp --device touch
+  palpate inspect cube.palp --device omega.3 --rate 4000 --grip firm --point 0,0.05,0
+  palpate inspect cube.palp --device touch --delay 0.02      # over a link, 20 ms there and back")]
 pub struct Arguments {
     /// The recording, or the store: a folder or s3://BUCKET/PREFIX
     file: PathBuf,
@@ -24,6 +34,9 @@ pub struct Arguments {
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+    /// The coupling of a device
+    #[command(flatten)]
+    stability: StabilityArguments,
 }
 
 /// Run the verb.
@@ -33,6 +46,9 @@ pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
         return inspect_store(arguments, &Location::parse(&text));
     }
     let recording = read_recording(&arguments.file)?;
+    if arguments.stability.tell(&recording, arguments.json)? {
+        return Ok(());
+    }
     if arguments.json {
         return print_as_json(&recording);
     }
