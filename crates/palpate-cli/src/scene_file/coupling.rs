@@ -1,6 +1,7 @@
 //! `coupling`: gains, or `"auto"` for those that the stability of the loop gives.
 
 use super::devices::read_simulated;
+use super::drivers::read_real;
 use super::entries::{CouplingChoice, DeviceEntry};
 use super::place::{Quantity, Source};
 use crate::Failure;
@@ -63,8 +64,12 @@ pub(super) fn choose(
             let (traits, hand) = read_simulated(source, entry)?;
             (traits, vec![Some(hand)])
         }
-        // The lightest that is known, in whatever hand.
-        None => (Traits::TOUCH, ANY_HAND.map(|(_, hand): (_, Option<Hand>)| hand).to_vec()),
+        // In whatever hand; the lightest that is known where nothing tells.
+        None => {
+            let real = read_real(source, device)?;
+            let traits = real.map_or(Traits::TOUCH, |real| real.driver.usual_traits());
+            (traits, ANY_HAND.map(|(_, hand): (_, Option<Hand>)| hand).to_vec())
+        }
     };
     let linked = device.linked.as_ref().is_some_and(|linked| *linked.get_ref());
     let timing = LoopTiming::new(step_s, if linked { LINK_S } else { 0.0 });

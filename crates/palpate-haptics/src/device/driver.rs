@@ -1,6 +1,6 @@
 //! The drivers of real devices: what they find, and how one is opened.
 
-use super::{Device, dhd, haply, openhaptics};
+use super::{Device, Traits, dhd, haply, openhaptics};
 use crate::error::Error;
 
 /// How a real device is driven.
@@ -45,6 +45,15 @@ impl Driver {
     /// One by its name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|driver| driver.name() == name)
+    }
+
+    /// What its devices are like, as far as nothing else is known: the lightest of those that it drives.
+    pub fn usual_traits(self) -> Traits {
+        match self {
+            Self::OpenHaptics => Traits::TOUCH,
+            Self::Dhd => Traits::OMEGA_3,
+            Self::Haply => Traits::INVERSE_3,
+        }
     }
 
     /// The environment variable that says where the vendor's library, or service, is.
