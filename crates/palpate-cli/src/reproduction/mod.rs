@@ -3,6 +3,7 @@
 mod agreement;
 mod cost;
 mod impulses;
+mod live;
 mod passivity;
 mod recording;
 
@@ -16,6 +17,7 @@ use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
 use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
 use std::fmt::Write;
+use std::path::Path;
 
 /// A file of numbers beside the report.
 pub struct DataFile {
@@ -44,8 +46,8 @@ pub struct Effort {
     pub steps: usize,
 }
 
-/// All chapters, in the order of the paper.
-pub fn chapters(effort: Effort, progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
+/// All chapters, in the order of the paper; `folder` is for what a live run needs.
+pub fn chapters(effort: Effort, folder: &Path, progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
     let body = cube(effort.cells, 200, &mut WithoutRemarks(progress))?;
     Ok(vec![
         recording::chapter(&body, effort, progress)?,
@@ -53,6 +55,7 @@ pub fn chapters(effort: Effort, progress: &mut Bars) -> Result<Vec<Chapter>, Fai
         passivity::chapter(&body, progress)?,
         agreement::chapter(progress)?,
         cost::chapter(effort, progress)?,
+        live::chapter(&body, &folder.join("live"), progress)?,
     ])
 }
 
