@@ -92,6 +92,7 @@ fn numbers_out_of_range_are_named_with_their_line() {
             "most_contact_points = 0",
             "line 1: most_contact_points is 0, expected 1 to 4096",
         ),
+        ("most_contact_points = 100", "most_places = 3", "line 1: most_places is 3, expected 8 to 1000000"),
         ("friction = 0.4", "friction = -0.4", "line 6: friction is -0.4, expected at least 0 and below 1e6"),
         (
             "normal = [0.0, 1.0, 0.0]",

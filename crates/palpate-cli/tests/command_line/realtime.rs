@@ -12,7 +12,7 @@ fn workplace() -> Workplace {
         )
     };
     let scene = [
-        "step = 0.002\ngravity = [0.0, 0.0, -9.81]\n".to_string(),
+        "step = 0.002\ngravity = [0.0, 0.0, -9.81]\nmost_places = 8\n".to_string(),
         "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [0.0, 0.0, 0.0501]\n".to_string(),
         "[[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 1.0]\n".to_string(),
         finger("left", ""),
@@ -32,6 +32,7 @@ fn a_log_of_a_run_in_real_time_repeats_bit_for_bit_anywhere() {
     let run = ["run", "fingers.toml", "--realtime", "--duration", "0.6", "--log", "run.mcap", "--json"];
     let report = workplace.json(&run);
     assert_eq!(report["steps"], 300);
+    assert_eq!(report["most_places"], 8);
     assert_eq!(report["log"]["steps"], 300);
     assert_eq!(report["force_process"]["cycles"], 300);
     assert!(report["deformation_process"]["cycles"].as_u64() > Some(3), "{report:#}");
@@ -124,7 +125,7 @@ fn the_paper_s_two_hands_run_in_real_time() {
         "0",
         "--json",
     ]);
-    assert_eq!(report["steps"], 200);
+    assert_eq!((&report["steps"], &report["most_places"]), (&200.into(), &48.into()));
     assert_eq!(report["deformation_process"]["cycles"], 0);
     assert!(report["devices"][0]["force_max_n"].as_f64() > Some(0.01), "{report:#}");
     let text = workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05"]);
