@@ -201,6 +201,11 @@ impl Model {
 }
 
 impl ModelParameters {
+    /// Whether few places may stand for many nodes.
+    pub(crate) fn thins_faces(&self) -> bool {
+        self.most_places < usize::MAX && !self.obstacles.is_empty()
+    }
+
     /// Whether objects, so many, have something to lie on: obstacles, or one another.
     fn touches_surfaces(&self, objects: usize) -> bool {
         !self.obstacles.is_empty() || objects > 1
@@ -267,7 +272,8 @@ impl SceneObject {
         radii.retain(|radius| *radius > 0.0);
         radii.sort_unstable_by(f64::total_cmp);
         radii.dedup();
-        let body = Body::new(recording, &radii, parameters.most_places);
+        let thins = parameters.thins_faces() && matches!(response, Response::Modal(_));
+        let body = Body::new(recording, &radii, if thins { parameters.most_places } else { usize::MAX });
         Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
     }
 

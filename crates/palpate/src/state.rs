@@ -228,12 +228,7 @@ impl State {
             levels: vec![Level::default(); model.objects.len() * parameters.obstacles.len()],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
-                solver: Solver::new(
-                    model.objects.len(),
-                    devices,
-                    contacts,
-                    parameters.most_places < usize::MAX,
-                ),
+                solver: Solver::new(model.objects.len(), devices, contacts, parameters.thins_faces()),
                 search: Search::new(),
                 caches: model.objects.iter().map(|o| NodeCache::new(&o.body)).collect(),
                 vicinities: (0..devices)

@@ -87,7 +87,10 @@ impl Body {
         let edge = recording.surface.mean_edge();
         let mut apart = edge;
         let mut count = recording.surface.positions.len();
-        while count > most_places && patches.len() < radii.len() + MOST_LEVELS {
+        for _ in 0..MOST_LEVELS {
+            if count <= most_places {
+                break;
+            }
             apart *= COARSER[usize::from(count <= MANY)];
             let nodes = thinned(&recording.surface, apart);
             if nodes.len() < count {

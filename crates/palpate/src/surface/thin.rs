@@ -11,7 +11,8 @@ const CORNER: f64 = 0.65;
 const EDGE: f64 = 0.85;
 
 /// Nodes that are at least so far apart [m], and no node is farther from one of them: corners first, then edges, so that
-/// what stands on them stands as the whole surface does. The two sides of a thin part have nodes of their own.
+/// what stands on them stands as the whole surface does. The two sides of a thin part have nodes of their own;
+/// a side that has no direction counts for both.
 pub(crate) fn thinned(surface: &Surface, apart: f64) -> Vec<u32> {
     let around = triangles_around(surface);
     let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
@@ -33,7 +34,7 @@ pub(crate) fn thinned(surface: &Surface, apart: f64) -> Vec<u32> {
         let beside = |[dx, dy, dz]: [i64; 3]| taken.get(&[x + dx, y + dy, z + dz]).into_iter().flatten();
         let blocks = |other: &u32| {
             let (other, its) = (surface.positions[*other as usize], normals[*other as usize]);
-            (other - place).length() < apart && its.dot(normal) > 0.0
+            (other - place).length() < apart && its.dot(normal) >= 0.0
         };
         let mut offsets = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
         let stays = !offsets.any(|offset| beside(offset).any(blocks));
@@ -84,6 +85,15 @@ mod tests {
                 assert!(near.map(|b| (*p - b).length()).fold(1.0, f64::min) < apart, "{p}");
             }
         }
+    }
+
+    #[test]
+    fn a_sheet_of_no_thickness_is_thinned_too() {
+        let mut surface = slab(10, 0.0);
+        // Both faces over the same nodes: none of them has a side.
+        let nodes = surface.positions.len() as u32 / 2;
+        surface.triangles.iter_mut().flatten().for_each(|node| *node %= nodes);
+        assert!(thinned(&surface, 0.3).len() < 30);
     }
 
     #[test]
