@@ -179,18 +179,18 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
         (
             "\"touch\", grip",
             "\"phantom\", grip",
-            "line 25: device is \"phantom\", expected one of \"touch\", \"omega.3\", \"inverse3\"",
+            "line 26: device is \"phantom\", expected one of \"touch\", \"omega.3\", \"inverse3\"",
         ),
-        ("\"light\"", "\"iron\"", "line 25: grip is \"iron\", expected \"firm\", \"light\" or \"fingertip\""),
+        ("\"light\"", "\"iron\"", "line 26: grip is \"iron\", expected \"firm\", \"light\" or \"fingertip\""),
         (
             "path = { file = \"left_finger.csv\" }\n",
             "",
-            "line 12: the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, or linked = true",
+            "line 13: the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, or linked = true",
         ),
         (
             "simulated = {",
             "linked = true\nsimulated = {",
-            "line 25: a linked device has its path, or its hand, in the process",
+            "line 26: a linked device has its path, or its hand, in the process",
         ),
         ("step = 0.002", "step = 0.02", "the step is 0.02 s: in real time it is 0.0002 s to 0.01 s"),
     ] {

@@ -73,3 +73,70 @@ impl NodalForces {
         }
     }
 }
+
+/// Add what forces [N] on nodes do to all nodes by the residual compliance [m]. Costs nodes × forces, of a near field the blocks
+/// around the forces.
+pub(super) fn add_dents(residual: &ResidualCompliance, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
+    match residual {
+        ResidualCompliance::None => {}
+        ResidualCompliance::NearField(near) => {
+            for &(node, force) in loads {
+                // S is symmetric: what a row's node feels of others is what they feel of it, transposed.
+                near.row(node as usize).for_each(|(other, block)| out[other] += block.transpose() * force);
+            }
+        }
+        ResidualCompliance::Whole(packed) => {
+            let row = |r: usize| &packed[r * (r + 1) / 2..][..=r];
+            let mut sums = vec![0.0; 3 * out.len()];
+            for &(node, force) in loads {
+                let first = 3 * node as usize;
+                for axis in 0..3 {
+                    let own = row(first + axis);
+                    sums.iter_mut().zip(own).for_each(|(sum, s)| *sum += f64::from(*s) * force[axis]);
+                }
+                // Of what comes after a row only the lower triangle is there.
+                for (r, sum) in sums.iter_mut().enumerate().skip(first + 1) {
+                    let columns = row(r)[first..].iter().take((r - first).min(3));
+                    *sum += columns.enumerate().map(|(axis, s)| f64::from(*s) * force[axis]).sum::<f64>();
+                }
+            }
+            for (u, sum) in out.iter_mut().zip(sums.chunks_exact(3)) {
+                *u += DVec3::from_slice(sum);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{NearField, Recording};
+
+    #[test]
+    fn dents_are_the_sums_of_blocks() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Recording::from_bytes(bytes).expect("a released recording");
+        let (whole, n) = (recording.residual, recording.surface.positions.len());
+        // The same as rows of blocks, of which every third is missing.
+        let kept = |i: usize, j: usize| (i + j) % 3 != 1;
+        let mut near = NearField { radius: 1.0, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
+        for i in 0..n {
+            for j in (0..n).filter(|&j| kept(i, j)) {
+                near.nodes.push(j as u32);
+                let block = whole.block(i, j);
+                near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
+            }
+            near.offsets.push(near.nodes.len() as u32);
+        }
+        let loads =
+            [(0, DVec3::X), (5, DVec3::new(0.3, -1.0, 2.0)), (n as u32 - 1, DVec3::new(-1.0, 0.5, 0.1))];
+        for residual in [whole, ResidualCompliance::NearField(near), ResidualCompliance::None] {
+            let mut out = vec![DVec3::Y; n];
+            add_dents(&residual, &loads, &mut out);
+            for (i, u) in out.into_iter().enumerate() {
+                let sum: DVec3 = loads.iter().map(|&(j, f)| residual.block(i, j as usize) * f).sum();
+                assert!((u - DVec3::Y - sum).length() < 1e-14 * (1.0 + sum.length()), "{i}: {u} {sum}");
+            }
+        }
+    }
+}

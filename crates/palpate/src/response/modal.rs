@@ -4,7 +4,7 @@
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
 use super::dot::{dot, dot3, dot9, dots};
-use super::loads::NodalForces;
+use super::loads::{NodalForces, add_dents};
 use super::nodes::NodeCompliance;
 use super::oscillator::{HeldOscillator, Oscillation};
 use super::{Acting, Body, Place, Placed, Reading};
@@ -301,10 +301,8 @@ impl SampledModes {
             if let Some(response) = &recording.gravity {
                 *u += response.residual_displacement(node, gravity);
             }
-            let dent =
-                |&(other, force): &(u32, DVec3)| recording.residual.block(node, other as usize) * force;
-            *u += loads.iter().map(dent).sum::<DVec3>();
         }
+        add_dents(&recording.residual, &loads, out);
     }
 }
 
