@@ -51,7 +51,7 @@ pub use summary::{Summary, percentile_us};
 pub struct Arguments {
     /// The scene file
     pub scene: PathBuf,
-    /// How long [s]; by default to the end of the longest path
+    /// How long [s]; by default to the end of the longest path, in real time with real or linked devices until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// What it should leave

@@ -90,7 +90,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     if !(options.pictures >= 0.0 && options.pictures <= 1000.0) {
         return Err(Failure(format!("--pictures is {}, expected 0 to 1000", options.pictures)));
     }
-    let steps = count_steps(scene, arguments)?;
+    // Hands without a path have no end but Ctrl-C.
+    let endless = arguments.duration.is_none() && scene.devices.iter().any(|device| device.path.is_none());
+    let steps = if endless { None } else { Some(count_steps(scene, arguments)? as u64) };
     let log = options.log.as_deref().map(|path| begin_log(scene, arguments, path)).transpose()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let start = Instant::now();
@@ -116,7 +118,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         start,
         devices,
         movers: movers(scene),
-        steps: Some(steps as u64),
+        steps,
         pictures_hz: options.pictures,
         scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
         patience_s: PATIENCE_S,
@@ -137,17 +139,22 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
 fn watch(
     session: Session,
     log: Option<(LogHand, LogWriter<WholeFile>)>,
-    steps: usize,
+    steps: Option<u64>,
 ) -> Result<(Report, Option<WholeFile>), Failure> {
     let (stop, done) = (stop_on_interrupt(), AtomicU64::new(0));
     let over = AtomicBool::new(false);
     std::thread::scope(|scope| {
         if std::io::stderr().is_terminal() {
             scope.spawn(|| {
-                let style =
-                    ProgressStyle::with_template("{wide_bar} {pos}/{len} steps, {eta} left (Ctrl-C ends it)");
-                let bar = ProgressBar::new(steps as u64);
-                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+                let (bar, style) = match steps {
+                    Some(steps) => {
+                        (ProgressBar::new(steps), "{wide_bar} {pos}/{len} steps, {eta} left (Ctrl-C ends it)")
+                    }
+                    None => (ProgressBar::new_spinner(), "{spinner} {pos} steps (Ctrl-C ends it)"),
+                };
+                bar.set_style(
+                    ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()),
+                );
                 while !over.load(Ordering::Relaxed) {
                     bar.set_position(done.load(Ordering::Relaxed));
                     std::thread::sleep(LOOK);
