@@ -221,6 +221,11 @@ impl Shape {
         matches!(self, Self::Sphere { .. } | Self::Capsule { .. })
     }
 
+    /// Whether [`Self::corners`] has any to give.
+    pub(crate) fn has_corners(&self) -> bool {
+        matches!(self, Self::Box { .. } | Self::Mesh(_))
+    }
+
     /// Weights of the point of a triangle that goes deepest into a round shape; those with corners meet the middle of
     /// a triangle with these.
     ///

@@ -1,14 +1,14 @@
 //! Haply's Inverse Service: axes, its one answer per message, and a service that goes away and comes back.
 
-use super::standin::until;
+use super::standin::{Hand, until};
 use glam::{DQuat, DVec3};
-use palpate_haptics::device::{Device, Driver, Reading};
+use palpate_haptics::device::Driver;
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tungstenite::{Error, Message, WebSocket};
 
 /// What the service answers.
@@ -166,39 +166,16 @@ fn answer(socket: &mut WebSocket<TcpStream>, text: &str, world: &Mutex<World>) {
     let _ = socket.send(Message::text(answer));
 }
 
-/// A device with a clock.
-struct Hand {
-    device: Box<dyn Device>,
-    start: Instant,
+fn open(service: &Service) -> Hand {
+    Hand::open(Driver::Haply, "0", &service.place())
 }
 
-impl Hand {
-    fn open(service: &Service) -> Self {
-        let device = Driver::Haply.open("0", Some(&service.place())).expect("a device").1;
-        Self { device, start: Instant::now() }
-    }
-
-    fn read(&mut self) -> Result<Reading, String> {
-        self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
-    }
-
-    /// The next reading, however busy the machine is.
-    fn next(&mut self) -> Reading {
-        let mut next = None;
-        until("a reading", || {
-            next = self.read().ok();
-            next.is_some()
-        });
-        next.expect("it was waited for")
-    }
-
-    /// Push until the service has the force.
-    fn push(&mut self, service: &Service, force: DVec3, theirs: [f64; 3]) {
-        until("the force arrives", || {
-            self.device.push(force, 0.0).expect("it pushes");
-            service.force() == theirs
-        });
-    }
+/// Push until the service has the force.
+fn push(hand: &mut Hand, service: &Service, force: DVec3, theirs: [f64; 3]) {
+    until("the force arrives", || {
+        hand.push(force).expect("it pushes");
+        service.force() == theirs
+    });
 }
 
 #[test]
@@ -243,18 +220,18 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
     service.set(|world| {
         (world.grip, world.pressed) = ([half.cos(), 0.0, 0.0, half.sin()], true);
     });
-    let mut hand = Hand::open(&service);
+    let mut hand = open(&service);
     let reading = hand.next();
     assert_eq!(reading.position, DVec3::new(0.01, 0.15, 0.12), "to the right, up, towards the user");
     let turned = reading.orientation.expect("it has a grip");
     assert!(turned.angle_between(DQuat::from_rotation_y(2.0 * half)) < 1e-9, "{turned}");
     assert_eq!(reading.buttons, 0b10);
-    hand.push(&service, DVec3::new(1.0, 2.0, 3.0), [1.0, -3.0, 2.0]);
-    hand.push(&service, DVec3::new(f64::NAN, 2.0, 3.0), [0.0; 3]);
+    push(&mut hand, &service, DVec3::new(1.0, 2.0, 3.0), [1.0, -3.0, 2.0]);
+    push(&mut hand, &service, DVec3::new(f64::NAN, 2.0, 3.0), [0.0; 3]);
     // Nobody pushes any more: whoever did may have died.
-    hand.push(&service, DVec3::X, [1.0, 0.0, 0.0]);
+    push(&mut hand, &service, DVec3::X, [1.0, 0.0, 0.0]);
     until("the force goes", || service.force() == [0.0; 3]);
-    hand.push(&service, DVec3::X, [1.0, 0.0, 0.0]);
+    push(&mut hand, &service, DVec3::X, [1.0, 0.0, 0.0]);
     drop(hand);
     assert_eq!(service.force(), [0.0; 3], "it is left without force");
     let sessions = service.world.lock().expect("no panic").sessions.clone();
@@ -264,7 +241,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
 #[test]
 fn answers_that_tell_nothing_are_silence_until_there_are_others() {
     let service = Service::new();
-    let mut hand = Hand::open(&service);
+    let mut hand = open(&service);
     hand.next();
     for mood in [Mood::Garbage, Mood::NoDevice, Mood::Nothing] {
         service.set(|world| world.mood = mood);
@@ -283,7 +260,7 @@ fn answers_that_tell_nothing_are_silence_until_there_are_others() {
 #[test]
 fn a_service_that_goes_away_is_found_again() {
     let mut service = Service::new();
-    let mut hand = Hand::open(&service);
+    let mut hand = open(&service);
     hand.next();
     service.stop();
     until("it is gone, and said to be", || {
@@ -292,7 +269,7 @@ fn a_service_that_goes_away_is_found_again() {
     let again = Service::at(&service.address.to_string(), service.world.clone());
     again.set(|world| world.cursor = [0.0, 0.0, 0.1]);
     until("it is found", || hand.read().is_ok_and(|reading| reading.position == DVec3::new(0.0, 0.1, 0.0)));
-    hand.push(&again, DVec3::Y, [0.0, 0.0, 1.0]);
+    push(&mut hand, &again, DVec3::Y, [0.0, 0.0, 1.0]);
     // One that has gone for good holds up nobody who leaves.
     drop(again);
     drop(hand);

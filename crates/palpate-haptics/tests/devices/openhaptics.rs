@@ -1,10 +1,9 @@
 //! OpenHaptics: units, frames of the scheduler, errors, and several devices on one scheduler.
 
-use super::standin::{Standin, until};
+use super::standin::{Hand, Standin, until};
 use glam::{DQuat, DVec3};
-use palpate_haptics::device::{Device, Driver, Reading};
+use palpate_haptics::device::Driver;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 type Transform = extern "C" fn(usize, &[f64; 16]);
 type Press = extern "C" fn(usize, i32);
@@ -25,35 +24,8 @@ fn standin() -> (MutexGuard<'static, ()>, Standin) {
     (ALONE.lock().unwrap_or_else(PoisonError::into_inner), Standin::new("libhd"))
 }
 
-/// A device with a clock.
-struct Hand {
-    device: Box<dyn Device>,
-    start: Instant,
-}
-
-impl Hand {
-    fn open(standin: &Standin, which: &str) -> Self {
-        let device = Driver::OpenHaptics.open(which, Some(standin.place())).expect("a device").1;
-        Self { device, start: Instant::now() }
-    }
-
-    fn read(&mut self) -> Result<Reading, String> {
-        self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
-    }
-
-    /// The next reading, however busy the machine is.
-    fn next(&mut self) -> Reading {
-        let mut next = None;
-        until("a reading", || {
-            next = self.read().ok();
-            next.is_some()
-        });
-        next.expect("it was waited for")
-    }
-
-    fn push(&mut self, force: DVec3) -> Result<(), String> {
-        self.device.push(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
-    }
+fn open(standin: &Standin, which: &str) -> Hand {
+    Hand::open(Driver::OpenHaptics, which, standin.place())
 }
 
 #[test]
@@ -62,7 +34,7 @@ fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() 
     let found = Driver::OpenHaptics.find(Some(standin.place())).expect("a device");
     assert_eq!(format!("{}, {:?} N", found[0], found[0].force_n), "0: Touch (2016-015-00123), Some(0.88) N");
     assert!(!standin.function::<InUse>("standin_in_use")(), "it is left again");
-    let hand = Hand::open(&standin, "0");
+    let hand = open(&standin, "0");
     assert_eq!(hand.device.traits().force_n, 0.88);
     drop(hand);
     standin.function::<Switch>("standin_plug")(false);
@@ -75,7 +47,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
     let (_alone, standin) = standin();
     standin.function::<Transform>("standin_transform")(0, &at(10.0, 20.0, -30.0));
     standin.function::<Press>("standin_press")(0, 0b10);
-    let mut hand = Hand::open(&standin, "0");
+    let mut hand = open(&standin, "0");
     let reading = hand.next();
     assert!((reading.position - DVec3::new(0.01, 0.02, -0.03)).length() < 1e-15, "{}", reading.position);
     let turned = reading.orientation.expect("it tells");
@@ -92,7 +64,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
 #[test]
 fn a_device_is_opened_once_and_left_without_force() {
     let (_alone, standin) = standin();
-    let mut hand = Hand::open(&standin, "0");
+    let mut hand = open(&standin, "0");
     let twice = Driver::OpenHaptics.open("0", Some(standin.place())).err().expect("it is taken").to_string();
     assert_eq!(
         twice,
@@ -117,7 +89,7 @@ fn a_device_is_opened_once_and_left_without_force() {
 fn two_devices_share_the_scheduler_and_one_goes_on_when_the_other_is_left() {
     let (_alone, standin) = standin();
     standin.function::<Transform>("standin_transform")(1, &at(1000.0, 0.0, 0.0));
-    let (mut first, mut second) = (Hand::open(&standin, "0"), Hand::open(&standin, "Left"));
+    let (mut first, mut second) = (open(&standin, "0"), open(&standin, "Left"));
     until("frames of both", || first.read().is_ok() && second.read().is_ok());
     assert_eq!(second.next().position, DVec3::X);
     until("both push", || {
@@ -136,7 +108,7 @@ fn two_devices_share_the_scheduler_and_one_goes_on_when_the_other_is_left() {
 fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
     let (_alone, standin) = standin();
     let fault = standin.function::<Code>("standin_fault");
-    let mut hand = Hand::open(&standin, "0");
+    let mut hand = open(&standin, "0");
     hand.next();
     fault(0x0200);
     let warm = Err("openhaptics: the force was not given: Warm motors (error 0x0200)".to_string());
@@ -158,7 +130,7 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
 #[test]
 fn numbers_that_are_none_are_told_and_never_pushed() {
     let (_alone, standin) = standin();
-    let mut hand = Hand::open(&standin, "0");
+    let mut hand = open(&standin, "0");
     standin.function::<Transform>("standin_transform")(0, &[f64::NAN; 16]);
     until("garbage", || hand.next().position.is_nan());
     assert_eq!(hand.next().orientation, None);

@@ -1,9 +1,11 @@
-//! A stand-in library, with what tests tell it and ask it.
+//! A stand-in library, with what tests tell it and ask it, and an open device.
 
 #[path = "../standins/compile.rs"]
 mod compile;
 
+use glam::DVec3;
 use libloading::Library;
+use palpate_haptics::device::{Device, Driver, Reading};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -40,6 +42,37 @@ impl Standin {
         let mut force = [f64::NAN; 3];
         self.function::<extern "C" fn(usize, &mut [f64; 3])>("standin_force")(id, &mut force);
         force
+    }
+}
+
+/// An open device with a clock.
+pub struct Hand {
+    pub device: Box<dyn Device>,
+    start: Instant,
+}
+
+impl Hand {
+    pub fn open(driver: Driver, which: &str, place: &str) -> Self {
+        let device = driver.open(which, Some(place)).expect("a device").1;
+        Self { device, start: Instant::now() }
+    }
+
+    pub fn read(&mut self) -> Result<Reading, String> {
+        self.device.read(self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    }
+
+    /// The next reading, however busy the machine is.
+    pub fn next(&mut self) -> Reading {
+        let mut next = None;
+        until("a reading", || {
+            next = self.read().ok();
+            next.is_some()
+        });
+        next.expect("it was waited for")
+    }
+
+    pub fn push(&mut self, force: DVec3) -> Result<(), String> {
+        self.device.push(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
     }
 }
 

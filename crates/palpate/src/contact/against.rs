@@ -114,7 +114,9 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         }
         break;
     }
-    encounter.corners(scene, at);
+    if obstacle.shape.has_corners() {
+        encounter.corners(scene, at);
+    }
 }
 
 impl Encounter<'_> {
@@ -132,8 +134,8 @@ impl Encounter<'_> {
 
     /// The nodes, and for round obstacles the middles of triangles.
     fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList, most: usize) {
-        let (reading, triangles) =
-            (self.body.level(self.level), self.body.tree(self.body.level(self.level)).1);
+        let reading = self.body.level(self.level);
+        let (_, triangles) = self.body.tree(reading);
         let enough = core::cell::Cell::new(false);
         let dent = sight.most_dent();
         sight.begin_visit();

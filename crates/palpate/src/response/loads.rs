@@ -77,32 +77,14 @@ impl NodalForces {
 /// Add what forces [N] on nodes do to all nodes by the residual compliance [m]. Costs nodes × forces, of a near field the blocks
 /// around the forces.
 pub(super) fn add_dents(residual: &ResidualCompliance, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
-    match residual {
-        ResidualCompliance::None => {}
-        ResidualCompliance::NearField(near) => {
-            for &(node, force) in loads {
-                // S is symmetric: what a row's node feels of others is what they feel of it, transposed.
-                near.row(node as usize).for_each(|(other, block)| out[other] += block.transpose() * force);
+    for &(node, force) in loads {
+        let node = node as usize;
+        match residual {
+            // S is symmetric: what a row's node feels of others is what they feel of it, transposed.
+            ResidualCompliance::NearField(near) => {
+                near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
             }
-        }
-        ResidualCompliance::Whole(packed) => {
-            let row = |r: usize| &packed[r * (r + 1) / 2..][..=r];
-            let mut sums = vec![0.0; 3 * out.len()];
-            for &(node, force) in loads {
-                let first = 3 * node as usize;
-                for axis in 0..3 {
-                    let own = row(first + axis);
-                    sums.iter_mut().zip(own).for_each(|(sum, s)| *sum += f64::from(*s) * force[axis]);
-                }
-                // Of what comes after a row only the lower triangle is there.
-                for (r, sum) in sums.iter_mut().enumerate().skip(first + 1) {
-                    let columns = row(r)[first..].iter().take((r - first).min(3));
-                    *sum += columns.enumerate().map(|(axis, s)| f64::from(*s) * force[axis]).sum::<f64>();
-                }
-            }
-            for (u, sum) in out.iter_mut().zip(sums.chunks_exact(3)) {
-                *u += DVec3::from_slice(sum);
-            }
+            _ => out.iter_mut().enumerate().for_each(|(i, u)| *u += residual.block(i, node) * force),
         }
     }
 }
