@@ -1,9 +1,9 @@
 //! The deformation process (paper, section 3.2): whole surfaces for the eye, beside the force.
 
+use crate::moment::Moment;
 use glam::DVec3;
-use palpate::{Deformation, Model, Pose, State};
+use palpate::{Model, Pose};
 use std::sync::Arc;
-use triple_buffer::{Input, Output, triple_buffer};
 
 /// The surfaces of all objects at one moment.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,45 +25,17 @@ pub struct FrameObject {
     pub normals: Vec<[f32; 3]>,
 }
 
-/// What goes from the force process to the deformation process.
-#[derive(Debug, Clone)]
-struct Moment {
-    time_s: f64,
-    objects: Vec<Deformation>,
-}
-
-/// The force process's end: it leaves the newest state there.
-pub struct Showing {
-    moments: Input<Moment>,
-}
-
 /// The deformation process without its thread: what happens in a cycle.
 pub struct DeformationProcess {
     model: Arc<Model>,
-    moments: Output<Moment>,
     frame: Frame,
     displacement: Vec<DVec3>,
     sums: Vec<DVec3>,
 }
 
-impl Showing {
-    /// Leave the state for the deformation process.
-    ///
-    /// # Real time
-    /// No allocation. Costs modes and contacts.
-    pub fn show(&mut self, state: &State) {
-        let moment = self.moments.input_buffer_mut();
-        moment.time_s = state.output().time_s;
-        moment.objects.iter_mut().for_each(|object| object.copy_from(state));
-        self.moments.publish();
-    }
-}
-
 impl DeformationProcess {
-    /// Beside a scene's force process.
-    pub fn new(model: Arc<Model>, state: &State) -> (Showing, Self) {
-        let objects = (0..model.recordings().count()).map(|object| state.deformation(object)).collect();
-        let (input, output) = triple_buffer(&Moment { time_s: 0.0, objects });
+    /// For a scene.
+    pub fn new(model: Arc<Model>) -> Self {
         let nodes: Vec<usize> = model.recordings().map(|r| r.surface.positions.len()).collect();
         let most = nodes.iter().copied().max().unwrap_or(0);
         let empty = |nodes| FrameObject {
@@ -72,22 +44,12 @@ impl DeformationProcess {
             normals: vec![[0.0; 3]; nodes],
         };
         let frame = Frame { time_s: 0.0, objects: nodes.into_iter().map(empty).collect() };
-        let process = Self {
-            model,
-            moments: output,
-            frame,
-            displacement: vec![DVec3::ZERO; most],
-            sums: vec![DVec3::ZERO; most],
-        };
-        (Showing { moments: input }, process)
+        Self { model, frame, displacement: vec![DVec3::ZERO; most], sums: vec![DVec3::ZERO; most] }
     }
 
-    /// Make the surfaces of the newest state; none when there is none newer.
-    pub fn cycle(&mut self) -> Option<&Frame> {
-        if !self.moments.update() {
-            return None;
-        }
-        let Moment { time_s, objects } = self.moments.output_buffer_mut();
+    /// Make the surfaces of a moment.
+    pub fn cycle(&mut self, moment: &Moment) -> &Frame {
+        let Moment { time_s, objects, .. } = moment;
         self.frame.time_s = *time_s;
         for ((deformation, frame), recording) in
             objects.iter().zip(&mut self.frame.objects).zip(self.model.recordings())
@@ -111,6 +73,6 @@ impl DeformationProcess {
                 *out = sum.normalize_or_zero().as_vec3().to_array();
             }
         }
-        Some(&self.frame)
+        &self.frame
     }
 }

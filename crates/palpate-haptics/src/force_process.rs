@@ -1,5 +1,6 @@
 //! The force process (paper, section 3.2): newest positions in, one step, forces out.
 
+use crate::motion_path::MotionPath;
 use crate::port::{Effort, ForcePort, Motion};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
@@ -11,8 +12,10 @@ pub type Mover = Box<dyn Fn(f64) -> Pose + Send>;
 /// A device as the force process sees it.
 struct Seat {
     port: ForcePort,
-    /// What it does while it is there.
+    /// What it does while it is there and says nothing else.
     mode: DeviceMode,
+    /// A path in simulated time that it follows, whatever its port tells.
+    path: Option<MotionPath>,
     /// The motion that was used last.
     motion: Motion,
     /// See [`Effort::taken_j`]: what went into the proxy, and the proxy then.
@@ -45,10 +48,22 @@ impl ForceProcess {
         patience_s: f64,
     ) -> Self {
         let state = State::new(&model);
+        Self::from_state(state, model, devices, movers, patience_s)
+    }
+
+    /// The same from a state of the model's.
+    pub fn from_state(
+        state: State,
+        model: Arc<Model>,
+        devices: Vec<(ForcePort, DeviceMode)>,
+        movers: Vec<Mover>,
+        patience_s: f64,
+    ) -> Self {
         let coupling = |at: usize| model.parameters().devices.get(at).and_then(|device| device.coupling);
         let seats = devices.into_iter().enumerate().map(|(at, (port, mode))| Seat {
             port,
             mode,
+            path: None,
             motion: Motion::default(),
             worked_j: 0.0,
             proxy: DVec3::ZERO,
@@ -61,9 +76,22 @@ impl ForceProcess {
         Self { model, state, input, seats, movers, steps: 0, patience_s }
     }
 
+    /// Let a device follow a path exactly: by simulated time, also where that is slower than the clock.
+    ///
+    /// # Panics
+    /// When there is no such device.
+    pub fn follow(&mut self, device: usize, path: MotionPath) {
+        self.seats[device].path = Some(path);
+    }
+
     /// The scene as it is.
     pub fn state(&self) -> &State {
         &self.state
+    }
+
+    /// The same, when there are no more cycles.
+    pub fn into_state(self) -> State {
+        self.state
     }
 
     /// What holds for the scene.
@@ -97,7 +125,11 @@ impl ForceProcess {
         self.steps += 1;
         let time_s = self.steps as f64 * self.model.parameters().step_s;
         for (seat, input) in self.seats.iter_mut().zip(&mut self.input.devices) {
-            let motion = seat.port.newest();
+            let mut motion = seat.port.newest();
+            if let Some(path) = &seat.path {
+                let position = path.at(time_s).position;
+                motion = Motion { sequence: self.steps, time_s: now_s, position, ..Motion::default() };
+            }
             let silent = motion.sequence == 0 || now_s - motion.time_s > self.patience_s;
             if motion.position.is_finite() {
                 seat.motion = motion;
@@ -105,7 +137,7 @@ impl ForceProcess {
             *input = if silent || !motion.position.is_finite() {
                 DeviceInput::away()
             } else {
-                DeviceInput { position: motion.position, mode: seat.mode }
+                DeviceInput { position: motion.position, mode: motion.mode.unwrap_or(seat.mode) }
             };
         }
         for (mover, pose) in self.movers.iter().zip(&mut self.input.obstacles) {

@@ -156,6 +156,7 @@ impl HapticUpdate {
                 position,
                 orientation: self.mount.world_orientation(orientation),
                 buttons: reading.buttons,
+                mode: None,
             });
         }
         if self.by_button && reading.buttons & !self.buttons != 0 {

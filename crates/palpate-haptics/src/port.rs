@@ -2,6 +2,7 @@
 
 use crate::link::LinkSender;
 use glam::{DQuat, DVec3};
+use palpate::DeviceMode;
 use triple_buffer::{Input, Output, triple_buffer};
 
 /// What a device tells of the hand.
@@ -17,6 +18,9 @@ pub struct Motion {
     pub orientation: DQuat,
     /// Pressed buttons, one bit each.
     pub buttons: u32,
+    /// What the device does, where that is not what the scene says: a pointer comes and goes, touches or holds. It does not go
+    /// over links.
+    pub mode: Option<DeviceMode>,
 }
 
 /// What the force process answers.
@@ -37,7 +41,14 @@ pub struct Effort {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { sequence: 0, time_s: 0.0, position: DVec3::ZERO, orientation: DQuat::IDENTITY, buttons: 0 }
+        Self {
+            sequence: 0,
+            time_s: 0.0,
+            position: DVec3::ZERO,
+            orientation: DQuat::IDENTITY,
+            buttons: 0,
+            mode: None,
+        }
     }
 }
 

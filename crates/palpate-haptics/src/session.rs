@@ -1,18 +1,20 @@
 //! A run in real time: the processes as threads.
 
 use crate::clock::Clock;
-use crate::deformation_process::{DeformationProcess, Frame};
 use crate::device::{Device, Mount, Traits};
 use crate::error::Error;
 use crate::force_process::{ForceProcess, Mover};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
 use crate::log::{LogHand, LogSummary, LogWriter};
+use crate::moment::{Moment, Showing, showing};
+use crate::motion_path::MotionPath;
 use crate::passivity::PassivityController;
+use crate::playback::Playback;
 use crate::port::{DevicePort, ForcePort, port};
 use crate::safety::{Safety, SafetyLimits};
 use crate::scheduling::{Granted, Scheduling};
-use crate::timing::{Spread, Timing};
-use palpate::{DeviceMode, Model, Output};
+use crate::timing::{Cycle, CycleTeller, Spread, Timing};
+use palpate::{DeviceMode, Model, State};
 use std::io::{Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -44,14 +46,18 @@ pub struct Attached {
 pub enum SessionDevice {
     /// On this machine, with a haptic update of its own.
     Here(Attached),
-    /// Behind a link, whose port this is.
+    /// Elsewhere, behind a link or under a pointer: this is its port.
     Linked(ForcePort, DeviceMode),
+    /// Nobody's: it follows a path by simulated time, and feels nothing.
+    Following(MotionPath, DeviceMode),
 }
 
 /// What to run.
 pub struct Session {
     /// The scene.
     pub model: Arc<Model>,
+    /// The state that it begins with; none is the scene at its start.
+    pub state: Option<State>,
     /// From when all times count.
     pub start: Instant,
     /// A device for each of the model's.
@@ -66,6 +72,10 @@ pub struct Session {
     pub scheduling: Scheduling,
     /// A device that has told nothing for so long [s] is away.
     pub patience_s: f64,
+    /// What those who watch ask for.
+    pub playback: Arc<Playback>,
+    /// Who listens to how the force process keeps its time.
+    pub cycles: Option<CycleTeller>,
 }
 
 /// How a run in real time went.
@@ -80,7 +90,7 @@ pub struct Report {
     /// The devices, in the model's order; none for those behind links.
     pub devices: Vec<Option<DeviceReport>>,
     /// The scene at the end.
-    pub output: Output,
+    pub state: State,
     /// Steps.
     pub steps: u64,
     /// Steps in which the contacts of some object could not be solved, or were left out.
@@ -128,8 +138,8 @@ struct Forces {
 }
 
 impl Session {
-    /// Run until the steps are done or `stop` is set. `show` gets every picture, on the deformation process's thread;
-    /// `steps` counts along. Gives back what the log was written to.
+    /// Run until the steps are done or `stop` is set. `show` gets what every picture takes, on the deformation process's
+    /// thread; `steps` counts along. Gives back what the log was written to.
     ///
     /// # Errors
     /// When the setting is not one, a thread can't be started, or the log can't be written.
@@ -138,14 +148,21 @@ impl Session {
         log: Option<(LogHand, LogWriter<W>)>,
         stop: &AtomicBool,
         steps: &AtomicU64,
-        mut show: impl FnMut(&Frame) + Send,
+        mut show: impl FnMut(&Moment) + Send,
     ) -> Result<(Report, Option<W>), Error> {
         self.check()?;
-        let Self { model, start, devices, movers, steps: most, pictures_hz, scheduling, patience_s } = self;
+        let Self { model, start, devices, movers, steps: most, pictures_hz, scheduling, patience_s, .. } =
+            self;
+        let (playback, cycles) = (self.playback, self.cycles);
         let step_s = model.parameters().step_s;
+        let follows: Vec<Option<MotionPath>> = devices.iter().map(SessionDevice::path).collect();
         let (updates, seats) = connect(devices);
-        let process = ForceProcess::new(model.clone(), seats, movers, patience_s);
-        let (showing, mut pictures) = DeformationProcess::new(model.clone(), process.state());
+        let state = self.state.unwrap_or_else(|| State::new(&model));
+        let mut process = ForceProcess::from_state(state, model.clone(), seats, movers, patience_s);
+        for (device, path) in follows.into_iter().enumerate() {
+            path.into_iter().for_each(|path| process.follow(device, path));
+        }
+        let (showing, mut moments) = showing(&Moment::new(&model, process.state(), process.input()));
         let (hand, writer) = log.unzip();
         let flags = [AtomicBool::new(false), AtomicBool::new(false)];
         let [ended, logged] = &flags;
@@ -168,15 +185,16 @@ impl Session {
                     .push(spawn(scope, "haptic update", move || run_update(update, &clock, asked, ended))?);
             }
             let clock = Clock::new(start, step_s);
-            let parts = Running { process, clock, hand, showing, picture_every, most, stop, steps };
+            let parts =
+                Running { process, clock, hand, showing, picture_every, most, stop, steps, playback, cycles };
             let forcing = spawn(scope, "force", move || parts.run(scheduling))?;
             let seeing = spawn(scope, "deformation", move || {
                 let mut timing = Timing::default();
                 while pictures_hz > 0.0 && !ended.load(Ordering::Relaxed) {
                     let begun = Instant::now();
-                    if let Some(frame) = pictures.cycle() {
-                        timing.record(Duration::ZERO, begun.elapsed());
-                        show(frame);
+                    if let Some(moment) = moments.newest() {
+                        show(moment);
+                        timing.record(Cycle { late: Duration::ZERO, took: begun.elapsed(), overrun: None });
                     }
                     std::thread::sleep(
                         Duration::from_secs_f64(0.5 / pictures_hz).saturating_sub(begun.elapsed()),
@@ -201,8 +219,8 @@ impl Session {
                 force: forces.timing,
                 pictures,
                 devices: devices?,
-                output: forces.process.state().output().clone(),
                 steps: forces.process.steps(),
+                state: forces.process.into_state(),
                 unsolved: forces.unsolved,
                 log: steps.map(|steps| LogSummary { steps, missed: forces.missed }),
                 wall_s: forces.wall_s,
@@ -241,16 +259,20 @@ struct Running<'a> {
     process: ForceProcess,
     clock: Clock,
     hand: Option<LogHand>,
-    showing: crate::deformation_process::Showing,
+    showing: Showing,
+    /// Ticks.
     picture_every: u64,
     most: Option<u64>,
     stop: &'a AtomicBool,
     steps: &'a AtomicU64,
+    playback: Arc<Playback>,
+    cycles: Option<CycleTeller>,
 }
 
 impl Running<'_> {
     fn run(self, scheduling: Scheduling) -> Forces {
-        let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps } = self;
+        let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps, .. } = self;
+        let (playback, mut cycles) = (self.playback, self.cycles);
         let granted = scheduling.claim();
         process.warm_up();
         std::thread::sleep(HEAD_START);
@@ -258,15 +280,21 @@ impl Running<'_> {
         let mut unsolved = 0;
         let period = clock.deadline(1) - clock.deadline(0);
         let mut tick = clock.next_after(0);
+        let mut picture_at = tick;
         let begun_all = clock.deadline(tick);
         while most.is_none_or(|most| process.steps() < most) && !stop.load(Ordering::Relaxed) {
             let late = clock.wait(tick);
+            if !playback.goes(tick) {
+                tick = clock.next_after(tick);
+                continue;
+            }
             let begun = Instant::now();
             let output = process.cycle(clock.now_s());
             unsolved += u64::from(output.status.unsolved_objects > 0 || output.status.dropped_contacts > 0);
-            let pictured = picture_every > 0 && process.steps().is_multiple_of(picture_every);
+            let pictured = picture_every > 0 && (tick >= picture_at || playback.is_paused());
             if pictured {
-                showing.show(process.state());
+                picture_at = tick + picture_every;
+                showing.show(process.steps(), process.input(), process.state());
             }
             let took = begun.elapsed();
             if let Some(hand) = &mut hand {
@@ -283,15 +311,14 @@ impl Running<'_> {
                 }
             }
             steps.store(process.steps(), Ordering::Relaxed);
-            timing.record(late, took);
             // On the grid again, whatever was missed.
-            let next = if Instant::now() > clock.deadline(tick + 1) {
-                let next = clock.next_after(tick);
-                timing.record_overrun(took > period, next - tick - 1);
-                next
-            } else {
-                tick + 1
-            };
+            let over = Instant::now() > clock.deadline(tick + 1);
+            let next = if over { clock.next_after(tick) } else { tick + 1 };
+            let cycle = Cycle { late, took, overrun: over.then_some((took > period, next - tick - 1)) };
+            timing.record(cycle);
+            if let Some(cycles) = &mut cycles {
+                cycles.tell(cycle);
+            }
             tick = next;
         }
         let wall_s = Instant::now().saturating_duration_since(begun_all).as_secs_f64();
@@ -314,7 +341,7 @@ pub fn run_update(
         let late = clock.wait(tick);
         let begun = Instant::now();
         update.cycle(clock.now_s());
-        timing.record(late, begun.elapsed());
+        timing.record(Cycle { late, took: begun.elapsed(), overrun: None });
         tick = clock.next_after(tick);
     }
     update.let_go(clock.now_s());
@@ -334,8 +361,18 @@ fn connect(devices: Vec<SessionDevice>) -> Connected {
             (Some((attached.update(device_port), rate_hz)), (force_port, mode))
         }
         SessionDevice::Linked(force_port, mode) => (None, (force_port, mode)),
+        SessionDevice::Following(_, mode) => (None, (port().1, mode)),
     };
     devices.into_iter().map(one).unzip()
+}
+
+impl SessionDevice {
+    fn path(&self) -> Option<MotionPath> {
+        match self {
+            Self::Following(path, _) => Some(path.clone()),
+            Self::Here(_) | Self::Linked(..) => None,
+        }
+    }
 }
 
 impl Attached {

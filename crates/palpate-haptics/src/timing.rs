@@ -1,6 +1,7 @@
 //! How a process keeps its time: histograms that record without allocating.
 
 use hdrhistogram::Histogram;
+use rtrb::{Consumer, Producer, RingBuffer};
 use std::time::Duration;
 
 /// The longest time [ns] that is told from longer ones: ten seconds.
@@ -39,6 +40,47 @@ pub struct Percentiles {
     pub max: f64,
 }
 
+/// One cycle of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cycle {
+    /// How late it began.
+    pub late: Duration,
+    /// How long it took.
+    pub took: Duration,
+    /// If it ended after the next was due: whether by itself, and how many ticks are passed over for it.
+    pub overrun: Option<(bool, u64)>,
+}
+
+/// A process's end of a line over which it tells of its cycles while it runs.
+pub struct CycleTeller(Producer<Cycle>);
+
+/// The other end.
+pub struct CycleListener(Consumer<Cycle>);
+
+/// A line for so many cycles that nobody has listened to yet; more are not told.
+pub fn cycles(room: usize) -> (CycleTeller, CycleListener) {
+    let (producer, consumer) = RingBuffer::new(room);
+    (CycleTeller(producer), CycleListener(consumer))
+}
+
+impl CycleTeller {
+    /// Tell of a cycle, if somebody listens.
+    ///
+    /// # Real time
+    pub(crate) fn tell(&mut self, cycle: Cycle) {
+        let _ = self.0.push(cycle);
+    }
+}
+
+impl CycleListener {
+    /// Take in all cycles that were told since the last time.
+    pub fn listen(&mut self, timing: &mut Timing) {
+        while let Ok(cycle) = self.0.pop() {
+            timing.record(cycle);
+        }
+    }
+}
+
 impl Default for Spread {
     fn default() -> Self {
         let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
@@ -67,21 +109,17 @@ impl Spread {
 }
 
 impl Timing {
-    /// Take in a cycle: how late it began, and how long it took.
+    /// Take in a cycle.
     ///
     /// # Real time
-    pub fn record(&mut self, late: Duration, took: Duration) {
+    pub fn record(&mut self, Cycle { late, took, overrun }: Cycle) {
         self.lateness.record(late);
         self.compute.record(took);
-    }
-
-    /// Take in a cycle that ended after the next was due, and how many ticks are passed over for it.
-    ///
-    /// # Real time
-    pub fn record_overrun(&mut self, own: bool, skipped: u64) {
-        self.overruns += 1;
-        self.own_overruns += u64::from(own);
-        self.skipped += skipped;
+        if let Some((own, skipped)) = overrun {
+            self.overruns += 1;
+            self.own_overruns += u64::from(own);
+            self.skipped += skipped;
+        }
     }
 
     /// Cycles.
@@ -105,13 +143,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_those_of_what_was_recorded() {
+    fn percentiles_are_those_of_what_was_told() {
         let mut timing = Timing::default();
+        let (mut teller, mut listener) = cycles(700);
         for k in 1..=1000_u64 {
-            timing.record(Duration::from_nanos(10 * k), Duration::from_micros(k));
+            let overrun = [(3, (true, 2)), (1000, (false, 0))].into_iter().find(|(at, _)| *at == k);
+            let (late, took) = (Duration::from_nanos(10 * k), Duration::from_micros(k));
+            teller.tell(Cycle { late, took, overrun: overrun.map(|(_, overrun)| overrun) });
+            if k.is_multiple_of(500) {
+                listener.listen(&mut timing);
+            }
         }
-        timing.record_overrun(true, 2);
-        timing.record_overrun(false, 0);
         let (late, took) = (timing.lateness_us(), timing.compute_us());
         assert_eq!(timing.cycles(), 1000);
         for (got, expected) in

@@ -49,16 +49,35 @@ impl Deformation {
         self.deformed.copy_from(&own.response);
     }
 
+    /// Modal coordinates q [m·√kg]; none for an object that uses a table.
+    pub fn modal_coordinates(&self) -> &[f64] {
+        self.deformed.coordinates()
+    }
+
+    /// What [`Self::surface_displacement`] is beside Φ·q [m, body]: the dents that the residual compliance adds where forces
+    /// act, and the part of a fixed body's sag that its modes miss. With a table, all of it.
+    ///
+    /// # Panics
+    /// When `out` does not have one entry per surface node.
+    pub fn dents(&self, model: &Model, out: &mut [DVec3]) {
+        let (object, gravity) = self.drawn(model, out);
+        self.deformed.dents(&object.response, &object.body, gravity, out);
+    }
+
     /// Elastic displacement [m, body] of every surface node. Costs nodes × modes, with a table nodes × forces of the last T
     /// steps.
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, out: &mut [DVec3]) {
+        let (object, gravity) = self.drawn(model, out);
+        self.deformed.surface_displacement(&object.response, &object.body, gravity, out);
+    }
+
+    /// The object, and gravity [m/s², body] as it is turned.
+    fn drawn<'m>(&self, model: &'m Model, out: &[DVec3]) -> (&'m SceneObject, DVec3) {
         let object: &SceneObject = &model.objects[self.object];
-        let SceneObject { body, response, .. } = object;
-        assert_eq!(out.len(), body.recording.surface.positions.len(), "one entry per surface node");
-        let gravity = object.gravity_in_body(model.parameters.gravity, &self.pose);
-        self.deformed.surface_displacement(response, body, gravity, out);
+        assert_eq!(out.len(), object.body.recording.surface.positions.len(), "one entry per surface node");
+        (object, object.gravity_in_body(model.parameters.gravity, &self.pose))
     }
 }

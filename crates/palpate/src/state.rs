@@ -246,6 +246,31 @@ impl State {
         }
     }
 
+    /// The scene where another state of the same objects is: placed, moving and deformed alike, with nothing in contact yet, at
+    /// time 0 with a ledger of its own. So a scene goes on under other rules: another step, gravity, friction. Objects
+    /// with other modes, or tables, begin where the model says.
+    pub fn going_on(model: &Model, from: &Self) -> Self {
+        let mut state = Self::new(model);
+        let gravity = model.parameters.gravity;
+        let pairs = state.objects.iter_mut().zip(&model.objects).zip(&from.objects);
+        for (at, ((own, object), before)) in pairs.enumerate() {
+            if !own.response.go_on_from(&before.response) {
+                continue;
+            }
+            own.rigid = before.rigid;
+            let still = RigidStep { end: own.rigid, turn: DVec3::ZERO, miss: 0.0 };
+            (own.free, own.end) = (still, still);
+            own.weigh(object, gravity);
+            own.stored_at_start = own.ledger.stored();
+            let output = &mut state.output.objects[at];
+            (output.pose, output.twist) = (before.rigid.pose, from.output.objects[at].twist);
+            output.energy = own.ledger;
+        }
+        state.output.energy =
+            state.objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));
+        state
+    }
+
     /// The output of the last step; before the first, the scene at its start.
     pub fn output(&self) -> &Output {
         &self.output

@@ -56,7 +56,7 @@ pub(super) fn motion(bytes: &[u8], time_s: f64) -> Option<Motion> {
     let buttons = u32::from_le_bytes(bytes[MOTION - 4..].try_into().ok()?);
     let (position, orientation) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
     let good = sequence > 0 && position.is_finite() && orientation.is_finite();
-    good.then_some(Motion { sequence, time_s, position, orientation, buttons })
+    good.then_some(Motion { sequence, time_s, position, orientation, buttons, mode: None })
 }
 
 /// An effort as bytes; its time is that of whoever receives it.
@@ -97,6 +97,7 @@ mod tests {
             position: DVec3::new(0.1, -1e-300, 3.0),
             orientation: DQuat::from_xyzw(0.5, 0.5, -0.5, 0.5),
             buttons: 5,
+            mode: None,
         };
         assert_eq!(motion(&motion_bytes(&sent), 2.0), Some(Motion { time_s: 2.0, ..sent }));
         let answer = Effort { sequence: 9, answers: 7, time_s: 3.0, force: DVec3::Y, taken_j: -0.25 };

@@ -2,7 +2,7 @@
 
 use super::record::{Picture, Record};
 use glam::{DQuat, DVec3};
-use palpate::{Against, DeviceMode, EnergyLedger, Pose};
+use palpate::{Against, DeviceMode, EnergyLedger, Grasp, Pose, SurfacePoint};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::HashMap;
@@ -76,6 +76,28 @@ pub(super) struct DeviceMessage {
     pub position: Xyz,
     pub force: Xyz,
     pub proxy: Xyz,
+    /// The point that it holds; none when it touches, and in logs of the first version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holds: Option<HoldMessage>,
+}
+
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(super) struct HoldMessage {
+    object: usize,
+    triangle: u32,
+    weights: [f64; 3],
+}
+
+impl From<Grasp> for HoldMessage {
+    fn from(Grasp { object, point }: Grasp) -> Self {
+        Self { object, triangle: point.triangle, weights: point.weights }
+    }
+}
+
+impl From<HoldMessage> for Grasp {
+    fn from(HoldMessage { object, triangle, weights }: HoldMessage) -> Self {
+        Self { object, point: SurfacePoint { triangle, weights } }
+    }
 }
 
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
@@ -165,6 +187,10 @@ impl Serialize for StepOf<'_> {
                 position: input.position.into(),
                 force: output.force_on_hand.into(),
                 proxy: output.proxy.into(),
+                holds: match input.mode {
+                    DeviceMode::Held(grasp) => Some(grasp.into()),
+                    DeviceMode::Away | DeviceMode::Touch => None,
+                },
             }
         };
         let object = |at: usize| {

@@ -125,7 +125,7 @@ impl Iterator for Steps<'_> {
 }
 
 impl LoggedStep {
-    /// What the step was given; `modes` are what the devices do while they are there.
+    /// What the step was given; `modes` are what the devices do while they are there, and hold nothing.
     ///
     /// # Errors
     /// When the log does not tell of a device or an obstacle.
@@ -135,7 +135,11 @@ impl LoggedStep {
         let mut input = Input::default();
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
-            let mode = if device.present { *mode } else { DeviceMode::Away };
+            let mode = match device.holds {
+                _ if !device.present => DeviceMode::Away,
+                Some(hold) => DeviceMode::Held(hold.into()),
+                None => *mode,
+            };
             input.devices.push(DeviceInput { position: device.position.into(), mode });
         }
         for name in &names.obstacles {

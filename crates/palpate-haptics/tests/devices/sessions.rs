@@ -9,6 +9,7 @@ use palpate::{DeviceMode, Pose};
 use palpate_haptics::device::{Driver, Mount};
 use palpate_haptics::{Attached, SafetyLimits, Scheduling, Session, SessionDevice};
 use std::io::Cursor;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -40,6 +41,9 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         pictures_hz: 0.0,
         scheduling: Scheduling { priority: None, core: None },
         patience_s: 0.5,
+        state: None,
+        playback: Arc::default(),
+        cycles: None,
     };
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let (report, felt) = std::thread::scope(|scope| {
@@ -59,7 +63,7 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
     assert_eq!(device.traits.kind, "dhd");
     assert!(felt[1] > 0.01 && felt[1] > 10.0 * felt[0].hypot(felt[2]), "out of the body: {felt:?}");
     assert!(device.counts.force_max_n >= felt[1] && device.counts.failed == 0, "{:?}", device.counts);
-    assert!(report.output.objects[0].twist.linear.x < 0.0, "and the body goes");
+    assert!(report.state.output().objects[0].twist.linear.x < 0.0, "and the body goes");
     assert_eq!(standin.force(0), [0.0; 3], "and is left without force");
     assert!(!standin.function::<extern "C" fn(usize) -> bool>("standin_is_open")(0));
 }

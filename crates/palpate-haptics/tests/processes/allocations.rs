@@ -3,7 +3,9 @@
 use super::scenes::{STEP_S, half_width, model, path, process};
 use palpate_haptics::device::{Hand, Mount, Simulated, Traits};
 use palpate_haptics::log::{LogWriter, Names};
-use palpate_haptics::{DeformationProcess, HapticUpdate, PassivityController, Safety, SafetyLimits, Timing};
+use palpate_haptics::{
+    Cycle, HapticUpdate, Moment, PassivityController, Safety, SafetyLimits, Timing, showing,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -56,7 +58,7 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
             HapticUpdate::new(Box::new(device), port, Mount::default(), safety, Some(passivity), false)
         })
         .collect();
-    let (mut showing, _pictures) = DeformationProcess::new(model.clone(), force.state());
+    let (mut showing, _moments) = showing(&Moment::new(&model, force.state(), force.input()));
     let names = Names {
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
@@ -74,11 +76,12 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         updates.iter_mut().for_each(|update| update.cycle(now_s));
         force.cycle(now_s);
         if tick % 16 == 0 {
-            showing.show(force.state());
+            showing.show(tick, force.input(), force.state());
             hand.take_picture(|picture| picture.take(force.input(), force.state()));
         }
         hand.take(|record| record.take(force.input(), force.state()));
-        timing.record(Duration::from_nanos(tick), Duration::from_nanos(2 * tick));
+        let late = Duration::from_nanos(tick);
+        timing.record(Cycle { late, took: 2 * late, overrun: None });
         pushed = pushed.max(force.state().output().devices[0].force_on_hand.length());
     }
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 1500 cycles");

@@ -4,9 +4,12 @@ use super::scenes::{half_width, model, path};
 use palpate::{DeviceMode, Pose};
 use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
 use palpate_haptics::log::{LogWriter, Names, Reader};
-use palpate_haptics::{Attached, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice};
+use palpate_haptics::{
+    Attached, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
+};
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -40,6 +43,9 @@ fn session(steps: Option<u64>) -> Session {
         pictures_hz: 60.0,
         scheduling: Scheduling { priority: None, core: None },
         patience_s: 0.5,
+        state: None,
+        playback: Arc::default(),
+        cycles: None,
     }
 }
 
@@ -59,9 +65,11 @@ fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
     let log = LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log");
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let mut frames = 0;
+    let mut pictures = DeformationProcess::new(session.model.clone());
     let (report, out) = session
-        .run(Some(log), &stop, &steps, |frame| {
+        .run(Some(log), &stop, &steps, |moment| {
             frames += 1;
+            let frame = pictures.cycle(moment);
             let object = &frame.objects[0];
             let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-5;
             assert!(object.pose.is_some() && object.normals.iter().all(unit));

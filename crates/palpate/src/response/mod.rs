@@ -282,6 +282,17 @@ impl ResponseState {
         }
     }
 
+    /// Whether the other is of as many modes, and if so take over how they move.
+    pub(crate) fn go_on_from(&mut self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Modal(own), Self::Modal(other)) if own.modes.len() == other.modes.len() => {
+                own.go_on_from(other);
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Modal coordinates; none where a table is used.
     pub(crate) fn modes(&self) -> &[Oscillation] {
         match self {
@@ -316,6 +327,22 @@ impl Deformed {
             (Self::Modal(own), ResponseState::Modal(state)) => own.copy_from(state),
             (Self::Fir(own), ResponseState::Fir(state)) => own.copy_from(&state.history),
             _ => {}
+        }
+    }
+
+    /// q [m·√kg] of the modes; none where a table is used.
+    pub(crate) fn coordinates(&self) -> &[f64] {
+        match self {
+            Self::Modal(deformed) => deformed.coordinates(),
+            Self::Fir(_) => &[],
+        }
+    }
+
+    /// The part of the surface's displacement that is not the modes' [m, body].
+    pub(crate) fn dents(&self, response: &Response, body: &Body, gravity: DVec3, out: &mut [DVec3]) {
+        match (response, self) {
+            (Response::Modal(modes), Self::Modal(deformed)) => modes.dents(body, deformed, gravity, out),
+            _ => self.surface_displacement(response, body, gravity, out),
         }
     }
 

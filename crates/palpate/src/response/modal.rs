@@ -78,6 +78,12 @@ impl ModalState {
         self.acting.iter().map(|other| body.residual(place, &other.place) * other.force).sum()
     }
 
+    /// Take over how the same modes move.
+    pub(super) fn go_on_from(&mut self, other: &Self) {
+        self.modes.copy_from_slice(&other.modes);
+        self.q.copy_from_slice(&other.q);
+    }
+
     fn rows(&self, slot: usize) -> &[f64] {
         let m = self.modes.len();
         &self.rows[3 * m * slot..3 * m * (slot + 1)]
@@ -281,6 +287,16 @@ impl SampledModes {
         gravity: DVec3,
         out: &mut [DVec3],
     ) {
+        let modes = &body.recording.modes;
+        self.dents(body, deformed, gravity, out);
+        for (node, u) in out.iter_mut().enumerate() {
+            let row = |axis: usize| modes.row(node, axis);
+            *u += DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
+        }
+    }
+
+    /// The part of it that is not the modes', S·f with what the body's weight adds.
+    pub(crate) fn dents(&self, body: &Body, deformed: &ModalDeformation, gravity: DVec3, out: &mut [DVec3]) {
         let recording = &body.recording;
         // All forces as forces on nodes: patches share theirs.
         let mut loads = deformed.loaded.clone();
@@ -295,12 +311,12 @@ impl SampledModes {
             }
             same
         });
-        for (node, u) in out.iter_mut().enumerate() {
-            let row = |axis: usize| recording.modes.row(node, axis);
-            *u = DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
-            if let Some(response) = &recording.gravity {
-                *u += response.residual_displacement(node, gravity);
+        match &recording.gravity {
+            Some(response) => {
+                let sag = |node: usize| response.residual_displacement(node, gravity);
+                out.iter_mut().enumerate().for_each(|(node, u)| *u = sag(node));
             }
+            None => out.fill(DVec3::ZERO),
         }
         add_dents(&recording.residual, &loads, out);
     }
@@ -335,6 +351,11 @@ impl ModalDeformation {
         };
         new.copy_from(state);
         new
+    }
+
+    /// q [m·√kg].
+    pub(super) fn coordinates(&self) -> &[f64] {
+        &self.q
     }
 
     /// # Real time

@@ -13,11 +13,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{Pose, State};
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogHand, LogWriter};
-use palpate_haptics::{DevicePort, Mover, Report, Scheduling, Session, SessionDevice, port};
+use palpate_haptics::{
+    DeformationProcess, DevicePort, Mover, Report, Scheduling, Session, SessionDevice, port,
+};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -122,6 +125,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         pictures_hz: options.pictures,
         scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
         patience_s: PATIENCE_S,
+        state: None,
+        playback: Arc::default(),
+        cycles: None,
     };
     let (report, file) = watch(session, log, steps)?;
     let links = server.map(|server| server.counts());
@@ -162,7 +168,10 @@ fn watch(
                 bar.finish_and_clear();
             });
         }
-        let ran = session.run(log, stop, &done, |_| ());
+        let mut pictures = DeformationProcess::new(session.model.clone());
+        let ran = session.run(log, stop, &done, |moment| {
+            pictures.cycle(moment);
+        });
         over.store(true, Ordering::Relaxed);
         ran.map_err(Failure::from)
     })

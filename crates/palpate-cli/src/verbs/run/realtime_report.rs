@@ -49,7 +49,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             },
         })
     });
-    let objects = scene.object_names.iter().zip(&report.output.objects);
+    let objects = scene.object_names.iter().zip(&report.state.output().objects);
     let objects =
         objects.map(|(name, object)| json!({ "name": name, "position_m": object.pose.position.to_array() }));
     json!({
