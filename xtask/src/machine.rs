@@ -59,6 +59,33 @@ pub fn need_python() -> Result<PathBuf, String> {
     Ok(python)
 }
 
+/// Node.js, for the viewer.
+pub fn need_node() -> Result<(), String> {
+    let version = |text: &[u8]| -> Option<u32> {
+        std::str::from_utf8(text).ok()?.trim().strip_prefix('v')?.split('.').next()?.parse().ok()
+    };
+    let node = Command::new("node").arg("--version").output();
+    match node.ok().and_then(|out| version(&out.stdout)) {
+        Some(major) if major >= 20 && runs("npm", &["--version"]) => Ok(()),
+        Some(major) if major < 20 => {
+            Err(format!("Node.js {major} is too old for the viewer: install Node.js 20 or newer"))
+        }
+        _ => Err("Node.js with npm is missing: install Node.js 20 or newer (https://nodejs.org)".into()),
+    }
+}
+
+/// A browser that draws without a screen, for the viewer's tests and for rendering logs.
+pub fn need_chromium() -> Result<PathBuf, String> {
+    let known = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+    let find = || known.into_iter().find(|name| runs(name, &["--version"]));
+    if find().is_none() {
+        install(&["chromium"]);
+    }
+    find().map(PathBuf::from).ok_or_else(|| {
+        "Chromium is missing and could not be installed: install chromium, so that `chromium --version` works".into()
+    })
+}
+
 /// Install Debian packages where that is possible: apt, as root.
 fn install(packages: &[&str]) {
     let root = Command::new("id").arg("-u").output().is_ok_and(|out| out.stdout.trim_ascii() == b"0");

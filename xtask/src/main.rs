@@ -1,17 +1,19 @@
-//! The project's chores: `cargo xtask demo | test | verify | licences`.
+//! The project's chores: `cargo xtask demo | test | viewer | verify | licences`.
 //!
 //! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
 
 mod licences;
 mod machine;
+mod viewer;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
 const USAGE: &str = "cargo xtask CHORE
 
-  demo       build palpate and run its demo: an elastic cube, held by two hands and shaken
+  demo       build palpate with its viewer and run its demo: elastic objects to touch in the browser
   test       install what the tests need, and run all of them
+  viewer     build the page that palpate serves (viewer/, with Node.js), which builds of palpate embed
   verify     the slow proofs: computed numbers against analytic ones, in release mode
   licences   check that every dependency's licence fits MIT OR Apache-2.0";
 
@@ -20,6 +22,7 @@ fn main() -> ExitCode {
     let done = match chore.as_deref() {
         Some("demo") => demo(),
         Some("test") => test(),
+        Some("viewer") => viewer::build(),
         Some("verify") => verify(),
         Some("licences") => licences::check(),
         _ => {
@@ -38,6 +41,9 @@ fn main() -> ExitCode {
 
 fn demo() -> Result<(), String> {
     machine::need_c_compiler()?;
+    if let Err(what) = viewer::build() {
+        eprintln!("xtask: {what}: palpate is built without its viewer");
+    }
     eprintln!("building palpate (some minutes the first time)");
     // Without object storage, which takes as long to build as all the rest and is of no use here.
     let package = ["--release", "--locked", "--package", "palpate-cli", "--no-default-features"];
@@ -48,9 +54,11 @@ fn demo() -> Result<(), String> {
 fn test() -> Result<(), String> {
     machine::need_c_compiler()?;
     let python = machine::need_python()?;
+    viewer::build()?;
     cargo(&["test", "--workspace", "--locked", "--doc"])?;
     cargo(&["build", "--locked", "--package", "palpate-cli"])?;
     python_tests(&python)?;
+    viewer::test(&root().join("target/debug/palpate"))?;
     if machine::runs("cargo", &["nextest", "--version"]) {
         return cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"]);
     }
@@ -73,6 +81,7 @@ fn python_tests(python: &Path) -> Result<(), String> {
     }
 }
 
+/// The repository's root.
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }

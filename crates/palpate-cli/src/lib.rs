@@ -13,6 +13,7 @@ mod reproduction;
 mod scene_file;
 mod selection;
 mod source;
+mod stages;
 mod verbs;
 mod verification;
 mod vtu;
@@ -40,6 +41,7 @@ enum Verb {
     Record(Box<verbs::record::Arguments>),
     Inspect(verbs::inspect::Arguments),
     Run(verbs::run::Arguments),
+    Serve(verbs::serve::Arguments),
     Replay(verbs::replay::Arguments),
     Device(Box<verbs::device::Arguments>),
     Devices(verbs::devices::Arguments),
@@ -65,6 +67,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Record(arguments) => verbs::record::record(&arguments),
         Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
         Verb::Run(arguments) => verbs::run::run(&arguments),
+        Verb::Serve(arguments) => verbs::serve::serve(&arguments),
         Verb::Replay(arguments) => verbs::replay::replay(&arguments),
         Verb::Device(arguments) => verbs::device::device(&arguments),
         Verb::Devices(arguments) => verbs::devices::devices(&arguments),

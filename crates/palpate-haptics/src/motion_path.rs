@@ -20,6 +20,8 @@ pub enum Columns {
 pub struct MotionPath {
     rows: Vec<(f64, Pose)>,
     turns: bool,
+    /// Whether it begins again at its end.
+    repeats: bool,
 }
 
 const POSITION: [&str; 4] = ["t", "x", "y", "z"];
@@ -90,7 +92,7 @@ impl MotionPath {
         if rows.is_empty() {
             return Err(format!("no rows, expected lines {} in s and m", columns.names()));
         }
-        Ok(Self { rows, turns: width == Some(POSE.len()) })
+        Ok(Self { rows, turns: width == Some(POSE.len()), repeats: false })
     }
 
     /// Whether it has orientations.
@@ -98,8 +100,17 @@ impl MotionPath {
         self.turns
     }
 
+    /// The same path, which begins again with its first row at the time of its last.
+    #[must_use]
+    pub fn repeating(self) -> Self {
+        Self { repeats: true, ..self }
+    }
+
     /// Pose [m, world] at a time [s]; without orientations it is not turned.
     pub fn at(&self, t: f64) -> Pose {
+        let (first, end) = (self.rows.first().map_or(0.0, |(time, _)| *time), self.end());
+        let again = self.repeats && t > end && end > first;
+        let t = if again { first + (t - first) % (end - first) } else { t };
         let after = self.rows.partition_point(|(time, _)| *time <= t);
         match (after.checked_sub(1).map(|before| self.rows[before]), self.rows.get(after)) {
             (Some((t0, from)), Some((t1, to))) => {
@@ -181,6 +192,16 @@ mod tests {
         assert_eq!(path.end(), 1.5);
         assert_eq!(path.clone().later(2.0).at(3.0), path.at(1.0));
         assert!(!path.turns());
+    }
+
+    #[test]
+    fn a_repeating_path_begins_again_with_its_first_row() {
+        let path = MotionPath::parse("1,0,0,0\n3,4,0,0\n", Columns::Position).expect("a path").repeating();
+        for (t, x) in [(0.0, 0.0), (1.0, 0.0), (2.0, 2.0), (3.0, 4.0), (3.5, 1.0), (6.5, 3.0)] {
+            assert_eq!(path.at(t).position.x, x, "{t}");
+        }
+        let still = MotionPath::parse("1,2,0,0\n", Columns::Position).expect("a path").repeating();
+        assert_eq!(still.at(9.0).position.x, 2.0);
     }
 
     #[test]

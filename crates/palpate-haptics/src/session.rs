@@ -274,6 +274,9 @@ impl Running<'_> {
         let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps, .. } = self;
         let (playback, mut cycles) = (self.playback, self.cycles);
         let granted = scheduling.claim();
+        if let Some(cycles) = &mut cycles {
+            cycles.begin(granted.clone());
+        }
         process.warm_up();
         std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();

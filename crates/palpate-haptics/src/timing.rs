@@ -1,7 +1,9 @@
 //! How a process keeps its time: histograms that record without allocating.
 
+use crate::scheduling::Granted;
 use hdrhistogram::Histogram;
 use rtrb::{Consumer, Producer, RingBuffer};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// The longest time [ns] that is told from longer ones: ten seconds.
@@ -52,18 +54,24 @@ pub struct Cycle {
 }
 
 /// A process's end of a line over which it tells of its cycles while it runs.
-pub struct CycleTeller(Producer<Cycle>);
+pub struct CycleTeller(Producer<Cycle>, Arc<OnceLock<Granted>>);
 
 /// The other end.
-pub struct CycleListener(Consumer<Cycle>);
+pub struct CycleListener(Consumer<Cycle>, Arc<OnceLock<Granted>>);
 
 /// A line for so many cycles that nobody has listened to yet; more are not told.
 pub fn cycles(room: usize) -> (CycleTeller, CycleListener) {
     let (producer, consumer) = RingBuffer::new(room);
-    (CycleTeller(producer), CycleListener(consumer))
+    let granted = Arc::default();
+    (CycleTeller(producer, Arc::clone(&granted)), CycleListener(consumer, granted))
 }
 
 impl CycleTeller {
+    /// Tell what the system has granted, before the first cycle.
+    pub(crate) fn begin(&mut self, granted: Granted) {
+        let _ = self.1.set(granted);
+    }
+
     /// Tell of a cycle, if somebody listens.
     ///
     /// # Real time
@@ -73,6 +81,11 @@ impl CycleTeller {
 }
 
 impl CycleListener {
+    /// What the system granted the process; none before it has begun.
+    pub fn granted(&self) -> Option<&Granted> {
+        self.1.get()
+    }
+
     /// Take in all cycles that were told since the last time.
     pub fn listen(&mut self, timing: &mut Timing) {
         while let Ok(cycle) = self.0.pop() {

@@ -48,6 +48,22 @@ impl EnergyLedger {
         self.dissipated + self.friction + self.impact
     }
 
+    /// All numbers [J] by their names, in the order above.
+    pub fn named(&self) -> [(&'static str, f64); 10] {
+        [
+            ("kinetic", self.kinetic),
+            ("elastic", self.elastic),
+            ("residual", self.residual),
+            ("potential", self.potential),
+            ("coupling", self.coupling),
+            ("input", self.input),
+            ("dissipated", self.dissipated),
+            ("friction", self.friction),
+            ("impact", self.impact),
+            ("defect", self.defect),
+        ]
+    }
+
     /// Sum over objects.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {

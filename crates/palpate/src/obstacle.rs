@@ -120,6 +120,11 @@ impl ObstacleMesh {
         Ok(Self { surface, tree, bounds, normals, owners, radius })
     }
 
+    /// Its nodes and triangles.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
     /// Give the triangles in spheres (centre, radius) that `near` takes, with their corners.
     fn walk(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(u32, [DVec3; 3])) {
         let place = |n: usize| self.surface.positions[n];

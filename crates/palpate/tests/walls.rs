@@ -45,7 +45,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-fem", &["palpate"]),
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
-    ("palpate-cli", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics"]),
+    ("palpate-viewer", &["palpate", "palpate-haptics"]),
+    ("palpate-cli", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-viewer"]),
     ("xtask", &[]),
 ];
 
@@ -129,7 +130,9 @@ fn the_runtime_has_no_standard_library_thread_clock_or_unsafe_code() {
 #[test]
 fn re_exports_stand_in_lib_rs_and_in_the_doors_of_rooms_only() {
     let mut files = Vec::new();
-    for name in ["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-cli"] {
+    for name in
+        ["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-viewer", "palpate-cli"]
+    {
         sources(&root().join("crates").join(name).join("src"), &mut files);
     }
     for path in files {

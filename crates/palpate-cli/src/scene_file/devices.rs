@@ -10,6 +10,7 @@ use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
 use palpate_haptics::Columns;
 use palpate_haptics::device::{Hand, Traits};
+use toml::Spanned;
 
 /// How far from the surface a point to hold may be, as a share of the object's diagonal.
 const OFF_SURFACE: f64 = 0.05;
@@ -70,24 +71,46 @@ pub(super) fn read_device(
             "a linked device has its path, or its hand, in the process that it is in: leave path and simulated out",
         );
     }
+    let pointer = device.pointer.as_ref().filter(|pointer| *pointer.get_ref());
+    if let Some(pointer) = pointer {
+        refuse_other_hands(source, device, pointer)?;
+    }
     let real = read_real(source, device)?;
-    let path = match (&device.path, linked) {
+    let path = match (&device.path, linked.or(pointer)) {
         (None, None) if real.is_none() => {
             return source.fail(
                 device.name.span(),
-                "the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, or linked = true if \
-                 it is in another process",
+                "the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, linked = true if it is \
+                 in another process, or pointer = true if it is a pointer of the viewer",
             );
         }
-        (entry, _) => {
-            entry.as_ref().map(|entry| source.motion_path(&entry.file, Columns::Position)).transpose()?
-        }
+        (entry, _) => entry.as_ref().map(|entry| source.motion_path(entry, Columns::Position)).transpose()?,
     };
     let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
-    let device = SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real };
+    let pointer = pointer.is_some();
+    let device =
+        SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real, pointer };
     remarks.extend(far_start(&device, objects));
     remarks.extend(small_patches(&device, objects, object_names));
     Ok(device)
+}
+
+/// A pointer is nobody else's hand, and touches until a page says otherwise.
+fn refuse_other_hands(source: &Source, device: &DeviceEntry, pointer: &Spanned<bool>) -> Result<(), Failure> {
+    let other = device.path.is_some() || device.simulated.is_some() || device.driver.is_some();
+    if other || device.linked.is_some() {
+        return source.fail(
+            pointer.span(),
+            "a pointer is where the viewer's page says: leave path, simulated, driver and linked out",
+        );
+    }
+    match &device.attach {
+        Some(attach) => source.fail(
+            attach.span(),
+            "a pointer holds what it is pressed on: leave attach out, and say mode = \"touch\"",
+        ),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), Failure> {

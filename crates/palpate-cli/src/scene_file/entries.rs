@@ -103,6 +103,7 @@ pub(super) struct DeviceEntry {
     pub attach: Option<Spanned<AttachEntry>>,
     pub path: Option<PathEntry>,
     pub linked: Option<Spanned<bool>>,
+    pub pointer: Option<Spanned<bool>>,
     pub tip_radius: Option<Spanned<f64>>,
     pub patch_radius: Option<Spanned<f64>>,
     pub friction: Option<Spanned<f64>>,
@@ -184,6 +185,8 @@ pub(super) struct CouplingEntry {
 #[serde(deny_unknown_fields)]
 pub(super) struct PathEntry {
     pub file: Spanned<PathBuf>,
+    #[serde(default)]
+    pub repeat: bool,
 }
 
 /// So many finite numbers.

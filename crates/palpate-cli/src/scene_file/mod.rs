@@ -60,6 +60,8 @@ pub struct SceneDevice {
     pub simulated: Option<(Traits, Hand)>,
     /// The real device that it is.
     pub real: Option<RealDevice>,
+    /// Whether it is a pointer of the viewer's page.
+    pub pointer: bool,
 }
 
 /// A plane or an obstacle.
@@ -142,8 +144,13 @@ pub fn read_carried(path: &Path, carried: &Carried, pace: Pace) -> Result<Scene,
             path.display()
         )));
     };
-    let source = Source { path, text: &text, carried };
-    let file: SceneFile = toml::from_str(&text).map_err(|e| {
+    read_text(path, &text, carried, pace)
+}
+
+/// The same of a text that stands for the file.
+pub fn read_text(path: &Path, text: &str, carried: &Carried, pace: Pace) -> Result<Scene, Failure> {
+    let source = Source { path, text, carried };
+    let file: SceneFile = toml::from_str(text).map_err(|e| {
         // Types in the user's words.
         let what = e
             .to_string()

@@ -54,7 +54,7 @@ pub(super) fn read_obstacle(
     }
     let mut path = None;
     if let Some(entry) = &obstacle.path {
-        let read = source.motion_path(&entry.file, Columns::Pose)?;
+        let read = source.motion_path(entry, Columns::Pose)?;
         if let (Some(orientation), true) = (&obstacle.orientation, read.turns()) {
             return source
                 .fail(orientation.span(), "the orientation is in the path: leave one of the two out");

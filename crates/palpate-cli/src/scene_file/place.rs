@@ -1,6 +1,7 @@
 //! Errors with their place in the scene's text, and numbers within their range.
 
 use super::LARGEST;
+use super::entries::PathEntry;
 use crate::Failure;
 use palpate_haptics::{Columns, MotionPath};
 use std::collections::HashMap;
@@ -61,9 +62,11 @@ impl Source<'_> {
     }
 
     /// A path beside the scene.
-    pub fn motion_path(&self, file: &Spanned<PathBuf>, columns: Columns) -> Result<MotionPath, Failure> {
-        let read = read_path(&self.relative(file.get_ref()), columns);
-        read.or_else(|failure| self.fail(file.span(), failure))
+    pub fn motion_path(&self, entry: &PathEntry, columns: Columns) -> Result<MotionPath, Failure> {
+        let PathEntry { file, repeat } = entry;
+        let path = read_path(&self.relative(file.get_ref()), columns);
+        let path = path.or_else(|failure| self.fail(file.span(), failure))?;
+        Ok(if *repeat { path.repeating() } else { path })
     }
 
     /// A number above 0.

@@ -1,32 +1,42 @@
-//! `palpate demo`: the paper's cube, held by two hands and shaken (figure 5b of the paper).
+//! `palpate demo`: the paper's cube, held by two hands and shaken (figure 5b of the paper), then in the browser to be touched.
 
 use crate::Failure;
 use crate::plot::{Curve, plot};
-use crate::progress::{Bars, WithoutRemarks};
+use crate::progress::Bars;
 use crate::scene_file::{self, Pace};
+use crate::stages::{BUILT_IN, Recipe, cache_folder, paper_cube as paper_recipe};
 use crate::verbs::run::{self, simulate};
-use crate::verbs::{inspect, print, read_recording, write_whole};
+use crate::verbs::serve::{Serving, serve_built_in};
+use crate::verbs::{inspect, print, write_whole};
 use clap::Args;
-use palpate::{Damping, Material, Recording};
-use palpate_fem::element::Order;
-use palpate_fem::mesh::box_mesh;
-use palpate_fem::record::{Extent, RecordParameters, record};
-use palpate_fem::residual::ResidualChoice;
+use palpate::Recording;
+use palpate_fem::record::RecordParameters;
 use std::f64::consts::PI;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// The main job in one command: an elastic cube, held by two hands and shaken at 2 Hz
+/// The main job in one command: record an elastic cube, shake it, and touch it in the browser
 ///
-/// Records the cube once (a few seconds; kept in the cache folder), runs the shake, shows the forces, and writes
-/// the scene, its paths, the steps as CSV and the deformed surfaces for ParaView.
+/// Records the cube once (a few seconds; kept in the cache folder), runs a shake by two hands at 2 Hz, shows the forces, and
+/// writes the scene, its paths, the steps as CSV and the deformed surfaces for ParaView. Then, on a terminal, it opens the
+/// viewer with the built-in scenes, where you poke, squeeze and throw.
 #[derive(Args)]
 pub struct Arguments {
+    /// The scene that the viewer begins with: bounce, shake, pinch, stack, ball, slab
+    #[arg(value_name = "NAME", default_value = BUILT_IN[0].id, value_parser = BUILT_IN.map(|scene| scene.id))]
+    name: String,
     /// Folder for what is written
     #[arg(short, long, default_value = "palpate-demo", value_name = "DIR")]
     output: PathBuf,
-    /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
-    #[arg(long, value_name = "DIR")]
-    cache: Option<PathBuf>,
+    /// Open the viewer also without a terminal
+    #[arg(long)]
+    serve: bool,
+    /// End after the shake
+    #[arg(long, conflicts_with = "serve")]
+    no_serve: bool,
+    /// How the viewer is served
+    #[command(flatten)]
+    serving: Serving,
 }
 
 /// Half the way of the hands [m], how often [Hz], how long [s], and how much they squeeze [m].
@@ -35,23 +45,14 @@ const FREQUENCY_HZ: f64 = 2.0;
 const DURATION_S: f64 = 2.0;
 const SQUEEZE_M: f64 = 0.003;
 
-/// The paper's material (section 3.1), with the damping of the reference series in `data/reference`.
+/// The paper's cube of so many cells a side.
+fn cube_recipe(cells: u32, modes: usize) -> Recipe {
+    Recipe { source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"), modes, ..paper_recipe() }
+}
+
+/// How it is recorded.
 pub fn paper_cube(cells: u32, modes: usize) -> RecordParameters {
-    RecordParameters {
-        materials: vec![Material {
-            region: String::new(),
-            young_pa: 2000.0,
-            poisson: 0.49,
-            density_kg_m3: 110.0,
-        }],
-        order: Order::Linear,
-        modes,
-        damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
-        residual: ResidualChoice::Automatic,
-        fixed_nodes: Vec::new(),
-        source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"),
-        extent: Extent::Whole,
-    }
+    cube_recipe(cells, modes).parameters(1)
 }
 
 /// Run the verb.
@@ -59,7 +60,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let output = &arguments.output;
     std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
     let recording_path = output.join("cube.palp");
-    let recording = cached_cube(12, 200, arguments.cache.as_deref())?;
+    let recording = cached_cube(12, 200, arguments.serving.cache.as_deref())?;
     let bytes = recording.to_bytes()?;
     write_whole(&recording_path, &bytes)?;
     print("An elastic cube, 10 cm and 110 g, as soft as jelly:\n\n")?;
@@ -104,7 +105,13 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
         output.join("shake.csv").display(),
         scene_path.display(),
         scene_path.display()
-    ))
+    ))?;
+    let person = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+    if !arguments.no_serve && (arguments.serve || person) {
+        print("\nNow touch one yourself: ")?;
+        return serve_built_in(&arguments.serving, &arguments.name);
+    }
+    print("\nTouch one yourself, in the browser:\n  palpate serve\n")
 }
 
 const SCENE: &str = r#"# The paper's figure 5(b): two hands hold a free cube and shake it at 2 Hz.
@@ -143,33 +150,20 @@ fn shake_path(side: f64) -> String {
 
 /// The paper's cube from the cache, or recorded into it.
 pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Recording, Failure> {
-    let folder = cache.map(Path::to_path_buf).or_else(cache_folder);
-    let name = format!("cube-{cells}-{modes}-{}.palp", env!("CARGO_PKG_VERSION"));
-    let path = folder.as_ref().map(|folder| folder.join(name));
-    if let Some(recording) = path.as_deref().and_then(|path| read_recording(path).ok()) {
+    let recipe = cube_recipe(cells, modes);
+    let folder = cache_folder(cache);
+    if let Some(recording) = folder.as_deref().and_then(|folder| recipe.cached(folder)) {
         return Ok(recording);
     }
     crate::tell(&format!(
         "recording the paper's cube, {cells}³ cells, {modes} modes (once; it is kept for the next time)"
     ));
     let mut progress = Bars::new();
-    let mesh = box_mesh([0.1; 3], [cells; 3])?;
-    let recording = record(mesh, &paper_cube(cells, modes), &mut WithoutRemarks(&mut progress))?.recording;
+    let recording = recipe.record(&mut progress)?;
     progress.finish();
     // A cache that can't be written costs time the next time, nothing else.
-    if let (Some(folder), Some(path)) = (folder, path)
-        && std::fs::create_dir_all(&folder).is_ok()
-        && write_whole(&path, &recording.to_bytes()?).is_err()
-    {
-        crate::tell(&format!(
-            "warning: {} cannot be written, so the cube will be recorded again",
-            path.display()
-        ));
+    if folder.is_none_or(|folder| recipe.keep(&recording, &folder).is_err()) {
+        crate::tell("warning: there is no folder to keep it in, so the cube will be recorded again");
     }
     Ok(recording)
-}
-
-fn cache_folder() -> Option<PathBuf> {
-    let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    Some(folder("XDG_CACHE_HOME").or_else(|| Some(folder("HOME")?.join(".cache")))?.join("palpate"))
 }

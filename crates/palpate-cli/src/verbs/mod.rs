@@ -9,6 +9,7 @@ pub mod record;
 pub mod replay;
 pub mod reproduce;
 pub mod run;
+pub mod serve;
 pub mod verify;
 
 use crate::Failure;

@@ -233,7 +233,7 @@ fn frequencies_hz(modes: &Modes) -> Vec<f64> {
 }
 
 /// 3s² − 2s³, from 0 to 1 as s does, and even at both ends.
-fn smooth(s: f64) -> f64 {
+pub fn smooth(s: f64) -> f64 {
     let s = s.clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)
 }

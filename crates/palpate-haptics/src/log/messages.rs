@@ -136,6 +136,23 @@ impl From<&EnergyLedger> for EnergyMessage {
     }
 }
 
+impl From<&EnergyMessage> for EnergyLedger {
+    fn from(e: &EnergyMessage) -> Self {
+        Self {
+            kinetic: e.kinetic,
+            elastic: e.elastic,
+            residual: e.residual,
+            potential: e.potential,
+            coupling: e.coupling,
+            input: e.input,
+            dissipated: e.dissipated,
+            friction: e.friction,
+            impact: e.impact,
+            defect: 0.0,
+        }
+    }
+}
+
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct StatusMessage {
     pub residual_m: f64,

@@ -303,6 +303,19 @@ fn describe_certificate(out: &mut String, certificate: &Certificate) -> std::fmt
     writeln!(out, "    reference            its own error is {}", percent(certificate.reference_error))
 }
 
+/// What a recording's certificate says, a line each.
+pub fn certificate_lines(recording: &Recording) -> Vec<String> {
+    let mut text = String::new();
+    // Text takes whatever is written to it.
+    let _ = recording
+        .metadata
+        .certificate
+        .as_ref()
+        .map(|certificate| describe_certificate(&mut text, certificate));
+    let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+    text.lines().map(words).collect()
+}
+
 fn percent(share: f64) -> String {
     match 100.0 * share {
         percent if percent > 1000.0 => "more than 1000 %".into(),

@@ -87,7 +87,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Run a scene to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
-    for SceneDevice { name, path, simulated, real, .. } in &scene.devices {
+    for SceneDevice { name, path, simulated, real, pointer, .. } in &scene.devices {
+        if *pointer {
+            return Err(pointer_without_page(name));
+        }
         let what = match (real, path, simulated) {
             (Some(_), ..) => "is held by a real hand",
             (None, None, _) => "comes over a link",
@@ -120,6 +123,11 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     }
     bar.finish_and_clear();
     outputs.finish(&state)
+}
+
+/// Pointers are of pages.
+fn pointer_without_page(name: &str) -> Failure {
+    Failure(format!("the device {name:?} is a pointer of the viewer: open the scene with palpate serve"))
 }
 
 /// How many steps: as many as asked for, or to the end of the longest path.

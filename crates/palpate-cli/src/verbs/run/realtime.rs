@@ -93,6 +93,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     if !(options.pictures >= 0.0 && options.pictures <= 1000.0) {
         return Err(Failure(format!("--pictures is {}, expected 0 to 1000", options.pictures)));
     }
+    if let Some(device) = scene.devices.iter().find(|device| device.pointer) {
+        return Err(super::pointer_without_page(&device.name));
+    }
     // Hands without a path have no end but Ctrl-C.
     let endless = arguments.duration.is_none() && scene.devices.iter().any(|device| device.path.is_none());
     let steps = if endless { None } else { Some(count_steps(scene, arguments)? as u64) };

@@ -1,0 +1,446 @@
+//! Scenes for the viewer: built-in ones, scene files, and meshes that a page sends.
+//!
+//! A scene is its text, whoever made it: what a page changes is changed in the text, and the text is read as any other.
+
+mod built_in;
+mod recipe;
+
+use crate::Failure;
+use crate::scene_file::{self, Carried, Pace, RealDevice, Scene};
+use crate::verbs::inspect::certificate_lines;
+use crate::verbs::read_recording;
+use crate::verbs::run::{attach, attach_real};
+pub use built_in::{BUILT_IN, paper_cube};
+use palpate::{Damping, DeviceMode, Recording, Support};
+use palpate_fem::element::Order;
+use palpate_fem::progress::Progress;
+use palpate_viewer::{
+    MaterialDescription, ObjectDescription, Rules, SceneDescription, SceneTitle, Stage, StageDevice, Tell,
+    Upload, Workshop,
+};
+pub use recipe::{Recipe, cache_folder};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tempfile::TempDir;
+use toml::{Table, Value};
+
+/// Pointers of a scene that names none.
+const POINTERS: usize = 4;
+
+/// Updates of a device on this machine per second.
+const DEVICE_HZ: f64 = 1000.0;
+
+/// A dropped mesh has fewer surface nodes than this, or its residual compliance takes minutes.
+const MOST_UPLOAD: usize = 64 << 20;
+
+/// Makes scenes for the viewer.
+pub struct Stages {
+    /// Where built-in recordings are kept.
+    cache: PathBuf,
+    /// Paths and meshes while the viewer is served; and the cache where there is no other.
+    folder: TempDir,
+    current: Mutex<Current>,
+}
+
+/// The scene that was made last.
+#[derive(Clone, Default)]
+struct Current {
+    id: Option<String>,
+    title: String,
+    about: String,
+    /// The file that the text stands for.
+    path: PathBuf,
+    text: Table,
+    /// How recordings are made, by the files that they lie in.
+    recipes: HashMap<PathBuf, Recipe>,
+    uploads: usize,
+}
+
+impl Stages {
+    /// With recordings kept in a folder, or the user's cache.
+    pub fn new(cache: Option<&Path>) -> Result<Self, Failure> {
+        let folder =
+            TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the viewer: {e}")))?;
+        let cache = cache_folder(cache).unwrap_or_else(|| folder.path().to_path_buf());
+        Ok(Self { cache, folder, current: Mutex::default() })
+    }
+
+    /// A scene file.
+    pub fn open_file(&self, path: &Path) -> Result<Stage, Failure> {
+        // Read as it stands first: then errors name its lines.
+        let scene = scene_file::read(path, Pace::RealTime)?;
+        scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
+        scene.choices.iter().for_each(|choice| crate::tell(choice));
+        let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
+        let text: Table = text.parse().map_err(|e| Failure(format!("{}: {e}", path.display())))?;
+        let title = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let current = Current {
+            title,
+            about: "Press and drag what you see.".into(),
+            path: path.to_path_buf(),
+            text,
+            ..Current::default()
+        };
+        self.make(current)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Current> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Read a scene's text, and keep it as the current one.
+    fn make(&self, mut current: Current) -> Result<Stage, Failure> {
+        let text = current.text.to_string();
+        let mut scene = scene_file::read_text(&current.path, &text, &Carried::new(), Pace::RealTime)?;
+        if !scene.devices.iter().any(|device| device.pointer) {
+            add_pointers(&mut current.text, &scene);
+            let text = current.text.to_string();
+            scene = scene_file::read_text(&current.path, &text, &Carried::new(), Pace::RealTime)?;
+        }
+        let stage = self.stage(&mut current, scene);
+        *self.lock() = current;
+        Ok(stage)
+    }
+
+    fn stage(&self, current: &mut Current, scene: Scene) -> Stage {
+        let objects = current.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
+        let files = objects.iter().map(|object| {
+            let file = object.get("recording").and_then(Value::as_str).unwrap_or_default();
+            current.path.parent().unwrap_or(Path::new("")).join(file)
+        });
+        let described: Vec<ObjectDescription> = scene
+            .model
+            .recordings()
+            .zip(&scene.object_names)
+            .zip(files)
+            .map(|((recording, name), file)| {
+                if let Some(recipe) = recipe_of(recording) {
+                    current.recipes.entry(file.clone()).or_insert(recipe);
+                }
+                let recordable = current.recipes.contains_key(&file);
+                ObjectDescription::new(name, recording, certificate_lines(recording), recordable)
+            })
+            .collect();
+        let devices: Vec<(String, bool)> =
+            scene.devices.iter().map(|device| (device.name.clone(), device.pointer)).collect();
+        let description = SceneDescription::new(
+            (current.id.clone(), current.title.clone(), current.about.clone()),
+            &scene.model,
+            described,
+            &scene.names().obstacles,
+            &devices,
+        );
+        Stage {
+            description,
+            model: scene.model.clone(),
+            devices: scene.devices.iter().map(stage_device).collect(),
+            movers: scene
+                .obstacles
+                .iter()
+                .map(|obstacle| {
+                    let obstacle = obstacle.clone();
+                    Arc::new(move |t: f64| obstacle.at(t)) as palpate_viewer::StageMover
+                })
+                .collect(),
+        }
+    }
+
+    fn open_built_in(&self, id: &str, tell: Tell) -> Result<Stage, Failure> {
+        let Some(scene) = BUILT_IN.iter().find(|scene| scene.id == id) else {
+            let known = BUILT_IN.map(|scene| scene.id).join(", ");
+            return Err(Failure(format!("there is no scene {id:?}; there are {known}")));
+        };
+        let folder = self.folder.path().join(scene.id);
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::file("make the folder", &folder, &e))?;
+        for (name, at) in scene.paths {
+            let path = folder.join(name);
+            let text = built_in::path_text(*at, scene.beat_s);
+            std::fs::write(&path, text).map_err(|e| Failure::file("write the path", &path, &e))?;
+        }
+        let mut text: Table =
+            scene.text.parse().map_err(|e| Failure(format!("the built-in scene {id}: {e}")))?;
+        let mut recipes = HashMap::new();
+        for object in text.get_mut("object").and_then(Value::as_array_mut).into_iter().flatten() {
+            let name =
+                object.get("recording").and_then(Value::as_str).and_then(|name| name.strip_prefix('@'));
+            let Some(recipe) = name.and_then(built_in::recipe) else { continue };
+            let path = recipe.recorded_in(&self.cache, &mut Telling::new(tell))?;
+            set(object, "recording", path.display().to_string());
+            recipes.insert(path, recipe);
+        }
+        self.make(Current {
+            id: Some(scene.id.into()),
+            title: scene.title.into(),
+            about: scene.about.into(),
+            path: folder.join("scene.toml"),
+            text,
+            recipes,
+            ..Current::default()
+        })
+    }
+
+    fn change_rules(&self, rules: &Rules) -> Result<Stage, Failure> {
+        let mut current = self.lock().clone();
+        let text = &mut current.text;
+        if let Some(gravity) = rules.gravity {
+            text.insert("gravity".into(), Value::Array(gravity.map(Value::Float).to_vec()));
+        }
+        if let Some(step) = rules.step {
+            if !(200e-6..=10e-3).contains(&step) {
+                return Err(Failure(format!("the step is {step} s, expected 0.0002 s to 0.01 s")));
+            }
+            text.insert("step".into(), Value::Float(step));
+        }
+        if let Some(friction) = rules.friction {
+            for kind in ["object", "plane", "obstacle", "device"] {
+                let entries = text.get_mut(kind).and_then(Value::as_array_mut).into_iter().flatten();
+                let touches = |entry: &Value| entry.get("mode").and_then(Value::as_str) != Some("held");
+                entries.filter(|entry| touches(entry)).for_each(|entry| set(entry, "friction", friction));
+            }
+        }
+        if let Some(coupling) = rules.coupling {
+            let gains = Table::from_iter([
+                ("stiffness".to_string(), Value::Float(coupling.stiffness)),
+                ("damping".to_string(), Value::Float(coupling.damping)),
+            ]);
+            let devices = text.get_mut("device").and_then(Value::as_array_mut).into_iter().flatten();
+            let pointer = |device: &Value| device.get("pointer").and_then(Value::as_bool) == Some(true);
+            devices
+                .filter(|device| pointer(device))
+                .for_each(|device| set(device, "coupling", gains.clone()));
+        }
+        self.make(current)
+    }
+
+    fn record_again(
+        &self,
+        object: usize,
+        material: MaterialDescription,
+        tell: Tell,
+    ) -> Result<Stage, Failure> {
+        let mut current = self.lock().clone();
+        let entry = current.text.get_mut("object").and_then(|objects| objects.get_mut(object));
+        let Some(entry) = entry else { return Err(Failure(format!("there is no object {object}"))) };
+        let file = entry.get("recording").and_then(Value::as_str).unwrap_or_default();
+        let file = current.path.parent().unwrap_or(Path::new("")).join(file);
+        let Some(recipe) = current.recipes.get(&file) else {
+            return Err(Failure(
+                "this object was recorded from a file, of which only the recording is here: record it again with palpate record"
+                    .into(),
+            ));
+        };
+        let recipe = Recipe { material, ..recipe.clone() };
+        let folder = self.folder.path().join("materials");
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::file("make the folder", &folder, &e))?;
+        let path = recipe.recorded_in(&folder, &mut Telling::new(tell))?;
+        set(entry, "recording", path.display().to_string());
+        current.recipes.insert(path, recipe);
+        self.make(current)
+    }
+
+    fn record_upload(&self, upload: Upload, tell: Tell) -> Result<Stage, Failure> {
+        let Upload { name, bytes, scale, material, modes } = upload;
+        let file = Path::new(&name).file_name().filter(|name| !name.is_empty());
+        let Some(file) = file else { return Err(Failure("the mesh file has no name".into())) };
+        if bytes.len() > MOST_UPLOAD {
+            return Err(Failure(format!(
+                "{name} has {} MB, at most {} MB are recorded in the viewer: use palpate record",
+                bytes.len() >> 20,
+                MOST_UPLOAD >> 20
+            )));
+        }
+        let kind = Path::new(file).extension().map(|kind| kind.to_string_lossy().to_lowercase());
+        if matches!(kind.as_deref(), Some("obj" | "stl")) {
+            return Err(Failure(format!(
+                "{name} is a surface, and has no inside that could deform: give tetrahedra (.msh of Gmsh, .vtk), as Gmsh, \
+                 TetGen or fTetWild make them of it"
+            )));
+        }
+        let number = {
+            let mut current = self.lock();
+            current.uploads += 1;
+            current.uploads
+        };
+        let folder = self.folder.path().join(format!("upload-{number}"));
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::file("make the folder", &folder, &e))?;
+        let source = folder.join(file);
+        std::fs::write(&source, &bytes).map_err(|e| Failure::file("keep the mesh", &source, &e))?;
+        let recipe = Recipe {
+            source: source.display().to_string(),
+            scale,
+            material,
+            order: Order::Quadratic,
+            modes,
+            damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
+        };
+        let path = recipe.recorded_in(&folder, &mut Telling::new(tell))?;
+        let recording = read_recording(&path)?;
+        let lowest = recording.surface.positions.iter().map(|place| place.y).fold(f64::INFINITY, f64::min);
+        let height = recording.surface.diagonal() * 0.1 - lowest;
+        let text = format!(
+            "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"object\"\nrecording = {:?}\nposition = [0.0, {height:?}, 0.0]\n\
+             [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n",
+            path.display().to_string(),
+        );
+        let uploads = self.lock().uploads;
+        self.make(Current {
+            id: None,
+            title: file.to_string_lossy().into_owned(),
+            about: "Your own mesh. Press and drag it.".into(),
+            path: folder.join("scene.toml"),
+            text: text.parse().map_err(|e| Failure(format!("the scene of {name}: {e}")))?,
+            recipes: HashMap::from([(path, recipe)]),
+            uploads,
+        })
+    }
+}
+
+impl Workshop for Stages {
+    fn titles(&self) -> Vec<SceneTitle> {
+        let title = |scene: &built_in::BuiltIn| SceneTitle {
+            id: scene.id.into(),
+            title: scene.title.into(),
+            about: scene.about.into(),
+        };
+        BUILT_IN.iter().map(title).collect()
+    }
+
+    fn open(&self, id: &str, tell: Tell) -> Result<Stage, String> {
+        self.open_built_in(id, tell).map_err(|failure| failure.0)
+    }
+
+    fn change(&self, rules: &Rules) -> Result<Stage, String> {
+        self.change_rules(rules).map_err(|failure| failure.0)
+    }
+
+    fn change_material(
+        &self,
+        object: usize,
+        material: MaterialDescription,
+        tell: Tell,
+    ) -> Result<Stage, String> {
+        self.record_again(object, material, tell).map_err(|failure| failure.0)
+    }
+
+    fn record(&self, upload: Upload, tell: Tell) -> Result<Stage, String> {
+        self.record_upload(upload, tell).map_err(|failure| failure.0)
+    }
+}
+
+/// Set a key of a table.
+fn set(entry: &mut Value, key: &str, value: impl Into<Value>) {
+    if let Some(table) = entry.as_table_mut() {
+        table.insert(key.into(), value.into());
+    }
+}
+
+/// How a primitive of one material was recorded.
+fn recipe_of(recording: &Recording) -> Option<Recipe> {
+    let metadata = &recording.metadata;
+    let source = &metadata.provenance.source;
+    let primitive = source.starts_with("box:") || source.starts_with("sphere:");
+    let [material] = metadata.materials.as_slice() else { return None };
+    (primitive && metadata.support == Support::Free).then(|| Recipe {
+        source: source.clone(),
+        scale: 1.0,
+        material: MaterialDescription {
+            young: material.young_pa,
+            poisson: material.poisson,
+            density: material.density_kg_m3,
+        },
+        order: if metadata.mesh.order == 1 { Order::Linear } else { Order::Quadratic },
+        modes: recording.modes.len(),
+        damping: metadata.damping,
+    })
+}
+
+/// Fingers for pointers: as large and as firm as suits the smallest object.
+fn add_pointers(text: &mut Table, scene: &Scene) {
+    let size = |recording: &Recording| recording.surface.radius();
+    let smallest = scene.model.recordings().min_by(|a, b| size(a).total_cmp(&size(b)));
+    let Some(recording) = smallest else { return };
+    let radius = size(recording);
+    // m·ω² of its lowest mode: about as stiff as the object is as a whole. Damped by a tenth.
+    let omega = recording.modes.angular_frequencies.first().copied().unwrap_or(50.0);
+    let stiffness = recording.mass() * omega * omega;
+    let damping = 0.2 * recording.mass() * omega;
+    let taken = scene.names();
+    let taken = |name: &String| {
+        [&taken.objects, &taken.devices, &taken.obstacles].into_iter().any(|names| names.contains(name))
+    };
+    let names = (1..).map(|number| format!("finger{number}")).filter(|name| !taken(name));
+    let devices = text.entry("device").or_insert_with(|| Value::Array(Vec::new()));
+    let Some(devices) = devices.as_array_mut() else { return };
+    for name in names.take(POINTERS) {
+        let coupling = Table::from_iter([
+            ("stiffness".to_string(), Value::Float(stiffness)),
+            ("damping".to_string(), Value::Float(damping)),
+        ]);
+        devices.push(Value::Table(Table::from_iter([
+            ("name".to_string(), Value::String(name)),
+            ("mode".to_string(), Value::String("touch".into())),
+            ("pointer".to_string(), Value::Boolean(true)),
+            ("tip_radius".to_string(), Value::Float(0.08 * radius)),
+            ("patch_radius".to_string(), Value::Float(0.15 * radius)),
+            ("friction".to_string(), Value::Float(0.8)),
+            ("coupling".to_string(), Value::Table(coupling)),
+        ])));
+    }
+}
+
+fn stage_device(device: &scene_file::SceneDevice) -> StageDevice {
+    match (&device.real, &device.path) {
+        (Some(real), _) => {
+            let (real, mode): (RealDevice, DeviceMode) = (real.clone(), device.mode);
+            StageDevice::Here(Arc::new(move || {
+                attach_real(&real, mode, DEVICE_HZ, false).map_err(|failure| failure.0)
+            }))
+        }
+        (None, Some(path)) => match device.simulated {
+            None => StageDevice::Following(path.clone(), device.mode),
+            simulated => {
+                let (path, mode) = (path.clone(), device.mode);
+                StageDevice::Here(Arc::new(move || {
+                    Ok(attach(path.clone(), simulated, mode, DEVICE_HZ, false))
+                }))
+            }
+        },
+        (None, None) => StageDevice::Pointer,
+    }
+}
+
+/// Progress of a recording as a page is told.
+struct Telling<'a, 'b> {
+    tell: &'a mut (dyn FnMut(&str, Option<f64>) + Send + 'b),
+    stage: String,
+    total: u64,
+    done: u64,
+    /// Hundredths that were told.
+    told: u64,
+}
+
+impl<'a, 'b> Telling<'a, 'b> {
+    fn new(tell: &'a mut (dyn FnMut(&str, Option<f64>) + Send + 'b)) -> Self {
+        Self { tell, stage: String::new(), total: 0, done: 0, told: 0 }
+    }
+}
+
+impl Progress for Telling<'_, '_> {
+    fn begin(&mut self, stage: &str, total: u64) {
+        (self.stage, self.total, self.done, self.told) = (stage.into(), total, 0, 0);
+        (self.tell)(stage, (total > 0).then_some(0.0));
+    }
+
+    fn advance(&mut self, units: u64) {
+        self.done += units;
+        let share = self.done as f64 / self.total.max(1) as f64;
+        let hundredths = (100.0 * share) as u64;
+        if hundredths > self.told {
+            self.told = hundredths;
+            (self.tell)(&self.stage, Some(share.min(1.0)));
+        }
+    }
+
+    fn remark(&mut self, _text: &str) {}
+}

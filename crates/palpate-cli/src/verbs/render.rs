@@ -1,0 +1,300 @@
+//! `palpate render`: pictures of a log, drawn by the viewer without a person.
+
+use crate::Failure;
+use crate::log_shows::{Frames, ShownLog};
+use crate::verbs::{print, print_json, write_whole};
+use crate::whole_file::stop_on_interrupt;
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use palpate_viewer::{CameraView, Exhibit, RenderJob, RenderWish, Server, Settings};
+use serde_json::json;
+use std::io::IsTerminal;
+use std::net::Ipv4Addr;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Draw pictures of a log: PNG files, and an animation
+///
+/// The log is computed again (as by `palpate replay`), and the page of `palpate serve` draws it in a browser without a window: the same
+/// pictures as in the viewer, and the same files every time. It needs Chromium or Chrome.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = "For example:
+  palpate render run.mcap -o frames                         # frames/frame_00000.png, …
+  palpate render run.mcap -o frames --gif run.gif --fps 20 --from 1 --to 3
+  palpate render run.mcap -o frames --mp4 run.mp4 --width 1920 --height 1080   # with ffmpeg
+  palpate render run.mcap -o frames --camera 0.3,0.2,0.4,0,0.05,0 --colour strain --dark")]
+pub struct Arguments {
+    /// The log
+    log: PathBuf,
+    /// Folder for the pictures
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Pictures per second of the log
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, allow_negative_numbers = true)]
+    fps: f64,
+    /// Begin there [s]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    from: f64,
+    /// End there [s]; by default with the log
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    to: Option<f64>,
+    /// Width [pixels]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1280, value_parser = clap::value_parser!(u32).range(64..=4096))]
+    width: u32,
+    /// Height [pixels]
+    #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=4096))]
+    height: u32,
+    /// Where the camera is and what it looks at [m, world]: six numbers x,y,z,x,y,z
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    camera: Option<Vec<f64>>,
+    /// What colours tell
+    #[arg(long, value_enum, default_value_t = Colour::Displacement)]
+    colour: Colour,
+    /// On a dark ground
+    #[arg(long)]
+    dark: bool,
+    /// Write an animated GIF too
+    #[arg(long, value_name = "OUT.gif")]
+    gif: Option<PathBuf>,
+    /// Write a film too, where ffmpeg is found
+    #[arg(long, value_name = "OUT.mp4")]
+    mp4: Option<PathBuf>,
+    /// The browser; by default the first of chromium, chromium-browser, google-chrome, chrome that is found
+    #[arg(long, value_name = "PROGRAM")]
+    browser: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What colours of the surface tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Colour {
+    Displacement,
+    Strain,
+    Plain,
+}
+
+/// Most pictures of one call.
+const MOST_PICTURES: u64 = 20_000;
+
+/// A browser that has drawn nothing for so long does not work.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Between two looks at the browser.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Run the verb.
+pub fn render(arguments: &Arguments) -> Result<(), Failure> {
+    let camera = arguments.camera.as_deref().map(read_camera).transpose()?;
+    if !(arguments.fps > 0.0 && arguments.fps <= 1000.0) {
+        return Err(Failure(format!("--fps is {}, expected above 0 and at most 1000", arguments.fps)));
+    }
+    let browser = find_browser(arguments.browser.as_deref())?;
+    if arguments.mp4.is_some() && !runs("ffmpeg") {
+        return Err(Failure("--mp4 needs ffmpeg, which is not found: install it, or take --gif".into()));
+    }
+    let output = &arguments.output;
+    std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
+    let log = ShownLog::read(&arguments.log, 0, arguments.fps)?;
+    let numbers = chosen(log.frames(), arguments.from, arguments.to)?;
+    let (show, frames, stop) = (log.show.clone(), log.frames(), stop_on_interrupt());
+    log.make(stop)?;
+    let (pictures, arrived) = channel();
+    let wish = RenderWish {
+        frames: numbers.clone(),
+        width: arguments.width,
+        height: arguments.height,
+        camera,
+        colour: format!("{:?}", arguments.colour).to_lowercase(),
+        dark: arguments.dark,
+    };
+    let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
+    let server = Server::bind(&settings).map_err(Failure)?;
+    let address = format!("http://{}/", server.address().map_err(Failure)?);
+    let done = AtomicBool::new(false);
+    let size = (arguments.width, arguments.height);
+    let drawn = std::thread::scope(|scope| {
+        let serving = scope.spawn(|| server.run(Exhibit::Render(show, RenderJob { wish, pictures }), &done));
+        let browser = Browser::open(&browser, &address, size);
+        let drawn = browser.and_then(|mut browser| collect(&mut browser, &arrived, &numbers, output, stop));
+        done.store(true, Ordering::Release);
+        let served = serving.join().map_err(|_| Failure("the server has ended by a bug".into()));
+        drawn.and_then(|files| served?.map(|()| files).map_err(Failure))
+    })?;
+    if let Some(gif) = &arguments.gif {
+        super::animation::write_gif(&drawn, frames.apart_s, gif)?;
+    }
+    if let Some(mp4) = &arguments.mp4 {
+        write_mp4(output, 1.0 / frames.apart_s, mp4)?;
+    }
+    let first = drawn.first().map(|path| path.display().to_string()).unwrap_or_default();
+    if arguments.json {
+        return print_json(&json!({
+            "pictures": drawn.len(), "folder": output, "apart_s": frames.apart_s, "gif": arguments.gif, "mp4": arguments.mp4,
+        }));
+    }
+    print(&format!("{} pictures, {:.4} s apart: {first} …\n", drawn.len(), frames.apart_s))
+}
+
+fn read_camera(numbers: &[f64]) -> Result<CameraView, Failure> {
+    match numbers {
+        &[a, b, c, x, y, z] if numbers.iter().all(|n| n.is_finite()) && [a, b, c] != [x, y, z] => {
+            Ok(CameraView { from: [a, b, c], to: [x, y, z] })
+        }
+        _ => Err(Failure(format!(
+            "--camera is {numbers:?}, expected six numbers: where it is x,y,z and what it looks at x,y,z"
+        ))),
+    }
+}
+
+/// The frames between two times.
+fn chosen(frames: Frames, from: f64, to: Option<f64>) -> Result<Vec<u64>, Failure> {
+    let end = (frames.count - 1) as f64 * frames.apart_s;
+    let to = to.unwrap_or(end);
+    if !(from >= 0.0 && from <= to && from <= end) {
+        return Err(Failure(format!("--from {from} --to {to}: the log goes from 0 to {end:.3} s")));
+    }
+    let number = |t: f64| (t / frames.apart_s).round() as u64;
+    let numbers: Vec<u64> = (number(from)..=number(to).min(frames.count - 1)).collect();
+    if numbers.len() as u64 > MOST_PICTURES {
+        return Err(Failure(format!(
+            "these are {} pictures, at most {MOST_PICTURES} are drawn at once: take a lower --fps, or --from and --to",
+            numbers.len()
+        )));
+    }
+    Ok(numbers)
+}
+
+fn runs(program: impl AsRef<Path>) -> bool {
+    let quiet = |option: &str| {
+        let mut command = Command::new(program.as_ref());
+        command.arg(option).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    quiet("--version") || quiet("-version")
+}
+
+fn find_browser(given: Option<&Path>) -> Result<PathBuf, Failure> {
+    let known = ["chromium", "chromium-browser", "google-chrome", "chrome"].map(PathBuf::from);
+    match given {
+        Some(given) if runs(given) => Ok(given.to_path_buf()),
+        Some(given) => Err(Failure(format!("the browser {} can't be started", given.display()))),
+        None => known.into_iter().find(runs).ok_or_else(|| {
+            Failure(
+                "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one with --browser"
+                    .into(),
+            )
+        }),
+    }
+}
+
+/// A browser without a window; it ends with this.
+struct Browser {
+    child: Child,
+    _profile: TempDir,
+}
+
+impl Browser {
+    fn open(program: &Path, address: &str, (width, height): (u32, u32)) -> Result<Self, Failure> {
+        let profile = TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the browser: {e}")))?;
+        let mut command = Command::new(program);
+        // Drawn by software, the same bytes on every machine with the same browser.
+        command
+            .args(["--headless", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
+            .args(["--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run", "--disable-sync"])
+            .args(["--disable-background-networking", "--disable-component-update", "--disable-quic"])
+            .args(["--disable-background-timer-throttling", "--disable-renderer-backgrounding"])
+            // As root it has no sandbox; it shows nothing but our own page.
+            .arg("--no-sandbox")
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg(format!("--window-size={width},{height}"))
+            .arg("--remote-debugging-port=0")
+            .arg(address)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        let child = command
+            .spawn()
+            .map_err(|e| Failure(format!("the browser {} can't be started: {e}", program.display())))?;
+        Ok(Self { child, _profile: profile })
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Write the pictures as they arrive; gives their files, in their order.
+fn collect(
+    browser: &mut Browser,
+    arrived: &Receiver<(u64, Vec<u8>)>,
+    numbers: &[u64],
+    folder: &Path,
+    stop: &AtomicBool,
+) -> Result<Vec<PathBuf>, Failure> {
+    let bar = if std::io::stderr().is_terminal() {
+        ProgressBar::new(numbers.len() as u64)
+    } else {
+        ProgressBar::hidden()
+    };
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} pictures, {eta} left") {
+        bar.set_style(style);
+    }
+    let mut files = Vec::with_capacity(numbers.len());
+    let mut last = Instant::now();
+    while files.len() < numbers.len() {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Failure(format!("interrupted: {} pictures are drawn", files.len())));
+        }
+        match arrived.recv_timeout(LOOK) {
+            Ok((number, png)) => {
+                if number != files.len() as u64 || !png.starts_with(b"\x89PNG") {
+                    return Err(Failure(format!("the browser sent no picture {}", files.len())));
+                }
+                let path = folder.join(format!("frame_{number:05}.png"));
+                write_whole(&path, &png)?;
+                files.push(path);
+                last = Instant::now();
+                bar.inc(1);
+            }
+            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => {
+                if let Ok(Some(status)) = browser.child.try_wait() {
+                    return Err(Failure(format!("the browser has ended ({status}) before all pictures were drawn")));
+                }
+                if last.elapsed() > PATIENCE {
+                    return Err(Failure(format!(
+                        "the browser has drawn nothing for {} s: it may lack WebGL 2; try another with --browser",
+                        PATIENCE.as_secs()
+                    )));
+                }
+            }
+        }
+    }
+    bar.finish_and_clear();
+    Ok(files)
+}
+
+fn write_mp4(folder: &Path, fps: f64, path: &Path) -> Result<(), Failure> {
+    let output = Command::new("ffmpeg")
+        .args(["-y", "-loglevel", "error", "-framerate", &fps.to_string(), "-i"])
+        .arg(folder.join("frame_%05d.png"))
+        // Even sizes are all that the usual pixel format takes.
+        .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+        .arg(path)
+        .output()
+        .map_err(|e| Failure(format!("ffmpeg can't be started: {e}")))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    Err(Failure(format!("ffmpeg could not write {}: {}", path.display(), said.lines().last().unwrap_or("?"))))
+}

@@ -1,0 +1,143 @@
+//! `palpate serve`: a scene, live, in the browser.
+
+use crate::Failure;
+use crate::stages::{BUILT_IN, Stages};
+use crate::whole_file::stop_on_interrupt;
+use clap::Args;
+use indicatif::ProgressBar;
+use palpate_haptics::Scheduling;
+use palpate_viewer::{Exhibit, Live, Server, Settings, Stage, Workshop};
+use std::io::IsTerminal;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+/// See a scene in the browser and touch it with mouse, pen or fingers
+///
+/// The scene runs in real time, as `palpate run --realtime` does; the page shows it at display rate and its pointers are
+/// devices. Scenes without `pointer = true` get four pointers of a size that suits their objects. Without a scene file
+/// there are built-in scenes.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = "For example:
+  palpate serve                        # the built-in scenes
+  palpate serve scene.toml
+  palpate serve --listen 0.0.0.0:7400 --token 4f0c9d2e71   # for other machines, tablets and phones too")]
+pub struct Arguments {
+    /// A scene file; without one, the built-in scenes
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// The built-in scene to begin with: bounce, shake, pinch, stack, ball, slab
+    #[arg(long, value_name = "ID", conflicts_with = "file")]
+    scene: Option<String>,
+    /// How it is served
+    #[command(flatten)]
+    serving: Serving,
+}
+
+/// How a viewer is served.
+#[derive(Args, Debug, Clone, Default)]
+pub struct Serving {
+    /// Address and port of the page [default: 127.0.0.1:7400, or a free port if that is taken]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<SocketAddr>,
+    /// What whoever comes from another machine must know; part of the address that is printed
+    #[arg(long, value_name = "TEXT")]
+    token: Option<String>,
+    /// Do not open a browser
+    #[arg(long)]
+    no_browser: bool,
+    /// The core that the force process stays on, counted from 0; by default the last one
+    #[arg(long, value_name = "CORE")]
+    core: Option<usize>,
+    /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// The port of the page when none is asked for.
+const PORT: u16 = 7400;
+
+/// Real-time priority of the force process.
+const PRIORITY: u8 = 80;
+
+/// Run the verb.
+pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { file, scene, serving } = arguments;
+    match file {
+        Some(file) => serve_live(serving, |stages| stages.open_file(file)),
+        None => serve_built_in(serving, scene.as_deref().unwrap_or(BUILT_IN[0].id)),
+    }
+}
+
+/// Serve the built-in scenes, one of them first.
+pub fn serve_built_in(serving: &Serving, id: &str) -> Result<(), Failure> {
+    serve_live(serving, |stages| {
+        let bar =
+            if std::io::stderr().is_terminal() { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
+        let mut told = String::new();
+        let opened = stages.open(id, &mut |what, _| {
+            if told != what {
+                told = what.into();
+                bar.set_message(format!("recording (once): {what}"));
+                bar.tick();
+            }
+        });
+        bar.finish_and_clear();
+        opened.map_err(Failure)
+    })
+}
+
+fn serve_live(
+    serving: &Serving,
+    first: impl FnOnce(&Stages) -> Result<Stage, Failure>,
+) -> Result<(), Failure> {
+    let stages = Stages::new(serving.cache.as_deref())?;
+    // Before what takes long: a port that is taken is told at once.
+    let server = serving.bind()?;
+    let first = first(&stages)?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let core = serving.core.or(cores.checked_sub(1));
+    let scheduling = Scheduling { priority: Some(PRIORITY), core };
+    let live = Live { workshop: Arc::new(stages), first, scheduling };
+    serving.serve(server, Exhibit::Live(Box::new(live)))
+}
+
+impl Serving {
+    fn settings(&self, listen: SocketAddr) -> Settings {
+        Settings { listen, token: self.token.clone() }
+    }
+
+    /// Listen where it was asked for, or at the usual port, or at a free one.
+    pub fn bind(&self) -> Result<Server, Failure> {
+        if let Some(listen) = self.listen {
+            return Server::bind(&self.settings(listen)).map_err(Failure);
+        }
+        let here = |port| self.settings((Ipv4Addr::LOCALHOST, port).into());
+        Server::bind(&here(PORT)).or_else(|_| Server::bind(&here(0))).map_err(Failure)
+    }
+
+    /// Say where, open a browser, and answer until Ctrl-C.
+    pub fn serve(&self, server: Server, exhibit: Exhibit) -> Result<(), Failure> {
+        let mut address = format!("http://{}/", server.address().map_err(Failure)?);
+        if let Some(token) = &self.token {
+            address += &format!("?token={token}");
+        }
+        crate::tell(&format!("open {address} in a browser (Ctrl-C ends it)"));
+        if !self.no_browser {
+            open_browser(&address);
+        }
+        server.run(exhibit, stop_on_interrupt()).map_err(Failure)
+    }
+}
+
+/// Where there is a screen; whoever has none opens the address elsewhere.
+fn open_browser(address: &str) {
+    let screen = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
+    let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    if screen || cfg!(target_os = "macos") {
+        let quiet = Command::new(program).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        // A browser that does not open is opened by hand.
+        drop(quiet);
+    }
+}

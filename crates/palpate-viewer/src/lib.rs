@@ -1,0 +1,26 @@
+//! The viewer's server: a page in the browser sees a scene and touches it, or looks at a log.
+//!
+//! ```text
+//! page ⇄ socket ⇄ live scene (stage's manager, pointers at 1 kHz) ⇄ session of palpate-haptics
+//!               ↖ pictures: modal coordinates, poses and dents, 60 times a second
+//! ```
+//!
+//! docs/viewer-protocol.md is the contract with the page, `viewer/`, which is embedded here. A [`Workshop`] makes the scenes: the
+//! server knows neither scene files nor recording. No page can make the force process wait: pictures are taken from
+//! its newest state, and a page that is slow misses some.
+
+mod live;
+mod log_show;
+mod pointers;
+mod server;
+mod stage;
+mod wire;
+
+pub use log_show::{LogMaker, LogShow};
+pub use server::{Exhibit, Live, RenderJob, Server, Settings};
+pub use stage::{Opener, Stage, StageDevice, StageMover, Tell, Upload, Workshop};
+pub use wire::{
+    CameraView, CouplingDescription, DeviceDescription, Form, FrameTimes, MaterialDescription,
+    ObjectDescription, ObstacleDescription, PictureMaker, RenderWish, Rules, SceneDescription, SceneTitle,
+    ShapeDescription, View, mode_scales, shapes_bytes, surface_bytes,
+};

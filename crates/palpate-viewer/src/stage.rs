@@ -1,0 +1,89 @@
+//! A scene that can be run, and whoever makes such scenes.
+
+use crate::wire::{MaterialDescription, Rules, SceneDescription, SceneTitle};
+use palpate::{DeviceMode, Model, Pose};
+use palpate_haptics::{Attached, MotionPath};
+use std::sync::Arc;
+
+/// Where an obstacle is at a time of the simulation [s]. It must not allocate.
+pub type StageMover = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
+
+/// Opens a device; it is asked again when the scene begins anew.
+pub type Opener = Arc<dyn Fn() -> Result<Attached, String> + Send + Sync>;
+
+/// A scene that can be run as often as one likes.
+#[derive(Clone)]
+pub struct Stage {
+    /// What the page is told.
+    pub description: SceneDescription,
+    /// The scene.
+    pub model: Arc<Model>,
+    /// One for each device of the model.
+    pub devices: Vec<StageDevice>,
+    /// One for each obstacle.
+    pub movers: Vec<StageMover>,
+}
+
+/// Who moves a device.
+#[derive(Clone)]
+pub enum StageDevice {
+    /// A pointer of a page, when one comes.
+    Pointer,
+    /// A path in simulated time.
+    Following(MotionPath, DeviceMode),
+    /// A device on this machine.
+    Here(Opener),
+}
+
+/// A mesh file that a page sends.
+#[derive(Debug, Clone)]
+pub struct Upload {
+    /// Its file name.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// To metres.
+    pub scale: f64,
+    /// Of all of it.
+    pub material: MaterialDescription,
+    /// How many modes.
+    pub modes: usize,
+}
+
+/// How far a long job is: what it does, and its share, if known.
+pub type Tell<'a> = &'a mut (dyn FnMut(&str, Option<f64>) + Send);
+
+/// Makes scenes. Every error is a text for people.
+pub trait Workshop: Send + Sync + 'static {
+    /// The scenes that can be opened.
+    fn titles(&self) -> Vec<SceneTitle>;
+
+    /// One of them, by its id.
+    ///
+    /// # Errors
+    /// When there is none, or it can't be made.
+    fn open(&self, id: &str, tell: Tell) -> Result<Stage, String>;
+
+    /// The scene that was made last, under other rules.
+    ///
+    /// # Errors
+    /// When a number is out of its range.
+    fn change(&self, rules: &Rules) -> Result<Stage, String>;
+
+    /// The scene that was made last, with an object of another material.
+    ///
+    /// # Errors
+    /// When it can't be recorded.
+    fn change_material(
+        &self,
+        object: usize,
+        material: MaterialDescription,
+        tell: Tell,
+    ) -> Result<Stage, String>;
+
+    /// A scene of a mesh.
+    ///
+    /// # Errors
+    /// When it is none, or can't be recorded.
+    fn record(&self, upload: Upload, tell: Tell) -> Result<Stage, String>;
+}

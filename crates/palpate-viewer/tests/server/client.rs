@@ -1,0 +1,291 @@
+//! A page without a browser, and something to look at.
+
+use glam::DVec3;
+use palpate::{
+    Coupling, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording,
+    Shape, Twist,
+};
+use palpate_haptics::Scheduling;
+use palpate_viewer::{
+    Exhibit, Live, MaterialDescription, ObjectDescription, Rules, SceneDescription, SceneTitle, Server,
+    Settings, Stage, StageDevice, Tell, Upload, Workshop,
+};
+use serde_json::Value;
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use tungstenite::stream::MaybeTlsStream;
+use tungstenite::{Message, WebSocket};
+
+pub fn recording() -> Arc<Recording> {
+    let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
+}
+
+/// A body that floats above a floor, with two pointers.
+pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
+    let recording = recording();
+    let radius = recording.surface.radius();
+    let finger = DeviceParameters {
+        tip_radius: 0.1 * radius,
+        patch_radius: 0.2 * radius,
+        friction: 0.5,
+        coupling: Some(Coupling { stiffness: 200.0, damping: 0.5 }),
+    };
+    let parameters = ModelParameters {
+        step_s,
+        gravity,
+        devices: vec![finger; 2],
+        obstacles: vec![Obstacle {
+            shape: Shape::Plane { normal: DVec3::Y },
+            pose: Pose { position: DVec3::Y * -5.0 * radius, ..Pose::IDENTITY },
+            friction: 0.5,
+        }],
+        ..ModelParameters::default()
+    };
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let floor = parameters.obstacles[0].pose;
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start)]).expect("a model");
+    let model = Arc::new(model);
+    let object = ObjectDescription::new("body", &recording, vec!["a line".into()], true);
+    let devices = [("left".to_string(), true), ("right".to_string(), true)];
+    let titles = (Some("float".into()), "A body".into(), "It floats.".into());
+    let description = SceneDescription::new(titles, &model, vec![object], &["floor".into()], &devices);
+    Stage {
+        description,
+        model,
+        devices: vec![StageDevice::Pointer; 2],
+        movers: vec![Arc::new(move |_: f64| floor)],
+    }
+}
+
+struct OneScene;
+
+impl Workshop for OneScene {
+    fn titles(&self) -> Vec<SceneTitle> {
+        vec![SceneTitle { id: "float".into(), title: "A body".into(), about: "It floats.".into() }]
+    }
+
+    fn open(&self, id: &str, tell: Tell) -> Result<Stage, String> {
+        tell("looking", Some(0.5));
+        if id == "float" { Ok(stage(DVec3::ZERO, 1e-3)) } else { Err(format!("there is no scene {id:?}")) }
+    }
+
+    fn change(&self, rules: &Rules) -> Result<Stage, String> {
+        let gravity = rules.gravity.map_or(DVec3::ZERO, DVec3::from_array);
+        Ok(stage(gravity, rules.step.unwrap_or(1e-3)))
+    }
+
+    fn change_material(&self, _: usize, material: MaterialDescription, _: Tell) -> Result<Stage, String> {
+        Err(format!("E = {}", material.young))
+    }
+
+    fn record(&self, upload: Upload, _: Tell) -> Result<Stage, String> {
+        Err(format!("{} bytes of {}", upload.bytes.len(), upload.name))
+    }
+}
+
+/// A server on a free port, until it is dropped.
+pub struct Served {
+    pub address: SocketAddr,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Served {
+    pub fn live() -> Self {
+        let scheduling = Scheduling { priority: None, core: None };
+        let first = stage(DVec3::ZERO, 1e-3);
+        Self::new(Exhibit::Live(Box::new(Live { workshop: Arc::new(OneScene), first, scheduling })))
+    }
+
+    pub fn new(exhibit: Exhibit) -> Self {
+        let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
+        let server = Server::bind(&settings).expect("a free port");
+        let address = server.address().expect("an address");
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = stop.clone();
+        let thread = Some(std::thread::spawn(move || server.run(exhibit, &stopped).expect("it runs")));
+        Self { address, stop, thread }
+    }
+
+    pub fn page(&self) -> Page {
+        let address = format!("ws://{}/session", self.address);
+        let (socket, _) = tungstenite::connect(address).expect("a session");
+        if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
+            stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+        }
+        Page { socket }
+    }
+
+    /// Status and body.
+    pub fn request(&self, head: &str, body: &[u8]) -> (u16, Vec<u8>) {
+        let mut stream = TcpStream::connect(self.address).expect("it listens");
+        stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+        let host = if head.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
+        let length = body.len();
+        write!(stream, "{head} HTTP/1.1\r\n{host}Content-Length: {length}\r\nConnection: close\r\n\r\n")
+            .or_else(|_| Ok::<(), std::io::Error>(()))
+            .expect("written or refused");
+        let _ = stream.write_all(body);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let end = answer.windows(4).position(|four| four == b"\r\n\r\n").map_or(answer.len(), |at| at + 4);
+        let status = String::from_utf8_lossy(&answer[..end]).split(' ').nth(1).and_then(|s| s.parse().ok());
+        (status.unwrap_or(0), answer[end..].to_vec())
+    }
+
+    pub fn get(&self, path: &str) -> (u16, Vec<u8>) {
+        self.request(&format!("GET {path}"), b"")
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What a picture of the scene above says.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    pub form: u32,
+    pub generation: u32,
+    pub step: u32,
+    pub time_s: f64,
+    pub position: DVec3,
+    /// Places of the surface nodes [m, body].
+    pub places: Vec<DVec3>,
+    /// What each device does, where it is, and the force on it.
+    pub devices: Vec<(u32, DVec3, DVec3)>,
+    pub bytes: usize,
+}
+
+/// Reads little-endian numbers one after the other.
+struct Cursor<'a>(&'a [u8]);
+
+impl Cursor<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let (now, later) = self.0.split_at(N);
+        self.0 = later;
+        now.try_into().expect("so many bytes")
+    }
+
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+
+    fn f32(&mut self) -> f64 {
+        f64::from(f32::from_le_bytes(self.take()))
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.f32(), self.f32(), self.f32())
+    }
+}
+
+/// Mode shapes as they are sent.
+pub fn shapes(bytes: &[u8]) -> Vec<Vec<DVec3>> {
+    let mut cursor = Cursor(bytes);
+    let (n, m) = (cursor.u32() as usize, cursor.u32() as usize);
+    cursor.0 = &cursor.0[4 * m..];
+    let half = |cursor: &mut Cursor| {
+        let bits = u32::from(u16::from_le_bytes(cursor.take()));
+        let (sign, exponent, fraction) = (bits >> 15, bits >> 10 & 31, bits & 1023);
+        let value = match exponent {
+            0 => f64::from(fraction) * 2.0_f64.powi(-24),
+            _ => (1.0 + f64::from(fraction) / 1024.0) * 2.0_f64.powi(exponent as i32 - 15),
+        };
+        if sign == 1 { -value } else { value }
+    };
+    let node = |cursor: &mut Cursor| DVec3::new(half(cursor), half(cursor), half(cursor));
+    (0..m).map(|_| (0..n).map(|_| node(&mut cursor)).collect()).collect()
+}
+
+pub fn read_picture(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Picture {
+    let mut cursor = Cursor(bytes);
+    assert_eq!(&cursor.take(), b"PLPF");
+    let (form, generation, step) = (cursor.u32(), cursor.u32(), cursor.u32());
+    let time_s = f64::from_le_bytes(cursor.take());
+    (0..10).for_each(|_| drop(cursor.f32()));
+    let counts: [u32; 4] = std::array::from_fn(|_| cursor.u32());
+    assert_eq!(&counts[..3], [1, 1, 2]);
+    cursor.u32();
+    cursor.u32();
+    let position = cursor.vector();
+    (0..4).for_each(|_| drop(cursor.f32()));
+    let mut places = recording().surface.positions.clone();
+    let count = cursor.u32() as usize;
+    if form == 1 {
+        for shape in &shapes[..count] {
+            let q = cursor.f32();
+            places.iter_mut().zip(shape).for_each(|(place, shape)| *place += *shape * q);
+        }
+        let (k, unit) = (cursor.u32() as usize, cursor.f32());
+        let (steps, rest) = cursor.0.split_at((2 * k).next_multiple_of(4));
+        let (values, rest) = rest.split_at((3 * k).next_multiple_of(4));
+        let mut node = 0;
+        for at in 0..k {
+            node += usize::from(u16::from_le_bytes([steps[2 * at], steps[2 * at + 1]]));
+            let axis = |axis: usize| f64::from(values[3 * at + axis] as i8) * unit;
+            places[node] += DVec3::new(axis(0), axis(1), axis(2));
+        }
+        cursor.0 = rest;
+    } else {
+        places.iter_mut().take(count).for_each(|place| *place = cursor.vector());
+    }
+    (0..7).for_each(|_| drop(cursor.f32()));
+    let device = |cursor: &mut Cursor| {
+        let (doing, position) = (cursor.u32(), cursor.vector());
+        cursor.vector();
+        (doing, position, cursor.vector())
+    };
+    let devices = (0..2).map(|_| device(&mut cursor)).collect();
+    assert_eq!(cursor.0.len(), counts[3] as usize * 32, "contacts");
+    Picture { form, generation, step, time_s, position, places, devices, bytes: bytes.len() }
+}
+
+/// A session.
+pub struct Page {
+    pub socket: WebSocket<MaybeTlsStream<TcpStream>>,
+}
+
+impl Page {
+    pub fn send(&mut self, text: &str) {
+        let _ = self.socket.send(Message::text(text.to_string()));
+    }
+
+    /// The next message of a type.
+    pub fn wait(&mut self, kind: &str) -> Value {
+        let until = Instant::now() + Duration::from_secs(20);
+        while Instant::now() < until {
+            if let Message::Text(text) = self.socket.read().expect("a message") {
+                let value: Value = serde_json::from_str(&text).expect("JSON");
+                if value["type"] == kind {
+                    return value;
+                }
+            }
+        }
+        panic!("no {kind} within 20 s");
+    }
+
+    /// The next picture that is so.
+    pub fn picture(&mut self, shapes: &[Vec<DVec3>], mut is: impl FnMut(&Picture) -> bool) -> Picture {
+        let until = Instant::now() + Duration::from_secs(20);
+        while Instant::now() < until {
+            if let Message::Binary(bytes) = self.socket.read().expect("a message") {
+                let picture = read_picture(&bytes, shapes);
+                if is(&picture) {
+                    return picture;
+                }
+            }
+        }
+        panic!("no such picture within 20 s");
+    }
+}

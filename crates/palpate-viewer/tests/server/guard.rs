@@ -1,0 +1,91 @@
+//! Strangers, and pages that do harm.
+
+use super::client::{Served, shapes};
+use palpate_viewer::{Server, Settings};
+use tungstenite::Message;
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
+use tungstenite::protocol::frame::coding::CloseCode;
+
+#[test]
+fn other_hosts_other_origins_and_paths_out_of_the_page_get_nothing() {
+    let served = Served::live();
+    assert_eq!(served.request("GET / HTTP/1.1\r\nHost: evil.example\r\nX-A: b\r\nX-B:", b"").0, 403);
+    let mut request = format!("ws://{}/session", served.address).into_client_request().expect("a request");
+    request.headers_mut().insert("Origin", HeaderValue::from_static("http://evil.example"));
+    assert!(tungstenite::connect(request).is_err(), "a page from elsewhere");
+    let mut request = format!("ws://{}/session", served.address).into_client_request().expect("a request");
+    let own = HeaderValue::from_str(&format!("http://{}", served.address)).expect("an origin");
+    request.headers_mut().insert("Origin", own);
+    assert!(tungstenite::connect(request).is_ok(), "its own page");
+    assert_eq!(served.get("/").0, 200);
+    for path in [
+        "/../Cargo.toml",
+        "/..%2f..%2fCargo.toml",
+        "/%2e%2e/%2e%2e/Cargo.toml",
+        "//etc/passwd",
+        "/assets/../../Cargo.toml",
+        "/log/0/frames?from=0&count=1",
+        "/log/99999999999999999999/series",
+    ] {
+        let (status, body) = served.get(path);
+        assert!((400..500).contains(&status), "{path}: {status}");
+        assert!(!String::from_utf8_lossy(&body).contains("[package]"), "{path}");
+    }
+    assert_eq!(served.request("POST /record?name=a", b"x").0, 400);
+    assert_eq!(served.request("POST /record?name=a&young=NaN&poisson=0&density=1", b"x").0, 400);
+    assert_eq!(served.request("POST /picture/0", b"x").0, 404);
+}
+
+#[test]
+fn beyond_loopback_nothing_is_served_without_a_token() {
+    let listen = ([0, 0, 0, 0], 0).into();
+    let refused = Server::bind(&Settings { listen, token: None }).expect_err("no token");
+    assert!(refused.contains("give a token"), "{refused}");
+    assert!(Server::bind(&Settings { listen, token: Some("short".into()) }).is_err());
+    assert!(Server::bind(&Settings { listen, token: Some("long enough".into()) }).is_ok());
+    let served = Served::live();
+    let taken = Server::bind(&Settings { listen: served.address, token: None }).expect_err("taken");
+    assert!(taken.contains("listens at"), "{taken}");
+}
+
+#[test]
+fn a_page_that_floods_is_sent_away_and_garbage_does_not_stop_the_scene() {
+    let served = Served::live();
+    let mut good = served.page();
+    let generation = good.wait("scene")["generation"].as_u64().expect("a generation");
+    let shapes = shapes(&served.get(&format!("/scene/{generation}/object/0/shapes")).1);
+    let before = good.picture(&shapes, |_| true).step;
+    let mut bad = served.page();
+    for garbage in [
+        "",
+        "{",
+        r#"{"type":"move","pointers":[{"pointer":1,"position":[1e999,0,0]}]}"#,
+        r#"{"type":"press","pointer":1,"mode":"touch","position":[1e300,0,0]}"#,
+        r#"{"type":"material","object":99,"young":-1,"poisson":9,"density":0}"#,
+        r#"{"type":"slow","slowness":4294967295}"#,
+        r#"{"type":"slow","slowness":1}"#,
+    ] {
+        bad.send(garbage);
+    }
+    bad.wait("error");
+    bad.wait("error");
+    let _ = bad.socket.send(Message::Binary(vec![0; 1000].into()));
+    for _ in 0..3000 {
+        if bad.socket.write(Message::text(r#"{"type":"release","pointer":1}"#)).is_err() {
+            break;
+        }
+    }
+    let _ = bad.socket.flush();
+    let closed = std::iter::from_fn(|| bad.socket.read().ok()).find_map(|message| match message {
+        Message::Close(frame) => frame.map(|frame| frame.code),
+        _ => None,
+    });
+    assert!(closed.is_none_or(|code| code == CloseCode::Policy), "{closed:?}");
+    let mut huge = served.page();
+    huge.send(&"x".repeat(70_000));
+    let ended = std::iter::from_fn(|| huge.socket.read().ok()).take(10_000).count();
+    assert!(ended < 10_000, "a message that is too large ends the session");
+    let after = good.picture(&shapes, |picture| picture.step > before + 100);
+    assert!(after.time_s > 0.0);
+}

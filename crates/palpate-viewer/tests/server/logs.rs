@@ -1,0 +1,95 @@
+//! Logs that are looked at, and pictures that are drawn from them.
+
+use super::client::{Served, read_picture, shapes, stage};
+use glam::DVec3;
+use palpate::{DeviceInput, Input, State, step};
+use palpate_haptics::Moment;
+use palpate_viewer::{Exhibit, LogShow, RenderJob, RenderWish};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+
+/// Frames of a body that falls, one every 20 steps.
+fn log(number: usize, frames: u64) -> Arc<LogShow> {
+    let stage = stage(DVec3::Y * -9.81, 1e-3);
+    let model = stage.model.clone();
+    let (show, mut maker) =
+        LogShow::new(number, format!("{number}.mcap"), model.clone(), stage.description, frames, 0.02);
+    let mut state = State::new(&model);
+    let input = Input {
+        devices: vec![DeviceInput::away(); 2],
+        obstacles: vec![model.parameters().obstacles[0].pose],
+    };
+    let mut moment = Moment::new(&model, &state, &input);
+    for number in 1..=20 * frames {
+        step(&model, &mut state, &input);
+        if number % 20 == 0 {
+            moment.take(number, &input, &state);
+            maker.take(&moment);
+        }
+    }
+    maker.finish(None);
+    show
+}
+
+/// Pictures as they are sent, each after its length.
+fn pieces(mut bytes: &[u8]) -> Vec<&[u8]> {
+    let mut all = Vec::new();
+    while let Some((length, rest)) = bytes.split_first_chunk::<4>() {
+        let (piece, rest) = rest.split_at(u32::from_le_bytes(*length) as usize);
+        all.push(piece);
+        bytes = rest;
+    }
+    all
+}
+
+#[test]
+fn two_logs_are_told_and_their_frames_and_series_are_fetched() {
+    let served = Served::new(Exhibit::Logs(vec![log(0, 30), log(1, 12)]));
+    let mut page = served.page();
+    let hello = page.wait("hello");
+    assert_eq!((&hello["kind"], &hello["logs"][1]["name"]), (&"logs".into(), &"1.mcap".into()));
+    let (first, second) = (page.wait("scene"), page.wait("scene"));
+    assert_eq!((&first["log"], &first["frames"], &second["frames"]), (&0.into(), &30.into(), &12.into()));
+    assert_eq!(page.wait("progress")["done"], true);
+    let shapes = shapes(&served.get("/scene/1/object/0/shapes").1);
+    let (status, bytes) = served.get("/log/1/frames?from=3&count=5");
+    let frames = pieces(&bytes);
+    assert_eq!((status, frames.len()), (200, 5));
+    let picture = read_picture(frames[0], &shapes);
+    assert_eq!((picture.step, picture.generation), (80, 1));
+    // ½·g·t², to the first order of the step.
+    assert!((picture.position.y + 0.5 * 9.81 * 0.08 * 0.08).abs() < 1e-3, "{}", picture.position);
+    assert_eq!(pieces(&served.get("/log/1/frames?from=10&count=1000").1).len(), 2);
+    assert!(served.get("/log/1/frames?from=12&count=1").1.is_empty());
+    assert_eq!(served.get("/log/1/frames?from=-1&count=1").0, 400);
+    assert_eq!(served.get("/log/2/frames?from=0&count=1").0, 404);
+    let series: serde_json::Value = serde_json::from_slice(&served.get("/log/0/series").1).expect("JSON");
+    assert_eq!(
+        (series["t"].as_array().map(Vec::len), &series["devices"][0]["name"]),
+        (Some(30), &"left".into())
+    );
+    let potential = series["energy"]["potential"].as_array().expect("energies");
+    assert!(potential[29].as_f64() < potential[0].as_f64());
+}
+
+#[test]
+fn a_page_that_draws_is_told_what_and_its_pictures_arrive() {
+    let (pictures, arrived) = channel();
+    let wish = RenderWish {
+        frames: vec![0, 7],
+        width: 640,
+        height: 480,
+        camera: None,
+        colour: "plain".into(),
+        dark: true,
+    };
+    let served = Served::new(Exhibit::Render(log(0, 10), RenderJob { wish, pictures }));
+    let mut page = served.page();
+    let hello = page.wait("hello");
+    assert_eq!((&hello["kind"], &hello["render"]["frames"]), (&"render".into(), &serde_json::json!([0, 7])));
+    for number in 0..2_u64 {
+        let (status, _) = served.request(&format!("POST /picture/{number}"), &[number as u8; 5]);
+        assert_eq!(status, 204);
+        assert_eq!(arrived.recv().expect("a picture"), (number, vec![number as u8; 5]));
+    }
+}
