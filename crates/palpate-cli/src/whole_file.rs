@@ -11,10 +11,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Files that have not taken their names yet, and folders that were made for them.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-fn note(temporary: &Path) {
-    if let Ok(mut unfinished) = UNFINISHED.lock() {
+/// Note a file or a folder and make it, as one: no interrupt comes between.
+fn noted<T>(temporary: &Path, make: impl FnOnce(&Path) -> T) -> T {
+    let unfinished = UNFINISHED.lock().map(|mut unfinished| {
         unfinished.insert(temporary.to_path_buf());
-    }
+        unfinished
+    });
+    let made = make(temporary);
+    drop(unfinished);
+    made
 }
 
 fn forget(temporary: &Path) {
@@ -44,6 +49,8 @@ pub fn remove_unfinished_on_interrupt() {
             // What lies in a folder sorts after it; a folder with anything else in it stays.
             let gone = |path: &PathBuf| std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
             unfinished.iter().rev().for_each(|path| drop(gone(path)));
+            // Still locked: nothing new is begun.
+            std::process::exit(130);
         }
         std::process::exit(130);
     });
@@ -63,8 +70,11 @@ impl WholeFile {
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-        note(&temporary);
-        let file = File::create(&temporary).map_err(|e| Failure::file("write", &path, &e))?;
+        let file = noted(&temporary, |place| File::create(place));
+        let file = file.map_err(|e| {
+            forget(&temporary);
+            Failure::file("write", &path, &e)
+        })?;
         Ok(Self { writer: Some(BufWriter::new(file)), temporary, path })
     }
 
@@ -129,12 +139,15 @@ pub struct MadeFolder {
 impl MadeFolder {
     /// Make it, and those around it, if they are not there.
     pub fn create(path: &Path) -> Result<Self, Failure> {
-        let made = !path.exists();
-        std::fs::create_dir_all(path).map_err(|e| Failure::file("make the folder", path, &e))?;
-        if made {
-            note(path);
+        if path.is_dir() {
+            return Ok(Self { path: path.to_path_buf(), made: false });
         }
-        Ok(Self { path: path.to_path_buf(), made })
+        let made = noted(path, |path| std::fs::create_dir_all(path));
+        made.map_err(|e| {
+            forget(path);
+            Failure::file("make the folder", path, &e)
+        })?;
+        Ok(Self { path: path.to_path_buf(), made: true })
     }
 
     /// Where it is.

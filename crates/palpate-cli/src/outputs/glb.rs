@@ -229,3 +229,22 @@ impl Content {
         self.materials.len() - 1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_that_the_file_can_not_state_is_refused_with_what_to_do() {
+        let path = Path::new("run.glb");
+        assert_eq!(check_size(u64::from(u32::MAX), path), Ok(()));
+        let refused = check_size(5_000_000_000, path).map_err(|failure| failure.0);
+        assert_eq!(
+            refused.err().as_deref(),
+            Some(
+                "run.glb would have 5.0 GB, a GLB file has 4.29 GB at most: export fewer frames with --fps, or a part \
+                 with --from and --to"
+            )
+        );
+    }
+}

@@ -59,7 +59,7 @@ impl GlbScene {
             let colour = OBJECTS[at % OBJECTS.len()];
             objects.push(Deforming::new(&mut glb, name, &surface.positions, &surface.triangles, colour)?);
         }
-        warn_of_size(path, expected_bytes(&objects, frames as u64), frames)?;
+        warn_of_size(path, expected_bytes(objects.iter().map(Deforming::size), frames as u64), frames)?;
 
         let extent = Extent::of(scene, state);
         let mut obstacles = Vec::new();
@@ -118,16 +118,15 @@ impl GlbScene {
     }
 }
 
-/// Bytes that so many frames of some objects will take.
-fn expected_bytes(objects: &[Deforming], frames: u64) -> u64 {
-    let each = |object: &Deforming| {
-        let (vertices, triangles) = object.size();
+/// Bytes that so many frames of objects of some vertices and triangles will take.
+fn expected_bytes(objects: impl Iterator<Item = (usize, usize)>, frames: u64) -> u64 {
+    let each = |(vertices, triangles): (usize, usize)| {
         let (vertices, triangles) = (vertices as u64, triangles as u64);
         let weights = frames.saturating_mul(frames).saturating_mul(4);
         let shapes = (24 * vertices + TEXT_PER_FRAME).saturating_mul(frames);
         shapes.saturating_add(weights).saturating_add(24 * vertices + 12 * triangles)
     };
-    objects.iter().map(each).fold(0, u64::saturating_add)
+    objects.map(each).fold(0, u64::saturating_add)
 }
 
 fn warn_of_size(path: &Path, bytes: u64, frames: usize) -> Result<(), Failure> {
@@ -143,4 +142,23 @@ fn warn_of_size(path: &Path, bytes: u64, frames: usize) -> Result<(), Failure> {
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_foretold_and_absurd_ones_are_refused_before_anything_is_computed() {
+        let path = Path::new("run.glb");
+        // 10 s at 30 frames a second of 866 vertices: two vectors of 12 bytes each, 300 weights a frame, and text.
+        let bytes = expected_bytes([(866, 1728)].into_iter(), 301);
+        assert!((6_500_000..7_500_000).contains(&bytes), "{bytes}");
+        assert_eq!(warn_of_size(path, bytes, 301), Ok(()));
+        // Weights alone are the square of the frames.
+        let bytes = expected_bytes([(866, 1728)].into_iter(), 36_000);
+        assert!(bytes > 4 * 36_000 * 36_000 && warn_of_size(path, bytes, 36_000).is_err());
+        let bytes = expected_bytes([(1 << 40, 1 << 41)].into_iter(), 1 << 60);
+        assert_eq!((bytes, warn_of_size(path, bytes, 1 << 60).is_err()), (u64::MAX, true));
+    }
 }

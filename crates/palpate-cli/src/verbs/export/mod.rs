@@ -23,10 +23,10 @@ use std::path::{Path, PathBuf};
 #[command(group(ArgGroup::new("outputs").required(true).multiple(true).args(["csv", "contacts", "vtu", "gltf"])))]
 #[command(after_help = "For example:
   palpate run scene.toml --realtime --duration 10 --log run.mcap
-  palpate export run.mcap --gltf run.glb                       # Blender, three.js, Windows, macOS
+  palpate export run.mcap --gltf run.glb                       # for Blender, or a browser
   palpate export run.mcap --vtu frames --fps 100 --from 2 --to 4
   palpate export run.mcap --csv steps.csv --contacts contacts.csv
-  palpate export cube.palp --gltf modes.glb --modes 6          # a morph target and an animation per mode
+  palpate export cube.palp --gltf modes.glb --modes 6          # an animation per mode
   palpate export cube.palp --vtu modes --csv modes.csv
 A scene that needs no clock: palpate run scene.toml --vtu frames. docs/export.md tells how to go on in each program.")]
 pub struct Arguments {
