@@ -3,9 +3,10 @@
 //! Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
 //! input is bad or a check failed; 2: the command line is wrong.
 
-mod csv;
 mod dense;
 mod failure;
+mod logged_run;
+mod outputs;
 mod plot;
 mod progress;
 mod report;
@@ -16,7 +17,6 @@ mod source;
 mod stages;
 mod verbs;
 mod verification;
-mod vtu;
 mod whole_file;
 
 pub use failure::Failure;
@@ -43,6 +43,7 @@ enum Verb {
     Run(verbs::run::Arguments),
     Serve(verbs::serve::Arguments),
     Replay(verbs::replay::Arguments),
+    Export(verbs::export::Arguments),
     Device(Box<verbs::device::Arguments>),
     Devices(verbs::devices::Arguments),
     Reproduce(verbs::reproduce::Arguments),
@@ -69,6 +70,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Run(arguments) => verbs::run::run(&arguments),
         Verb::Serve(arguments) => verbs::serve::serve(&arguments),
         Verb::Replay(arguments) => verbs::replay::replay(&arguments),
+        Verb::Export(arguments) => verbs::export::export(&arguments),
         Verb::Device(arguments) => verbs::device::device(&arguments),
         Verb::Devices(arguments) => verbs::devices::devices(&arguments),
         Verb::Reproduce(arguments) => verbs::reproduce::reproduce(&arguments),

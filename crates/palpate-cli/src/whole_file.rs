@@ -1,18 +1,30 @@
 //! Output files that are either whole or not there.
 
 use crate::Failure;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Files that have not taken their names yet.
-static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Files that have not taken their names yet, and folders that were made for them.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-fn note(temporary: &Path) {
+/// Note a file or a folder and make it, as one: no interrupt comes between.
+fn noted<T>(temporary: &Path, make: impl FnOnce(&Path) -> T) -> T {
+    let unfinished = UNFINISHED.lock().map(|mut unfinished| {
+        unfinished.insert(temporary.to_path_buf());
+        unfinished
+    });
+    let made = make(temporary);
+    drop(unfinished);
+    made
+}
+
+fn forget(temporary: &Path) {
     if let Ok(mut unfinished) = UNFINISHED.lock() {
-        unfinished.push(temporary.to_path_buf());
+        unfinished.remove(temporary);
     }
 }
 
@@ -34,7 +46,11 @@ pub fn remove_unfinished_on_interrupt() {
             return;
         }
         if let Ok(unfinished) = UNFINISHED.lock() {
-            unfinished.iter().for_each(|path| drop(std::fs::remove_file(path)));
+            // What lies in a folder sorts after it; a folder with anything else in it stays.
+            let gone = |path: &PathBuf| std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+            unfinished.iter().rev().for_each(|path| drop(gone(path)));
+            // Still locked: nothing new is begun.
+            std::process::exit(130);
         }
         std::process::exit(130);
     });
@@ -54,8 +70,11 @@ impl WholeFile {
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-        note(&temporary);
-        let file = File::create(&temporary).map_err(|e| Failure::file("write", &path, &e))?;
+        let file = noted(&temporary, |place| File::create(place));
+        let file = file.map_err(|e| {
+            forget(&temporary);
+            Failure::file("write", &path, &e)
+        })?;
         Ok(Self { writer: Some(BufWriter::new(file)), temporary, path })
     }
 
@@ -65,13 +84,25 @@ impl WholeFile {
         writer.write_all(bytes).map_err(|e| Failure::file("write", &self.path, &e))
     }
 
-    /// Let the file take its name.
-    pub fn finish(mut self) -> Result<(), Failure> {
+    /// The file is written, and waits for others before it takes its name: one of a series that is whole or not there.
+    pub fn close(&mut self) -> Result<(), Failure> {
+        let Some(writer) = self.writer.take() else { return Ok(()) };
+        writer.into_inner().map(drop).map_err(|e| Failure::file("write", &self.path, &e.into_error()))
+    }
+
+    /// Where it will be.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Let the file take its name; gives that.
+    pub fn finish(mut self) -> Result<PathBuf, Failure> {
         let failed = |e: std::io::Error| Failure::file("write", &self.path, &e);
         if let Some(writer) = self.writer.take() {
             writer.into_inner().map_err(|e| failed(e.into_error()))?.sync_all().map_err(failed)?;
         }
-        std::fs::rename(&self.temporary, &self.path).map_err(failed)
+        std::fs::rename(&self.temporary, &self.path).map_err(failed)?;
+        Ok(self.path.clone())
     }
 }
 
@@ -95,8 +126,41 @@ impl Drop for WholeFile {
     fn drop(&mut self) {
         // After `finish` there is nothing left to remove.
         let _ = std::fs::remove_file(&self.temporary);
-        if let Ok(mut unfinished) = UNFINISHED.lock() {
-            unfinished.retain(|path| *path != self.temporary);
+        forget(&self.temporary);
+    }
+}
+
+/// A folder for a series of files. If it was not there before, it goes when it is left empty.
+pub struct MadeFolder {
+    path: PathBuf,
+    made: bool,
+}
+
+impl MadeFolder {
+    /// Make it, and those around it, if they are not there.
+    pub fn create(path: &Path) -> Result<Self, Failure> {
+        if path.is_dir() {
+            return Ok(Self { path: path.to_path_buf(), made: false });
+        }
+        let made = noted(path, |path| std::fs::create_dir_all(path));
+        made.map_err(|e| {
+            forget(path);
+            Failure::file("make the folder", path, &e)
+        })?;
+        Ok(Self { path: path.to_path_buf(), made: true })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for MadeFolder {
+    fn drop(&mut self) {
+        if self.made {
+            let _ = std::fs::remove_dir(&self.path);
+            forget(&self.path);
         }
     }
 }
@@ -118,6 +182,21 @@ fn target(path: &Path, inputs: &[&Path]) -> Result<PathBuf, Failure> {
     Ok(real)
 }
 
+/// Refuse options that name the same file as an output.
+pub fn check_apart(outputs: &[(&str, Option<&Path>)]) -> Result<(), Failure> {
+    let given = outputs.iter().filter_map(|(option, path)| Some((option, (*path)?)));
+    let given: Vec<_> = given.collect();
+    for (at, (second, b)) in given.iter().enumerate() {
+        if let Some((first, _)) = given[..at].iter().find(|(_, a)| is_same_file(a, b)) {
+            return Err(Failure(format!(
+                "cannot write {}: {first} and {second} name the same file",
+                b.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// Whether two outputs would be one file; what can't be written is told of elsewhere.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let real = |path: &Path| {
@@ -136,5 +215,5 @@ pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let mut file = WholeFile::create(path, &[])?;
     file.write(bytes)?;
-    file.finish()
+    file.finish().map(drop)
 }

@@ -14,8 +14,10 @@ pub use drivers::{RealDevice, STRONGEST_N, known_driver};
 use entries::SceneFile;
 use glam::DVec3;
 use palpate::{
-    DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, MotionRule, Pose, RigidCompliance,
+    DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters, MotionRule, Pose,
+    RigidCompliance,
 };
+use palpate_fem::mesh::SurfaceMesh;
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{Hand, Traits};
 use palpate_haptics::log::Names;
@@ -73,6 +75,8 @@ pub struct SceneObstacle {
     pub path: Option<MotionPath>,
     /// Where it is without a path, and how it is turned when the path does not say.
     pub start: Pose,
+    /// Its surface, if it is a mesh.
+    pub mesh: Option<Arc<SurfaceMesh>>,
 }
 
 /// Lengths [m], velocities and accelerations beyond this are no scene's.
@@ -110,6 +114,16 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(|device| device.name.clone()).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+        }
+    }
+
+    /// Where all paths are at a time [s].
+    pub fn input_at(&self, time: f64) -> Input {
+        let devices = self.devices.iter();
+        let devices = devices.map(|device| DeviceInput { position: device.at(time), mode: device.mode });
+        Input {
+            devices: devices.collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.at(time)).collect(),
         }
     }
 

@@ -6,6 +6,7 @@ use super::place::{Quantity, Source};
 use crate::{Failure, source as mesh_source};
 use glam::{DQuat, DVec3};
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
+use palpate_fem::mesh::SurfaceMesh;
 use palpate_haptics::{Columns, orientation};
 use std::sync::Arc;
 use toml::Spanned;
@@ -26,7 +27,7 @@ pub(super) fn read_plane(
     let name = name_or(plane.name.as_ref(), "plane", number);
     Ok((
         Obstacle { shape: Shape::Plane { normal }, pose, friction },
-        SceneObstacle { name, path: None, start: pose },
+        SceneObstacle { name, path: None, start: pose, mesh: None },
     ))
 }
 
@@ -39,7 +40,7 @@ pub(super) fn read_obstacle(
 ) -> Result<(Obstacle, SceneObstacle), Failure> {
     let obstacle = entry.get_ref();
     let name = name_or(obstacle.name.as_ref(), "obstacle", number);
-    let shape = read_shape(source, entry, &name, remarks)?;
+    let (shape, mesh) = read_shape(source, entry, &name, remarks)?;
     let friction = source.friction(obstacle.friction.as_ref())?;
     if let (Some(position), Some(_)) = (&obstacle.position, &obstacle.path) {
         return source.fail(position.span(), "the position is in the path: leave one of the two out");
@@ -61,7 +62,7 @@ pub(super) fn read_obstacle(
         }
         path = Some(read);
     }
-    let placed = SceneObstacle { name, path, start };
+    let placed = SceneObstacle { name, path, start, mesh };
     Ok((Obstacle { shape, pose: placed.at(0.0), friction }, placed))
 }
 
@@ -79,11 +80,13 @@ fn read_shape(
     entry: &Spanned<ObstacleEntry>,
     name: &str,
     remarks: &mut Vec<String>,
-) -> Result<Shape, Failure> {
+) -> Result<(Shape, Option<Arc<SurfaceMesh>>), Failure> {
     let obstacle = entry.get_ref();
     let length = |key, number| source.positive(number, Quantity::length(key));
     match (&obstacle.sphere, &obstacle.cuboid, &obstacle.capsule, &obstacle.mesh) {
-        (Some(sphere), None, None, None) => Ok(Shape::Sphere { radius: length("radius", &sphere.radius)? }),
+        (Some(sphere), None, None, None) => {
+            Ok((Shape::Sphere { radius: length("radius", &sphere.radius)? }, None))
+        }
         (None, Some(cuboid), None, None) => {
             let Numbers(given) = *cuboid.half_extents.get_ref();
             if given.iter().any(|half| *half <= 0.0) {
@@ -92,13 +95,16 @@ fn read_shape(
                     format!("half_extents are {given:?} m, expected three numbers above 0"),
                 );
             }
-            Ok(Shape::Box { half_extents: DVec3::from_array(given) })
+            Ok((Shape::Box { half_extents: DVec3::from_array(given) }, None))
         }
-        (None, None, Some(capsule), None) => Ok(Shape::Capsule {
-            radius: length("radius", &capsule.radius)?,
-            half_length: length("half_length", &capsule.half_length)?,
-        }),
-        (None, None, None, Some(mesh)) => Ok(Shape::Mesh(Arc::new(read_mesh(source, mesh, name, remarks)?))),
+        (None, None, Some(capsule), None) => {
+            let radius = length("radius", &capsule.radius)?;
+            Ok((Shape::Capsule { radius, half_length: length("half_length", &capsule.half_length)? }, None))
+        }
+        (None, None, None, Some(mesh)) => {
+            let (shape, surface) = read_mesh(source, mesh, name, remarks)?;
+            Ok((Shape::Mesh(Arc::new(shape)), Some(Arc::new(surface))))
+        }
         _ => source.fail(
             entry.span(),
             format!("the obstacle {name:?} needs one shape: sphere, box, capsule or mesh"),
@@ -111,7 +117,7 @@ fn read_mesh(
     entry: &MeshEntry,
     name: &str,
     remarks: &mut Vec<String>,
-) -> Result<ObstacleMesh, Failure> {
+) -> Result<(ObstacleMesh, SurfaceMesh), Failure> {
     let place = entry.file.span();
     let path = source.relative(entry.file.get_ref());
     let scale = Quantity { key: "scale", unit: "", below: super::LARGEST };
@@ -125,6 +131,7 @@ fn read_mesh(
         ));
         mesh.turn_over();
     }
-    ObstacleMesh::new(mesh.positions, mesh.triangles)
+    ObstacleMesh::new(mesh.positions.clone(), mesh.triangles.clone())
+        .map(|shape| (shape, mesh))
         .or_else(|error| source.fail(place, format!("{}: {error}", path.display())))
 }

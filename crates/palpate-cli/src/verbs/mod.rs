@@ -4,6 +4,7 @@ pub mod bench;
 pub mod demo;
 pub mod device;
 pub mod devices;
+pub mod export;
 pub mod inspect;
 pub mod record;
 pub mod replay;

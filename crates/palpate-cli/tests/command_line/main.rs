@@ -5,6 +5,8 @@ mod bad_input;
 mod contacts;
 mod couplings;
 mod devices;
+mod exports;
+mod glb;
 mod realtime;
 mod results;
 mod stores;

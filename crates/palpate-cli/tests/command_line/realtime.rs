@@ -3,7 +3,7 @@
 use crate::workplace::{Table, Workplace};
 
 /// Two fingers on the cube of `Workplace::with_scene`, which lies on a floor; the right one in a simulated hand.
-fn workplace() -> Workplace {
+pub fn workplace() -> Workplace {
     let workplace = Workplace::with_scene();
     let finger = |name: &str, more: &str| {
         format!(

@@ -289,16 +289,21 @@ fn surfaces_for_paraview_are_all_there_and_listed() {
             Some((time, rest.split_once('"')?.0))
         })
         .collect();
-    // Every 10 ms from 0 to 50 ms.
-    assert_eq!(listed.len(), 6, "{index}");
-    for (frame, (time, file)) in listed.iter().enumerate() {
+    // Every 10 ms from 0 to 50 ms the cube, and the devices.
+    assert_eq!(listed.len(), 12, "{index}");
+    for (entry, (time, file)) in listed.iter().enumerate() {
         let time: f64 = time.parse().expect("a number");
-        assert!((time - 0.01 * frame as f64).abs() < SUMMED, "{time}");
+        assert!((time - 0.01 * (entry / 2) as f64).abs() < SUMMED, "{time}");
         let text = workplace.text(&format!("out/frames/{file}"));
-        assert!(text.contains("NumberOfPoints=\"56\" NumberOfCells=\"108\""), "{file}");
+        let (name, size) = [
+            ("cube", "NumberOfPoints=\"56\" NumberOfCells=\"108\""),
+            ("scene.devices", "NumberOfPoints=\"2\" NumberOfCells=\"2\""),
+        ][entry % 2];
+        assert_eq!(*file, format!("{name}_{:05}.vtu", entry / 2));
+        assert!(text.contains(size), "{file}");
     }
     // Nothing else lies there.
-    assert_eq!(std::fs::read_dir(workplace.path("out/frames")).expect("a folder").count(), 7);
+    assert_eq!(std::fs::read_dir(workplace.path("out/frames")).expect("a folder").count(), 13);
 }
 
 #[test]

@@ -102,8 +102,8 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     let step_s = scene.model.parameters().step_s;
     let steps = count_steps(scene, arguments)?;
     let mut state = State::new(&scene.model);
-    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, steps)?;
-    let mut input = input_at(scene, 0.0);
+    let mut input = scene.input_at(0.0);
+    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, &input, steps)?;
     let bar = if std::io::stderr().is_terminal() && steps > PROGRESS_FROM {
         ProgressBar::new(steps as u64)
     } else {
@@ -149,15 +149,6 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
         )));
     }
     Ok(steps as usize)
-}
-
-fn input_at(scene: &Scene, time: f64) -> Input {
-    let devices = scene.devices.iter();
-    let devices = devices.map(|device| DeviceInput { position: device.at(time), mode: device.mode });
-    Input {
-        devices: devices.collect(),
-        obstacles: scene.obstacles.iter().map(|obstacle| obstacle.at(time)).collect(),
-    }
 }
 
 fn move_input(scene: &Scene, time: f64, input: &mut Input) {

@@ -2,10 +2,8 @@
 
 use super::summary::Summary;
 use crate::Failure;
-use crate::csv::{ContactsCsv, StepsCsv};
+use crate::outputs::{OutputFiles, Wanted, Window};
 use crate::scene_file::Scene;
-use crate::vtu::VtuSeries;
-use crate::whole_file::is_same_file;
 use clap::Args;
 use palpate::{Input, State};
 use std::path::PathBuf;
@@ -20,7 +18,7 @@ pub struct OutputArguments {
     /// Write every contact of every step: what touches what, where, with which force, gap and slip
     #[arg(long, value_name = "OUT.csv")]
     pub contacts: Option<PathBuf>,
-    /// Write the deformed surfaces for ParaView (VTU files and scene.pvd)
+    /// Write objects, obstacles, contacts and devices for ParaView (VTU files and scene.pvd)
     #[arg(long, value_name = "DIR")]
     pub vtu: Option<PathBuf>,
     /// Frames of --vtu per second of simulated time
@@ -36,10 +34,7 @@ const LOOKS: usize = 100;
 
 /// The files that are being written, and the summary that is being made.
 pub struct Outputs {
-    csv: Option<StepsCsv>,
-    contacts: Option<ContactsCsv>,
-    series: Option<VtuSeries>,
-    fps: f64,
+    files: OutputFiles,
     summary: Summary,
     steps: usize,
     look_every: usize,
@@ -51,42 +46,30 @@ impl OutputArguments {
         self.csv.is_some() || self.contacts.is_some() || self.vtu.is_some()
     }
 
-    /// Refuse what can't be written before anything is run.
-    pub fn check(&self) -> Result<(), Failure> {
-        if !(self.fps.is_finite() && self.fps > 0.0) {
-            return Err(Failure(format!("--fps is {}, expected a positive number", self.fps)));
+    fn wanted(&self) -> Wanted<'_> {
+        Wanted {
+            csv: self.csv.as_deref(),
+            contacts: self.contacts.as_deref(),
+            vtu: self.vtu.as_deref(),
+            gltf: None,
+            window: Window { fps: self.fps, ..Window::default() },
         }
-        if let (Some(csv), Some(contacts)) = (&self.csv, &self.contacts)
-            && is_same_file(csv, contacts)
-        {
-            return Err(Failure(format!(
-                "cannot write {}: --csv and --contacts name the same file",
-                contacts.display()
-            )));
-        }
-        Ok(())
     }
 }
 
 impl Outputs {
-    /// Begin, with the scene at its start and so many steps before it.
+    /// Begin, with the scene at its start, where `input` is, and so many steps before it.
     pub fn new(
         arguments: &OutputArguments,
         scene: &Scene,
         state: &State,
+        input: &Input,
         steps: usize,
     ) -> Result<Self, Failure> {
-        arguments.check()?;
-        let csv = arguments.csv.as_deref().map(|path| StepsCsv::new(path, scene)).transpose()?;
-        let contacts = arguments.contacts.as_deref().map(|path| ContactsCsv::new(path, scene)).transpose()?;
-        let series = arguments.vtu.as_deref().map(|dir| VtuSeries::new(dir, scene.object_names.clone()));
-        let mut series = series.transpose()?;
-        if let Some(series) = &mut series {
-            series.write_frame(&scene.model, state)?;
-        }
+        let files = OutputFiles::new(&arguments.wanted(), scene, state, input, steps)?;
         let summary = Summary::new(scene, steps, state.output());
         let look_every = (steps / LOOKS).max(1);
-        Ok(Self { csv, contacts, series, fps: arguments.fps, summary, steps: 0, look_every })
+        Ok(Self { files, summary, steps: 0, look_every })
     }
 
     /// Take in a step, and how long it took.
@@ -98,33 +81,17 @@ impl Outputs {
         took: Duration,
     ) -> Result<(), Failure> {
         self.steps += 1;
-        let output = state.output();
-        self.summary.take(output, took);
-        if let Some(csv) = &mut self.csv {
-            csv.write(input, output)?;
-        }
-        if let Some(contacts) = &mut self.contacts {
-            contacts.write(scene, output)?;
-        }
+        self.summary.take(state.output(), took);
         if self.steps.is_multiple_of(self.look_every) {
             self.summary.look(scene, state);
         }
-        let due = |series: &&mut VtuSeries| output.time_s * self.fps >= series.frames() as f64 - 1e-9;
-        if let Some(series) = self.series.as_mut().filter(due) {
-            series.write_frame(&scene.model, state)?;
-        }
-        Ok(())
+        self.files.take(scene, input, state)
     }
 
     /// Finish all files.
     pub fn finish(mut self, state: &State) -> Result<Summary, Failure> {
-        if let Some(csv) = self.csv {
-            csv.finish()?;
-        }
-        if let Some(contacts) = self.contacts {
-            contacts.finish()?;
-        }
-        let index = self.series.map(VtuSeries::finish).transpose()?;
+        let written = self.files.finish()?;
+        let index = written.into_iter().find(|file| file.kind == "vtu").map(|file| file.path);
         self.summary.finish(state.output(), index);
         Ok(self.summary)
     }

@@ -235,6 +235,6 @@ fn begin_log(
         ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
     ]);
     let state = State::new(&scene.model);
-    let input = super::input_at(scene, 0.0);
+    let input = scene.input_at(0.0);
     Ok(LogWriter::new(file, scene.names(), facts, &files, (&scene.model, &state, &input))?)
 }

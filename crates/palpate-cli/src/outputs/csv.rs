@@ -1,4 +1,4 @@
-//! A run as CSV: a row per step, and a row per contact.
+//! Steps as CSV: a row per step, and a row per contact.
 
 use crate::Failure;
 use crate::scene_file::Scene;
@@ -73,8 +73,8 @@ impl StepsCsv {
         self.rows.line(&joined(numbers))
     }
 
-    /// Let the file take its name.
-    pub fn finish(self) -> Result<(), Failure> {
+    /// Let the file take its name; gives that.
+    pub fn finish(self) -> Result<PathBuf, Failure> {
         self.rows.file.finish()
     }
 }
@@ -109,8 +109,8 @@ impl ContactsCsv {
         Ok(())
     }
 
-    /// Let the file take its name.
-    pub fn finish(self) -> Result<(), Failure> {
+    /// Let the file take its name; gives that.
+    pub fn finish(self) -> Result<PathBuf, Failure> {
         self.rows.file.finish()
     }
 }

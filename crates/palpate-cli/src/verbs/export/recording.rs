@@ -1,0 +1,157 @@
+//! A recording as files: the surface at rest, and the shapes that its modes give it.
+
+use super::{Arguments, tell_of};
+use crate::Failure;
+use crate::outputs::{Animation, Deforming, Glb, VtuSeries, Written, check_size, deformed, root};
+use crate::verbs::read_recording;
+use crate::whole_file::{WholeFile, check_apart};
+use glam::DVec3;
+use palpate::{Pose, Recording};
+use serde_json::json;
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+/// Modes are many, and the low ones tell most.
+const MODES: usize = 10;
+
+/// A mode's largest displacement, as a share of the object's diagonal: enough to be seen.
+const SWING: f64 = 0.1;
+
+/// An animation swings its mode once in this time [s], whatever its frequency is.
+const PERIOD_S: f64 = 2.0;
+
+/// Between the times of such a swing weights are linear.
+const KEYS: usize = 24;
+
+const COLOUR: [f32; 3] = [0.75, 0.22, 0.13];
+
+/// The recording, and what is wanted of it.
+struct Export<'a> {
+    recording: &'a Recording,
+    /// How many modes are drawn, and how many have a row.
+    drawn: usize,
+    rows: usize,
+    inputs: Vec<PathBuf>,
+}
+
+pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
+    check_apart(&[("--csv", arguments.csv.as_deref()), ("--gltf", arguments.gltf.as_deref())])?;
+    let recording = read_recording(&arguments.source)?;
+    let kept = recording.modes.len();
+    if arguments.modes == Some(0) {
+        return Err(Failure("--modes is 0, expected at least 1".to_string()));
+    }
+    let export = Export {
+        recording: &recording,
+        drawn: arguments.modes.unwrap_or(MODES).min(kept),
+        rows: arguments.modes.unwrap_or(kept).min(kept),
+        inputs: vec![arguments.source.clone()],
+    };
+    let mut written = Vec::new();
+    if let Some(path) = &arguments.csv {
+        written.push(Written { kind: "csv", path: export.csv(path)? });
+    }
+    if let Some(folder) = &arguments.vtu {
+        written.push(Written { kind: "vtu", path: export.vtu(folder)? });
+    }
+    if let Some(path) = &arguments.gltf {
+        written.push(Written { kind: "gltf", path: export.gltf(path)? });
+    }
+    let frequencies: Vec<f64> = (0..export.drawn).map(|mode| export.frequency_hz(mode)).collect();
+    let facts = json!({ "modes": kept, "modes_drawn": export.drawn, "frequencies_hz": frequencies });
+    tell_of(arguments, &written, facts, &export.line())
+}
+
+impl Export<'_> {
+    fn frequency_hz(&self, mode: usize) -> f64 {
+        self.recording.modes.angular_frequencies[mode] / TAU
+    }
+
+    fn line(&self) -> String {
+        let kept = self.recording.modes.len();
+        match self.drawn {
+            0 => "the recording keeps no modes: its surface at rest".to_string(),
+            drawn => format!(
+                "{drawn} of {kept} modes, {:.2} to {:.2} Hz; their largest displacement is drawn as {:.0} % of the diagonal",
+                self.frequency_hz(0),
+                self.frequency_hz(drawn - 1),
+                100.0 * SWING
+            ),
+        }
+    }
+
+    /// What a mode is called.
+    fn name(&self, mode: usize) -> String {
+        format!("mode {}: {:.2} Hz", mode + 1, self.frequency_hz(mode))
+    }
+
+    /// A mode's displacement of every surface node [m].
+    fn shape(&self, mode: usize) -> Vec<DVec3> {
+        let nodes = self.recording.surface.positions.len();
+        let at = |node, axis| self.recording.modes.row(node, axis)[mode];
+        let shape = (0..nodes).map(|node| DVec3::new(at(node, 0), at(node, 1), at(node, 2)));
+        let shape: Vec<DVec3> = shape.collect();
+        let largest = shape.iter().map(|u| u.length()).fold(f64::MIN_POSITIVE, f64::max);
+        let scale = SWING * self.recording.surface.diagonal() / largest;
+        shape.into_iter().map(|u| scale * u).collect()
+    }
+
+    fn csv(&self, path: &Path) -> Result<PathBuf, Failure> {
+        let inputs: Vec<&Path> = self.inputs.iter().map(PathBuf::as_path).collect();
+        let mut file = WholeFile::create(path, &inputs)?;
+        file.write(b"mode,frequency_hz,damping_ratio\n")?;
+        for mode in 0..self.rows {
+            let damping = self.recording.modes.damping_ratios[mode];
+            file.write(format!("{},{:?},{damping:?}\n", mode + 1, self.frequency_hz(mode)).as_bytes())?;
+        }
+        file.finish()
+    }
+
+    /// A time for each mode, from 1, and the surface at rest at time 0.
+    fn vtu(&self, folder: &Path) -> Result<PathBuf, Failure> {
+        let surface = &self.recording.surface;
+        let mut series = VtuSeries::new(folder, "modes.pvd", &self.inputs)?;
+        for number in 0..=self.drawn {
+            let (shape, facts) = match number.checked_sub(1) {
+                None => (vec![DVec3::ZERO; surface.positions.len()], Vec::new()),
+                Some(mode) => {
+                    let damping = self.recording.modes.damping_ratios[mode];
+                    let facts = vec![("frequency_hz", self.frequency_hz(mode)), ("damping_ratio", damping)];
+                    (self.shape(mode), facts)
+                }
+            };
+            let mut grid = deformed(&surface.positions, &surface.triangles, &shape, Pose::IDENTITY);
+            grid.facts = facts;
+            let name = series.write("mode", number, &grid)?;
+            series.show(number as f64, 0, name);
+        }
+        series.finish()
+    }
+
+    /// A morph target and an animation for each mode.
+    fn gltf(&self, path: &Path) -> Result<PathBuf, Failure> {
+        let surface = &self.recording.surface;
+        // A node of the surface is drawn as one vertex at least.
+        check_size((24 * surface.positions.len() as u64).saturating_mul(1 + self.drawn as u64), path)?;
+        let mut glb = Glb::new(path, &self.inputs)?;
+        glb.content.nodes.push(root(DVec3::ZERO));
+        let name = self.recording.metadata.provenance.source.clone();
+        let mut object = Deforming::new(&mut glb, &name, &surface.positions, &surface.triangles, COLOUR)?;
+        for mode in 0..self.drawn {
+            object.add_shape(&mut glb, &self.shape(mode), self.name(mode))?;
+        }
+        let times: Vec<f64> = (0..=KEYS).map(|key| PERIOD_S * key as f64 / KEYS as f64).collect();
+        let times = glb.times(&times);
+        for mode in 0..self.drawn {
+            let mut animation = Animation::new(times);
+            let swing = |key: usize| (TAU * key as f64 / KEYS as f64).sin() as f32;
+            let weights = (0..=KEYS).flat_map(|key| {
+                (0..self.drawn).map(move |other| if other == mode { swing(key) } else { 0.0 })
+            });
+            animation.channel(&mut glb, object.node(), "weights", weights, ("SCALAR", 1));
+            glb.content.animations.push(animation.json(&self.name(mode)));
+        }
+        object.finish(&mut glb.content, &vec![0.0; self.drawn]);
+        glb.finish()
+    }
+}
