@@ -3,7 +3,7 @@
 import type { Connection } from "./protocol/connection";
 import type { Granted, Hello, Progress, SceneMessage, Status, TouchMode } from "./protocol/messages";
 import type { Picture } from "./protocol/picture";
-import { loadScene } from "./picture/load";
+import { hasFloor, loadScene } from "./picture/load";
 import { PictureDoesNotFit } from "./picture/elastic/object";
 import { MeshDrop } from "./panels/drop";
 import { element } from "./panels/element";
@@ -25,6 +25,8 @@ import { Pointers } from "./touch/pointers";
 import { Touches } from "./touch/touches";
 import type { Kind } from "./kind";
 
+const STRAYED_EVERY_MS = 700;
+
 export class Live implements Kind {
   private readonly touches: Touches;
   private readonly pointers: Pointers;
@@ -41,6 +43,8 @@ export class Live implements Kind {
   private readonly timing = new TimingPanel();
   private readonly accuracy = new AccuracyPanel();
   private readonly viewers = element("span", { class: "chip" });
+  private readonly strayed = element("button", { class: "button strayed", type: "button", text: "It has left the view: show it" });
+  private strayedCheck = 0;
   private readonly loading = element("div", { class: "loading", role: "status" });
   private loader: AbortController | null = null;
   private wanted: SceneMessage | null = null;
@@ -75,7 +79,7 @@ export class Live implements Kind {
       (chosen) => {
         this.pointers.mode = chosen;
       },
-      () => stage.orbit.home(),
+      () => stage.home(),
     );
     this.scenes = new ScenesPanel((id) => send({ type: "open", scene: id }));
     this.laws = new LawsPanel(send);
@@ -83,11 +87,13 @@ export class Live implements Kind {
     const drop = new MeshDrop(notes);
 
     this.viewers.hidden = true;
+    this.strayed.hidden = true;
+    this.strayed.addEventListener("click", () => stage.home());
     this.loading.hidden = true;
     frame_.chips.append(this.viewers);
     frame_.bar.append(...this.bar.parts);
-    frame_.upper.append(this.reading.box, this.jobs.box);
-    frame_.lower.append(this.hint.box);
+    frame_.upper.append(this.reading.box, this.hint.box, this.jobs.box);
+    frame_.lower.append(this.strayed);
     frame_.stageArea.append(this.loading);
     frame_.controls.append(this.scenes.section, look.section, this.laws.section, this.material.section, drop.section);
     frame_.measured.append(...this.plots.sections, this.timing.section, this.accuracy.section);
@@ -140,7 +146,7 @@ export class Live implements Kind {
         const before = this.stage.worlds[0]?.info ?? null;
         const again = before !== null && before.id === scene.id && before.objects.length === scene.objects.length;
         if (!again) {
-          this.stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity);
+          this.stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
         }
         this.stage.put(0, loaded);
         this.stage.fitCamera();
@@ -218,6 +224,10 @@ export class Live implements Kind {
     }
     this.reading.show(this.picture, world?.info ?? null, this.touches.devices);
     this.plots.frame(now);
+    if (now - this.strayedCheck > STRAYED_EVERY_MS) {
+      this.strayedCheck = now;
+      this.strayed.hidden = !this.stage.empty;
+    }
   }
 
   dress(): void {

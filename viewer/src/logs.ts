@@ -13,7 +13,7 @@ import { Jobs } from "./panels/jobs";
 import type { LookPanel } from "./panels/look";
 import { AccuracyPanel, PlotPanels } from "./panels/measured";
 import type { Notes } from "./panels/notes";
-import { loadScene } from "./picture/load";
+import { hasFloor, loadScene } from "./picture/load";
 import type { Stage } from "./picture/stage";
 import { Pointers } from "./touch/pointers";
 
@@ -47,7 +47,7 @@ export class Logs implements Kind {
     look: LookPanel,
   ) {
     new Pointers(stage, null);
-    this.timeLine = new TimeLine(this.player, () => stage.orbit.home());
+    this.timeLine = new TimeLine(this.player, () => stage.home());
     page.bar.append(...this.timeLine.parts);
     page.upper.append(this.jobs.box);
     page.stageArea.append(this.captions);
@@ -97,7 +97,7 @@ export class Logs implements Kind {
       if (this.names.length > 1) this.captions.append(log.caption);
     }
     this.logs[index] = log;
-    if (index === 0) this.stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity);
+    if (index === 0) this.stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
     this.stage.put(index, loaded);
     this.stage.fitCamera();
     if (index === 0) this.stage.orbit.home();

@@ -147,7 +147,7 @@ function start(): void {
     if (event.key === " " && at.closest("button, summary, input") !== null) return;
     const acts: Record<string, () => void> = {
       "?": () => help?.showModal(),
-      v: () => stage.orbit.home(),
+      v: () => stage.home(),
       c: () => look.nextColour(),
       a: () => look.toggle("arrows"),
       w: () => look.toggle("wires"),

@@ -4,7 +4,7 @@
 import type { Kind } from "./kind";
 import { fetchFrames } from "./log/fetch";
 import { isColourMode } from "./picture/colours";
-import { loadScene } from "./picture/load";
+import { hasFloor, loadScene } from "./picture/load";
 import { niceAbove } from "./picture/scale";
 import type { Stage } from "./picture/stage";
 import type { World } from "./picture/world";
@@ -52,7 +52,7 @@ export class Render implements Kind {
     stage.writesTime = true;
     document.body.append(stage.canvas, stage.overlay);
     const loaded = await loadScene(scene, stage.sumsModes, new AbortController().signal, () => undefined);
-    stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity);
+    stage.orbit.look(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
     const world = stage.put(0, loaded);
     stage.resize(width, height, 1);
     stage.orbit.home();

@@ -11,7 +11,7 @@ export class LiveBar {
   private readonly modes;
   private readonly pause: HTMLButtonElement;
   private readonly step: HTMLButtonElement;
-  private readonly speed = element("select", { title: "Slow motion ([ and ])", attributes: { "aria-label": "Slow motion" } });
+  private readonly speed = element("select", { title: "Speed of time: slow motion with [, faster with ]", attributes: { "aria-label": "Speed of time" } });
   paused = false;
   private slowness = 1;
   mode: TouchMode;
@@ -35,7 +35,7 @@ export class LiveBar {
     this.pause = iconButton("pause", "Pause (Space)", () => this.togglePause(), "Pause");
     this.step = iconButton("step", "One step (.)", () => this.oneStep());
     this.speed.append(
-      ...SLOWNESSES.map((s) => element("option", { text: s === 1 ? "Real time" : `${slownessName(s)} speed`, attributes: { value: String(s) } })),
+      ...SLOWNESSES.map((s) => element("option", { text: slownessName(s), attributes: { value: String(s) } })),
     );
     this.speed.addEventListener("change", () => this.slow(Number(this.speed.value)));
     this.parts = [

@@ -24,7 +24,6 @@ export class PlotPanels {
   private latest: Picture | null = null;
 
   constructor(prefix = "") {
-    this.energy.box.classList.add("energies");
     const named = (text: string) => (prefix === "" ? text : `${prefix}: ${text.toLowerCase()}`);
     this.sections = [
       section(named("Force on the fingers"), true, this.force.box),

@@ -2,13 +2,16 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { digits, withUnit } from "../format";
+import { withUnit } from "../format";
 import { element } from "./element";
 
 const LINE_COLOURS = ["--line-1", "--line-2", "--line-3", "--line-4", "--line-5", "--line-6"];
 
 export class Plot {
-  readonly box = element("div", { class: "plot" });
+  private readonly canvas = element("div", { class: "plot" });
+  private readonly legend = element("ul", { class: "legend" });
+  readonly box = element("div", {}, this.canvas, this.legend);
+  private readonly readings: HTMLElement[] = [];
   private plot: uPlot | null = null;
   private data: uPlot.AlignedData = [[]];
   private window: [number, number] | null = null;
@@ -20,7 +23,7 @@ export class Plot {
     private readonly height: number,
     private lines: readonly { name: string; title: string }[],
   ) {
-    new ResizeObserver(() => this.fit()).observe(this.box);
+    new ResizeObserver(() => this.fit()).observe(this.canvas);
   }
 
   /** New lines, or new colours. */
@@ -28,7 +31,29 @@ export class Plot {
     this.lines = lines;
     this.plot?.destroy();
     this.plot = null;
+    this.readings.length = 0;
+    this.legend.replaceChildren(
+      ...lines.map(({ name, title }, i) => {
+        const mark = element("i");
+        mark.style.background = `var(${LINE_COLOURS[i % LINE_COLOURS.length]})`;
+        const reading = element("b");
+        this.readings.push(reading);
+        return element("li", { title }, mark, element("span", { class: "name", text: name }), reading);
+      }),
+    );
     this.draw();
+  }
+
+  /** Says the values where the cursor is, else at the marked time, else the last ones. */
+  private read(): void {
+    const times = this.data[0];
+    let at = this.plot?.cursor.idx ?? null;
+    if (at === null && this.cursorAt !== null) at = nearest(times, this.cursorAt);
+    at ??= times.length - 1;
+    this.readings.forEach((reading, i) => {
+      const value = this.data[i + 1]?.[at];
+      reading.textContent = value == null ? "" : withUnit(value, this.unit, 1e-7);
+    });
   }
 
   show(data: readonly (readonly number[])[], window: [number, number] | null): void {
@@ -41,10 +66,11 @@ export class Plot {
   mark(time: number | null): void {
     this.cursorAt = time;
     this.plot?.redraw(false);
+    this.read();
   }
 
   private draw(): void {
-    if (this.box.clientWidth < 40 || this.box.offsetParent === null) return;
+    if (this.canvas.clientWidth < 40 || this.canvas.offsetParent === null) return;
     if (this.data.length !== this.lines.length + 1) return;
     if (this.plot === null) this.make();
     this.plot?.batch((plot: uPlot) => {
@@ -53,28 +79,28 @@ export class Plot {
       const [min, max] = this.window ?? [times[0] ?? 0, times[times.length - 1] ?? 1];
       plot.setScale("x", { min, max: Math.max(max, min + 1e-6) });
     });
+    this.read();
   }
 
   private fit(): void {
-    const width = this.box.clientWidth;
+    const width = this.canvas.clientWidth;
     if (this.plot !== null && width >= 40 && width !== this.plot.width) this.plot.setSize({ width, height: this.height });
     else this.draw();
   }
 
   private make(): void {
-    const style = getComputedStyle(this.box);
+    const style = getComputedStyle(this.canvas);
     const colour = (name: string) => style.getPropertyValue(name).trim();
     const quiet = colour("--quiet");
     const grid = { stroke: colour("--rule"), width: 1 };
     const font = `11px ${style.fontFamily}`;
-    const reading = (value: number | null | undefined) => (value == null ? "" : withUnit(value, this.unit, 1e-7));
     this.plot = new uPlot(
       {
-        width: this.box.clientWidth,
+        width: this.canvas.clientWidth,
         height: this.height,
         padding: [10, 8, 0, 0],
         cursor: { y: false, drag: { x: false, y: false }, points: { size: 5 } },
-        legend: { live: true, markers: { width: 2 } },
+        legend: { show: false },
         scales: {
           x: { time: false, auto: false },
           y: { range: (_, min, max) => range(min, max) },
@@ -92,23 +118,19 @@ export class Plot {
           },
         ],
         series: [
-          { label: "Time", value: (_, time) => (time == null ? "" : `${digits(time)} s`) },
+          {},
           ...this.lines.map(({ name }, i) => ({
             label: name,
             stroke: colour(LINE_COLOURS[i % LINE_COLOURS.length]),
             width: 1.5,
             points: { show: false },
-            value: (_: uPlot, value: number | null) => reading(value),
           })),
         ],
-        hooks: { draw: [(plot) => this.drawMark(plot, colour("--accent"))] },
+        hooks: { draw: [(plot) => this.drawMark(plot, colour("--accent"))], setCursor: [() => this.read()] },
       },
       this.data,
-      this.box,
+      this.canvas,
     );
-    this.plot.root.querySelectorAll<HTMLElement>(".u-series").forEach((row, i) => {
-      if (i > 0) row.title = this.lines[i - 1].title;
-    });
     const plot = this.plot;
     plot.over.addEventListener("click", (event) => this.onSeek?.(plot.posToVal(event.offsetX, "x")));
   }
@@ -127,6 +149,17 @@ export class Plot {
     plot.ctx.stroke();
     plot.ctx.restore();
   }
+}
+
+/** Where in a rising list the number is that is nearest. */
+function nearest(times: ArrayLike<number>, time: number): number {
+  let [low, high] = [0, times.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle;
+  }
+  return Math.abs(times[high] - time) < Math.abs(times[low] - time) ? high : low;
 }
 
 /** From 0 if all is above, with some room. */

@@ -7,6 +7,7 @@ const FIELD_OF_VIEW = 32;
 const FIRST_AZIMUTH = 0.52;
 const FIRST_ELEVATION = 0.36;
 const STEEPEST = 1.5;
+const LOWEST_ABOVE_FLOOR = 0.03;
 
 export class OrbitCamera {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
@@ -19,12 +20,15 @@ export class OrbitCamera {
   private distance = 1;
   private center = new Vector3();
   private radius = 0.1;
+  /** How steeply it may look up [rad]: less where there is a floor. */
+  private lowest = -STEEPEST;
   changed = true;
 
-  /** The usual view of a scene; up is against gravity. */
-  look(center: Vector, radius: number, gravity: Vector): void {
+  /** The usual view of a scene; up is against gravity. Above a floor it does not go below it. */
+  look(center: Vector, radius: number, gravity: Vector, floor: boolean): void {
     this.center.set(...center);
     this.radius = radius;
+    this.lowest = floor ? LOWEST_ABOVE_FLOOR : -STEEPEST;
     const up = new Vector3(...gravity).negate();
     if (up.lengthSq() < 1e-12) up.set(0, 1, 0);
     this.up.copy(up.normalize());
@@ -34,8 +38,9 @@ export class OrbitCamera {
     this.home();
   }
 
-  home(): void {
-    this.target.copy(this.center);
+  /** The usual view, of another place if that is where things are now. */
+  home(center = this.center): void {
+    this.target.copy(center);
     this.azimuth = FIRST_AZIMUTH;
     this.elevation = FIRST_ELEVATION;
     this.distance = this.fitting();
@@ -70,7 +75,7 @@ export class OrbitCamera {
   /** Radians. */
   turn(right: number, down: number): void {
     this.azimuth -= right;
-    this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation + down));
+    this.elevation = Math.min(STEEPEST, Math.max(this.lowest, this.elevation + down));
     this.update();
   }
 

@@ -26,6 +26,9 @@ import { WHOLE_TARGET } from "./elastic/shaders";
 import { niceAbove } from "./scale";
 
 const SHADOW_SIZE = 384;
+// The light comes from the front left: shadows fall to the back right, by so much per height.
+const SHEAR_ASIDE = 0.38;
+const SHEAR_BACK = 0.3;
 
 const VERTEX = /* glsl */ `
 precision highp float;
@@ -234,12 +237,13 @@ export class Ground {
   }
 
   /** `around`: where the things are that throw shadows. */
-  draw(renderer: WebGLRenderer, casters: Scene, around: Vector3, setPlane: (plane: Vector4, reach: number) => void): void {
+  draw(renderer: WebGLRenderer, casters: Scene, around: Vector3, setPlane: (plane: Vector4, shear: Vector3, reach: number) => void): void {
     if (this.shadow === null) return;
     const offset = this.normal.dot(this.group.position);
     const middle = around.clone().addScaledVector(this.normal, offset - this.normal.dot(around));
     const reach = 2.2 * this.radius;
-    setPlane(new Vector4(this.normal.x, this.normal.y, this.normal.z, offset), reach);
+    const shear = this.across.clone().cross(this.normal).multiplyScalar(-SHEAR_ASIDE).addScaledVector(this.across, -SHEAR_BACK);
+    setPlane(new Vector4(this.normal.x, this.normal.y, this.normal.z, offset), shear, reach);
     this.shadow.draw(renderer, casters, middle, this.normal, this.across, 2 * this.radius, 12 * this.radius);
   }
 

@@ -5,6 +5,10 @@ import type { SceneMessage } from "../protocol/messages";
 import { readShapes, readSurface, type Shapes, type Surface } from "../protocol/surface";
 import type { Loaded } from "./world";
 
+export function hasFloor(scene: SceneMessage): boolean {
+  return scene.obstacles.some(({ shape }) => "plane" in shape);
+}
+
 /** How many bytes a scene will be, about. */
 function bytesOf(scene: SceneMessage, withShapes: boolean): number {
   return scene.objects.reduce(

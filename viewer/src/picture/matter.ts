@@ -1,6 +1,6 @@
 // The material of rigid things: obstacles, proxies. Lit like the elastic surfaces.
 
-import { GLSL3, RawShaderMaterial, Vector3 } from "three";
+import { GLSL3, RawShaderMaterial, Vector3, Vector4 } from "three";
 import { rgb } from "./colours";
 import { LIGHTING } from "./elastic/shaders";
 
@@ -51,11 +51,14 @@ export function matter(colour: string, up: Vector3, opacity = 1, gloss = 0.6): R
 const SHADOW_VERTEX = /* glsl */ `
 precision highp float;
 uniform mat4 modelMatrix, viewMatrix, projectionMatrix;
+uniform vec4 plane;
+uniform vec3 shear;
 in vec3 position;
 out vec3 seenAt;
 void main() {
   vec4 world = modelMatrix * vec4(position, 1.0);
   seenAt = world.xyz;
+  world.xyz += shear * max(0.0, dot(plane.xyz, world.xyz) - plane.w);
   gl_Position = projectionMatrix * viewMatrix * world;
 }`;
 
@@ -65,6 +68,6 @@ export function shadowMatter(fragmentShader: string): RawShaderMaterial {
     glslVersion: GLSL3,
     vertexShader: SHADOW_VERTEX,
     fragmentShader,
-    uniforms: { plane: { value: null }, reach: { value: 1 } },
+    uniforms: { plane: { value: new Vector4() }, shear: { value: new Vector3() }, reach: { value: 1 } },
   });
 }

@@ -16,6 +16,11 @@ export interface Rectangle {
 }
 
 const MARGIN = 14;
+
+/** What is written grows a little with the picture. */
+function sizeIn(view: Rectangle): number {
+  return Math.min(1.6, Math.max(1, view.height / 850));
+}
 const BAR_WIDTH = 168;
 const BAR_HEIGHT = 10;
 
@@ -37,7 +42,8 @@ export function drawLabels(
   palette: Palette,
   keepOut: readonly Rectangle[],
 ): void {
-  pen.font = `600 14px ${FONT}`;
+  const size = sizeIn(view);
+  pen.font = `600 ${14 * size}px ${FONT}`;
   pen.textBaseline = "middle";
   pen.textAlign = "left";
   const taken: Rectangle[] = [...keepOut];
@@ -47,10 +53,10 @@ export function drawLabels(
     const width = pen.measureText(label.text).width;
     const x = Math.min(view.x + view.width - width - 6, Math.max(view.x + 6, view.x + (0.5 + 0.5 * at.x) * view.width + 9));
     let y = Math.min(view.y + view.height - 12, Math.max(view.y + 12, view.y + (0.5 - 0.5 * at.y) * view.height - 9));
-    let box = { x: x - 3, y: y - 10, width: width + 6, height: 20 };
+    let box = { x: x - 3, y: y - 10 * size, width: width + 6, height: 20 * size };
     for (let tries = 0; tries < 4 && taken.some((other) => overlap(box, other)); tries++) {
-      y -= 20;
-      box = { ...box, y: y - 10 };
+      y -= 20 * size;
+      box = { ...box, y: y - 10 * size };
     }
     if (y < view.y + 10 || taken.some((other) => overlap(box, other))) continue;
     taken.push(box);
@@ -71,17 +77,20 @@ function reading(mode: ColourMode, value: number): string {
 /** The colour bar at the lower left; says how much room it has taken. */
 export function drawColourBar(pen: CanvasRenderingContext2D, mode: ColourMode, range: number, view: Rectangle, palette: Palette): number {
   if (mode === "plain" || !(range > 0)) return 0;
+  const size = sizeIn(view);
+  const width = BAR_WIDTH * size;
+  const height = BAR_HEIGHT * size;
   const x = view.x + MARGIN;
-  const y = view.y + view.height - MARGIN - 16;
-  const gradient = pen.createLinearGradient(x, 0, x + BAR_WIDTH, 0);
+  const y = view.y + view.height - MARGIN - 16 * size;
+  const gradient = pen.createLinearGradient(x, 0, x + width, 0);
   RAMP.forEach((colour, i) => gradient.addColorStop(i / (RAMP.length - 1), colour));
-  pen.font = `500 12px ${FONT}`;
+  pen.font = `500 ${12 * size}px ${FONT}`;
   pen.textBaseline = "alphabetic";
   pen.textAlign = "left";
-  haloed(pen, TITLES[mode], x, y - BAR_HEIGHT - 6, palette.text, palette);
+  haloed(pen, TITLES[mode], x, y - height - 6 * size, palette.text, palette);
   pen.fillStyle = gradient;
   pen.beginPath();
-  pen.roundRect(x, y - BAR_HEIGHT, BAR_WIDTH, BAR_HEIGHT, 3);
+  pen.roundRect(x, y - height, width, height, 3);
   pen.fill();
   pen.strokeStyle = "#00000040";
   pen.lineWidth = 1;
@@ -92,9 +101,9 @@ export function drawColourBar(pen: CanvasRenderingContext2D, mode: ColourMode, r
     [1, "right"],
   ] as const) {
     pen.textAlign = align;
-    haloed(pen, share === 0 ? "0" : reading(mode, share * range), x + share * BAR_WIDTH, y + 14, palette.text, palette);
+    haloed(pen, share === 0 ? "0" : reading(mode, share * range), x + share * width, y + 14 * size, palette.text, palette);
   }
-  return BAR_HEIGHT + 44;
+  return height + 44 * size;
 }
 
 /** How long an arrow of how many newtons is. `pixels` per newton, where the camera looks. */
@@ -114,7 +123,7 @@ export function drawArrowScale(pen: CanvasRenderingContext2D, newtons: number, p
   pen.lineTo(x + length - 11, y - 5);
   pen.lineTo(x + length - 11, y + 5);
   pen.fill();
-  pen.font = `500 12px ${FONT}`;
+  pen.font = `500 ${12 * sizeIn(view)}px ${FONT}`;
   pen.textAlign = "left";
   pen.textBaseline = "middle";
   haloed(pen, withUnit(share * newtons, "N", 0, 2), x + length + 8, y + 0.5, palette.text, palette);
@@ -124,7 +133,7 @@ export function drawArrowScale(pen: CanvasRenderingContext2D, newtons: number, p
 export function drawTime(pen: CanvasRenderingContext2D, time: number, title: string, view: Rectangle, palette: Palette): void {
   pen.textBaseline = "top";
   pen.textAlign = "left";
-  pen.font = `600 16px ${FONT}`;
+  pen.font = `600 ${16 * sizeIn(view)}px ${FONT}`;
   haloed(pen, title, view.x + MARGIN, view.y + MARGIN, palette.text, palette);
   pen.textAlign = "right";
   haloed(pen, seconds(time), view.x + view.width - MARGIN, view.y + MARGIN, palette.text, palette);

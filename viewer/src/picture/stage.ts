@@ -81,6 +81,21 @@ export class Stage {
     this.redraw();
   }
 
+  /** The usual view: of the place of the scene, or of where its objects have gone. */
+  home(): void {
+    const [world] = this.worlds;
+    const strayed = world !== undefined && world.middleOfObjects().distanceTo(world.center) > 1.5 * world.radius;
+    this.orbit.home(strayed ? world.middleOfObjects() : undefined);
+  }
+
+  /** Whether the objects have left the picture. */
+  get empty(): boolean {
+    const [world] = this.worlds;
+    if (world === undefined || world.objects.length === 0) return false;
+    const at = world.middleOfObjects().project(this.orbit.camera);
+    return Math.abs(at.x) > 1.15 || Math.abs(at.y) > 1.15 || Math.abs(at.z) > 1;
+  }
+
   fitCamera(): void {
     const view = this.viewOf(0);
     this.orbit.resize(view.width / view.height);

@@ -149,17 +149,18 @@ export class World {
     if (!this.shadowsStale) return;
     this.shadowsStale = false;
     const around = this.middleOfObjects();
-    const setPlane = (plane: Vector4, reach: number) => {
+    const setPlane = (plane: Vector4, shear: Vector3, reach: number) => {
       const materials = [...this.objects, ...this.obstacles.values(), ...this.fingers].map((x) => x.shadowMaterial);
       for (const material of materials) {
         material.uniforms.plane.value = plane;
+        material.uniforms.shear.value = shear;
         material.uniforms.reach.value = reach;
       }
     };
     for (const ground of this.grounds.values()) ground.draw(renderer, this.casters, around, setPlane);
   }
 
-  private middleOfObjects(): Vector3 {
+  middleOfObjects(): Vector3 {
     const middle = new Vector3();
     if (this.objects.length === 0) return middle.copy(this.center);
     for (const object of this.objects) middle.add(object.group.position);

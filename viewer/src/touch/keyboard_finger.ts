@@ -23,6 +23,7 @@ export class KeyboardFinger {
   private y = 0;
   private readonly pressed = new Set<string>();
   private shown = false;
+  private byPointer = false;
   private last = 0;
 
   constructor(
@@ -38,11 +39,21 @@ export class KeyboardFinger {
       this.touches.end(KEY);
       this.hide();
     });
+    // Script may focus the picture too; only who came by keyboard wants the ring.
     canvas.addEventListener("focus", () => {
-      if (!canvas.matches(":focus-visible")) return;
+      if (this.byPointer) return;
       this.shown = true;
       this.stage.redraw();
     });
+    for (const [name, byPointer] of [
+      ["pointerdown", true],
+      ["keydown", false],
+    ] as const) {
+      document.addEventListener(name, () => {
+        this.byPointer = byPointer;
+        canvas.classList.toggle("keyed", !byPointer);
+      }, { capture: true });
+    }
     canvas.addEventListener("pointerdown", () => this.hide());
   }
 

@@ -35,7 +35,7 @@ export class Pointers {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", (event) => {
       const at = stage.toPicture(event.clientX, event.clientY);
-      if (this.touches === null || this.touches.at(at.x, at.y) === null) stage.orbit.home();
+      if (this.touches === null || this.touches.at(at.x, at.y) === null) stage.home();
     });
   }
 

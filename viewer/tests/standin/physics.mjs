@@ -6,6 +6,7 @@ import { boxSurface, shapeAt, waves } from "./box.mjs";
 const SIZE = 0.1;
 const MASS = 0.11;
 const INERTIA = (MASS * SIZE * SIZE) / 6;
+const FIRST_HZ = 17;
 const DENT_STIFFNESS = 900;
 const DENT_RADIUS = 0.014;
 export const TIP = 0.006;
@@ -92,7 +93,7 @@ export class Box {
     this.devices.forEach((device, i) => this.touch(device, i, h));
     if (this.floor) for (const foot of this.feet) this.stand(foot, h);
     for (let k = 0; k < this.waves.length; k++) {
-      const omega = 2 * Math.PI * 6 * Math.sqrt(this.waves[k].square);
+      const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
       this.speed[k] = (this.speed[k] - h * omega * omega * this.q[k]) / (1 + h * (6 + 0.12 * omega));
       this.q[k] += h * this.speed[k];
     }
@@ -112,7 +113,7 @@ export class Box {
     const v = this.velocityAt(arm, foot.shape);
     const up = Math.max(0, -60 * at[1] - 0.25 * v[1]);
     const side = Math.hypot(v[0], v[2]);
-    const grip = side > 0 ? Math.min(this.friction * up, 0.3 * side) / side : 0;
+    const grip = side > 0 ? Math.min(this.friction * up, 3 * side) / side : 0;
     const force = [-grip * v[0], up, -grip * v[2]];
     this.lost += Math.max(0, -dot(force, v)) * h * 0.5;
     this.press(force, arm, foot.shape, h);
@@ -215,7 +216,7 @@ export class Box {
   energies() {
     let [elastic, kinetic] = [0, 0.5 * MASS * dot(this.velocity, this.velocity) + 0.5 * INERTIA * dot(this.spin, this.spin)];
     for (let k = 0; k < this.q.length; k++) {
-      const omega = 2 * Math.PI * 6 * Math.sqrt(this.waves[k].square);
+      const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
       elastic += 0.125 * MASS * (omega * this.q[k]) ** 2;
       kinetic += 0.125 * MASS * this.speed[k] ** 2;
     }

@@ -14,6 +14,7 @@ import {
   RawShaderMaterial,
   type Texture,
   Vector3,
+  Vector4,
   type WebGLRenderer,
 } from "three";
 import type { ObjectPicture } from "../../protocol/picture";
@@ -106,14 +107,14 @@ export class ElasticObject {
         glslVersion: GLSL3,
         vertexShader: SURFACE_VERTEX,
         fragmentShader,
-        uniforms: { ...this.uniforms, ...own },
+        uniforms: { plane: { value: new Vector4() }, shear: { value: new Vector3() }, ...this.uniforms, ...own },
         side: DoubleSide,
         transparent,
         depthWrite: !transparent,
       });
     this.surfaceMaterial = material(SURFACE_FRAGMENT, { colour: { value: rgb(colour) }, lift: { value: 0 }, glow: { value: 0 } });
-    this.wireMaterial = material(WIRE_FRAGMENT, { colour: { value: [0, 0, 0] }, opacity: { value: 0.16 }, lift: { value: 8e-4 } }, true);
-    this.shadowMaterial = material(SHADOW_FRAGMENT, { plane: { value: null }, reach: { value: 1 }, lift: { value: 0 } });
+    this.wireMaterial = material(WIRE_FRAGMENT, { colour: { value: [0, 0, 0] }, opacity: { value: 0.11 }, lift: { value: 8e-4 } }, true);
+    this.shadowMaterial = material(SHADOW_FRAGMENT, { plane: { value: new Vector4() }, shear: { value: new Vector3() }, reach: { value: 1 }, lift: { value: 0 } });
     this.solid = new Mesh(this.geometry, this.surfaceMaterial);
     this.wires = new LineSegments(this.edges, this.wireMaterial);
     this.wires.renderOrder = 1;

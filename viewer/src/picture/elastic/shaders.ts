@@ -89,6 +89,8 @@ uniform int placeWidth;
 uniform int normalWidth;
 uniform int measure;          // 0 none, 1 displacement, 2 strain
 uniform float range;
+uniform vec4 plane;           // of a shadow: normal, offset
+uniform vec3 shear;           // how far a shadow falls aside per height; 0 for what is seen
 uniform float lift;           // towards the eye, as a share of the distance: lines lie on the surface
 in vec2 element;              // node, vertex
 out vec3 seenAt;
@@ -102,6 +104,7 @@ void main() {
   seenAt = world.xyz;
   facing = mat3(modelMatrix) * normal.xyz;
   value = measure == 1 ? place.w / range : measure == 2 ? normal.w / range : 0.0;
+  world.xyz += shear * max(0.0, dot(plane.xyz, world.xyz) - plane.w);
   vec4 eye = viewMatrix * world;
   gl_Position = projectionMatrix * vec4(eye.xyz * (1.0 - lift), 1.0);
 }`;
