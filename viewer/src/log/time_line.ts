@@ -1,0 +1,51 @@
+// The bar of a log: play, frame by frame, a slider over all of it, the speed.
+
+import { seconds } from "../format";
+import { element, icon, iconButton } from "../panels/element";
+import { SPEEDS, type Player } from "./player";
+
+export class TimeLine {
+  readonly parts: HTMLElement[];
+  private readonly play: HTMLButtonElement;
+  private readonly slider = element("input", { type: "range", class: "scrubber", attributes: { min: "0", max: "1", step: "any", value: "0", "aria-label": "Time" } });
+  private readonly clock = element("output", { class: "clock" });
+  private readonly speed = element("select", { title: "Speed ([ and ])", attributes: { "aria-label": "Speed" } });
+  private shownPlaying = false;
+
+  constructor(
+    private readonly player: Player,
+    home: () => void,
+  ) {
+    this.play = iconButton("play", "Play (Space)", () => player.toggle());
+    this.slider.addEventListener("input", () => player.seek(this.slider.valueAsNumber));
+    this.speed.append(...SPEEDS.map((s) => element("option", { text: `${s}×`, attributes: { value: String(s) } })));
+    this.speed.addEventListener("change", () => {
+      player.speed = Number(this.speed.value);
+    });
+    this.parts = [
+      this.play,
+      iconButton("back", "One picture back (←)", () => player.hop(-1)),
+      iconButton("step", "One picture on (→)", () => player.hop(1)),
+      this.slider,
+      this.clock,
+      this.speed,
+      iconButton("home", "The view as at first (V)", home),
+    ];
+  }
+
+  show(): void {
+    const { player } = this;
+    this.slider.max = String(player.duration);
+    this.slider.value = String(player.time);
+    this.slider.setAttribute("aria-valuetext", seconds(player.time));
+    this.slider.style.setProperty("--share", `${(100 * player.time) / Math.max(player.duration, 1e-9)}%`);
+    this.clock.textContent = `${player.time.toFixed(2)} / ${seconds(player.duration)}`;
+    if (document.activeElement !== this.speed) this.speed.value = String(player.speed);
+    if (player.playing === this.shownPlaying) return;
+    this.shownPlaying = player.playing;
+    const label = player.playing ? "Pause (Space)" : "Play (Space)";
+    this.play.replaceChildren(icon(player.playing ? "pause" : "play"));
+    this.play.title = label;
+    this.play.setAttribute("aria-label", label);
+  }
+}

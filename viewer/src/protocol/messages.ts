@@ -1,0 +1,227 @@
+// Messages as JSON, both ways (docs/viewer-protocol.md, "Messages").
+
+import type { EnergyName, Vector } from "./picture";
+
+export interface SceneEntry {
+  id: string;
+  title: string;
+  about: string;
+}
+
+export interface RenderOrder {
+  frames: number[];
+  width: number;
+  height: number;
+  camera: { from: Vector; to: Vector } | null;
+  colour: string;
+  dark: boolean;
+}
+
+export interface Hello {
+  type: "hello";
+  protocol: number;
+  version: string;
+  kind: "live" | "logs" | "render";
+  scenes: SceneEntry[];
+  logs: { name: string }[];
+  render?: RenderOrder;
+}
+
+export interface Material {
+  young: number;
+  poisson: number;
+  density: number;
+}
+
+export interface Coupling {
+  stiffness: number;
+  damping: number;
+}
+
+export interface SceneObject {
+  name: string;
+  nodes: number;
+  triangles: number;
+  modes: number;
+  radius: number;
+  mass: number;
+  fixed: boolean;
+  material: Material | null;
+  recordable: boolean;
+  certificate: string[];
+}
+
+export type ObstacleShape =
+  | { plane: object }
+  | { sphere: { radius: number } }
+  | { box: { half_extents: Vector } }
+  | { capsule: { radius: number; half_length: number } }
+  | { mesh: object };
+
+export interface SceneObstacle {
+  name: string;
+  shape: ObstacleShape;
+  pose: number[];
+  friction: number;
+}
+
+export interface SceneDevice {
+  name: string;
+  pointer: boolean;
+  tip_radius: number;
+  patch_radius: number;
+  friction: number;
+  coupling: Coupling | null;
+}
+
+export interface SceneMessage {
+  type: "scene";
+  generation: number;
+  id: string;
+  title: string;
+  about: string;
+  step_s: number;
+  gravity: Vector;
+  log?: number;
+  frames?: number;
+  frame_s?: number;
+  objects: SceneObject[];
+  obstacles: SceneObstacle[];
+  devices: SceneDevice[];
+  view: { center: Vector; radius: number };
+}
+
+export interface Percentiles {
+  p50: number;
+  p99: number;
+  p999: number;
+  max: number;
+}
+
+export interface Status {
+  type: "status";
+  generation: number;
+  paused: boolean;
+  slowness: number;
+  steps: number;
+  viewers: number;
+  force_process: {
+    compute_us: Percentiles;
+    late_us: Percentiles;
+    overruns: number;
+    own_overruns: number;
+    priority: boolean;
+  } | null;
+}
+
+export interface Granted {
+  type: "granted";
+  pointer: number;
+  device: number | null;
+}
+
+export interface Progress {
+  type: "progress";
+  job: string;
+  what: string;
+  share: number | null;
+  done?: boolean;
+}
+
+export interface Note {
+  type: "note";
+  text: string;
+}
+
+export interface Complaint {
+  type: "error";
+  text: string;
+}
+
+export type FromServer = Hello | SceneMessage | Status | Granted | Progress | Note | Complaint;
+
+export type TouchMode = "touch" | "hold";
+
+export type ToServer =
+  | { type: "press"; pointer: number; mode: "touch"; position: Vector }
+  | {
+      type: "press";
+      pointer: number;
+      mode: "hold";
+      position: Vector;
+      object: number;
+      triangle: number;
+      weights: Vector;
+    }
+  | { type: "move"; pointers: { pointer: number; position: Vector }[] }
+  | { type: "release"; pointer: number }
+  | { type: "pause"; paused: boolean }
+  | { type: "step" }
+  | { type: "slow"; slowness: number }
+  | { type: "reset" }
+  | { type: "open"; scene: string }
+  | { type: "set"; gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }
+  | ({ type: "material"; object: number } & Material)
+  | { type: "stream"; form: "modal" | "vertices"; every: number };
+
+/** What `/log/K/series` answers. */
+export interface Series {
+  t: number[];
+  devices: { name: string; force: number[] }[];
+  energy: Partial<Record<EnergyName, number[]>>;
+}
+
+type Check = (message: Record<string, unknown>) => boolean;
+
+function isList(value: unknown): value is unknown[] {
+  return Array.isArray(value);
+}
+
+function isNumbers(value: unknown, count: number): boolean {
+  return isList(value) && value.length === count && value.every((x) => typeof x === "number");
+}
+
+function isObject(value: unknown): value is Record<string, unknown> {
+  return typeof value === "object" && value !== null && !isList(value);
+}
+
+function isView(value: unknown): boolean {
+  return isObject(value) && isNumbers(value.center, 3) && typeof value.radius === "number" && value.radius > 0;
+}
+
+// What the page relies on when it takes a message apart.
+const CHECKS: Record<FromServer["type"], Check> = {
+  hello: (m) =>
+    typeof m.protocol === "number" &&
+    (m.kind === "live" || m.kind === "logs" || m.kind === "render") &&
+    isList(m.scenes) &&
+    isList(m.logs),
+  scene: (m) =>
+    typeof m.generation === "number" &&
+    isNumbers(m.gravity, 3) &&
+    isList(m.objects) &&
+    m.objects.every((o) => isObject(o) && typeof o.radius === "number" && isList(o.certificate)) &&
+    isList(m.obstacles) &&
+    m.obstacles.every((o) => isObject(o) && isObject(o.shape) && isNumbers(o.pose, 7)) &&
+    isList(m.devices) &&
+    m.devices.every((d) => isObject(d) && typeof d.tip_radius === "number") &&
+    isView(m.view),
+  status: (m) => typeof m.paused === "boolean" && typeof m.slowness === "number",
+  granted: (m) => typeof m.pointer === "number",
+  progress: (m) => typeof m.job === "string",
+  note: (m) => typeof m.text === "string",
+  error: (m) => typeof m.text === "string",
+};
+
+/** A message of the server; null if it is none that this page knows. */
+export function readMessage(text: string): FromServer | null {
+  let value: unknown;
+  try {
+    value = JSON.parse(text);
+  } catch {
+    return null;
+  }
+  if (!isObject(value) || typeof value.type !== "string") return null;
+  const check = Object.hasOwn(CHECKS, value.type) ? CHECKS[value.type as FromServer["type"]] : undefined;
+  return check !== undefined && check(value) ? (value as unknown as FromServer) : null;
+}

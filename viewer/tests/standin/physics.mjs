@@ -1,0 +1,228 @@
+// Made-up motion of the box: a free body with damped waves, springs to fingers, a springy floor. Smooth and plausible,
+// and no more.
+
+import { boxSurface, shapeAt, waves } from "./box.mjs";
+
+const SIZE = 0.1;
+const MASS = 0.11;
+const INERTIA = (MASS * SIZE * SIZE) / 6;
+const FIRST_HZ = 17;
+const DENT_STIFFNESS = 900;
+const DENT_RADIUS = 0.014;
+export const TIP = 0.006;
+
+const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const length = (a) => Math.hypot(...a);
+
+function turn([x, y, z, w], v) {
+  const t = scale(cross([x, y, z], v), 2);
+  return add(add(v, scale(t, w)), cross([x, y, z], t));
+}
+const unturn = ([x, y, z, w], v) => turn([-x, -y, -z, w], v);
+
+export class Box {
+  constructor({ cells = 12, modes = 60, height = 0.05, floor = true, devices = 2 } = {}) {
+    this.size = SIZE;
+    this.surface = boxSurface(SIZE, cells);
+    this.waves = waves(modes);
+    this.nodes = this.surface.positions.length / 3;
+    this.floor = floor;
+    this.gravity = [0, -9.81, 0];
+    this.friction = 0.6;
+    this.coupling = { stiffness: 200, damping: 0.5 };
+    this.height = height;
+    this.deviceCount = devices;
+    const grid = [-0.5, -0.25, 0, 0.25, 0.5];
+    this.feet = grid.flatMap((x) => grid.flatMap((y) => grid.map((z) => [x * SIZE, y * SIZE, z * SIZE]))).filter((p) => p.some((x) => Math.abs(x) > 0.49 * SIZE));
+    this.feet = this.feet.map((rest) => ({ rest, shape: this.shapesAt(rest) }));
+    this.begin();
+  }
+
+  begin() {
+    this.step = 0;
+    this.time = 0;
+    this.position = [0, SIZE / 2 + this.height, 0];
+    this.velocity = [0, 0, 0];
+    this.orientation = [0, 0, 0, 1];
+    this.spin = [0, 0, 0];
+    this.q = new Float64Array(this.waves.length);
+    this.speed = new Float64Array(this.waves.length);
+    this.devices = Array.from({ length: this.deviceCount }, () => ({ doing: 0, position: [0, 0, 0], target: [0, 0, 0], proxy: [0, 0, 0], force: [0, 0, 0], dent: 0 }));
+    this.contacts = [];
+    this.lost = 0;
+    this.input = 0;
+  }
+
+  shapesAt(p) {
+    return Float64Array.from(this.waves, (wave) => shapeAt(wave, ...p, SIZE));
+  }
+
+  moved(shape) {
+    const u = [0, 0, 0];
+    for (let k = 0; k < this.waves.length; k++) u[this.waves[k].axis] += this.q[k] * shape[k];
+    return u;
+  }
+
+  drag(shape) {
+    const u = [0, 0, 0];
+    for (let k = 0; k < this.waves.length; k++) u[this.waves[k].axis] += this.speed[k] * shape[k];
+    return u;
+  }
+
+  /** Presses with a force in the world at a place in the body frame. */
+  press(force, arm, shape, h) {
+    this.velocity = add(this.velocity, scale(force, h / MASS));
+    this.spin = add(this.spin, scale(cross(turn(this.orientation, arm), force), h / INERTIA));
+    const own = unturn(this.orientation, force);
+    for (let k = 0; k < this.waves.length; k++) this.speed[k] += (h * own[this.waves[k].axis] * shape[k]) / (0.25 * MASS);
+  }
+
+  velocityAt(arm, shape) {
+    return add(add(this.velocity, cross(this.spin, turn(this.orientation, arm))), turn(this.orientation, this.drag(shape)));
+  }
+
+  advance(h = 0.001) {
+    this.step++;
+    this.time += h;
+    this.velocity = add(this.velocity, scale(this.gravity, h));
+    this.contacts = [];
+    this.devices.forEach((device, i) => this.touch(device, i, h));
+    if (this.floor) for (const foot of this.feet) this.stand(foot, h);
+    for (let k = 0; k < this.waves.length; k++) {
+      const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
+      this.speed[k] = (this.speed[k] - h * omega * omega * this.q[k]) / (1 + h * (6 + 0.12 * omega));
+      this.q[k] += h * this.speed[k];
+    }
+    this.spin = scale(this.spin, 1 - 0.6 * h);
+    this.position = add(this.position, scale(this.velocity, h));
+    const [x, y, z, w] = this.orientation;
+    const [a, b, c] = scale(this.spin, 0.5 * h);
+    const next = [x + a * w + b * z - c * y, y + b * w + c * x - a * z, z + c * w + a * y - b * x, w - a * x - b * y - c * z];
+    const norm = Math.hypot(...next);
+    this.orientation = next.map((value) => value / norm);
+  }
+
+  stand(foot, h) {
+    const arm = add(foot.rest, this.moved(foot.shape));
+    const at = add(this.position, turn(this.orientation, arm));
+    if (at[1] >= 0) return;
+    const v = this.velocityAt(arm, foot.shape);
+    const up = Math.max(0, -60 * at[1] - 0.25 * v[1]);
+    const side = Math.hypot(v[0], v[2]);
+    const grip = side > 0 ? Math.min(this.friction * up, 3 * side) / side : 0;
+    const force = [-grip * v[0], up, -grip * v[2]];
+    this.lost += Math.max(0, -dot(force, v)) * h * 0.5;
+    this.press(force, arm, foot.shape, h);
+    this.contacts.push({ object: 0, kind: 1, number: 0, point: at, force, slip: side });
+  }
+
+  touch(device, number, h) {
+    device.force = [0, 0, 0];
+    if (device.doing === 0) {
+      device.dent = 0;
+      return;
+    }
+    device.position = add(device.position, scale(sub(device.target, device.position), Math.min(1, 30 * h)));
+    const local = unturn(this.orientation, sub(device.position, this.position));
+    let rest = device.held;
+    let normal = null;
+    if (device.doing === 1) {
+      // The nearest place of the box, as it is at rest.
+      const half = SIZE / 2;
+      const inside = local.every((x) => Math.abs(x) < half + TIP);
+      if (!inside) {
+        device.proxy = device.position;
+        device.dent *= 0.9;
+        device.anchor = null;
+        return;
+      }
+      if (device.anchor == null) {
+        const axis = [0, 1, 2].reduce((best, k) => (Math.abs(local[k]) > Math.abs(local[best]) ? k : best), 0);
+        device.anchor = { axis, side: Math.sign(local[axis]) };
+      }
+      const { axis, side } = device.anchor;
+      rest = local.map((x, k) => (k === axis ? side * half : Math.max(-half, Math.min(half, x))));
+      normal = [0, 0, 0].map((_, k) => (k === axis ? side : 0));
+    }
+    const shape = this.shapesAt(rest);
+    const arm = add(rest, this.moved(shape));
+    if (normal === null) {
+      device.proxy = add(this.position, turn(this.orientation, arm));
+      const pull = add(scale(sub(device.position, device.proxy), this.coupling.stiffness), scale(this.velocityAt(arm, shape), -this.coupling.damping));
+      this.apply(device, number, pull, arm, rest, shape, h, 0);
+      return;
+    }
+    const depth = TIP - dot(sub(local, arm), normal);
+    if (depth <= 0) {
+      device.proxy = device.position;
+      device.dent *= 0.9;
+      return;
+    }
+    const stiffness = 1 / (1 / this.coupling.stiffness + 1 / DENT_STIFFNESS);
+    const v = this.velocityAt(arm, shape);
+    const out = turn(this.orientation, normal);
+    const push = Math.max(0, stiffness * depth + this.coupling.damping * dot(v, out));
+    const side = sub(v, scale(out, dot(v, out)));
+    const slip = length(side);
+    const grip = slip > 0 ? Math.min(this.friction * push, 2 * slip) / slip : 0;
+    device.dent = push / DENT_STIFFNESS;
+    device.proxy = add(device.position, scale(out, depth - device.dent));
+    this.apply(device, number, add(scale(out, -push), scale(side, -grip)), arm, rest, shape, h, slip);
+  }
+
+  apply(device, number, force, arm, rest, shape, h, slip) {
+    device.force = scale(force, -1);
+    device.rest = rest;
+    this.input += dot(force, this.velocityAt(arm, shape)) * h;
+    this.press(force, arm, shape, h);
+    const point = add(this.position, turn(this.orientation, arm));
+    this.contacts.push({ object: 0, kind: 0, number, point, force, slip });
+  }
+
+  /** What fingers dent beyond the waves: body frame, per node. */
+  dents() {
+    const found = [];
+    const { positions } = this.surface;
+    for (let n = 0; n < this.nodes; n++) {
+      const u = [0, 0, 0];
+      for (const device of this.devices) {
+        if (device.doing === 0 || device.rest === undefined) continue;
+        const away = sub([positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]], device.rest);
+        const share = Math.exp(-dot(away, away) / (DENT_RADIUS * DENT_RADIUS));
+        if (share < 0.01) continue;
+        const own = scale(unturn(this.orientation, device.force), -share / DENT_STIFFNESS);
+        for (let k = 0; k < 3; k++) u[k] += own[k];
+      }
+      if (length(u) > 1e-6) found.push({ node: n, u });
+    }
+    return found;
+  }
+
+  places() {
+    const { positions } = this.surface;
+    const places = positions.slice();
+    for (let n = 0; n < this.nodes; n++) {
+      const u = this.moved(this.shapesAt([positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]]));
+      for (let k = 0; k < 3; k++) places[3 * n + k] += u[k];
+    }
+    for (const { node, u } of this.dents()) for (let k = 0; k < 3; k++) places[3 * node + k] += u[k];
+    return places;
+  }
+
+  energies() {
+    let [elastic, kinetic] = [0, 0.5 * MASS * dot(this.velocity, this.velocity) + 0.5 * INERTIA * dot(this.spin, this.spin)];
+    for (let k = 0; k < this.q.length; k++) {
+      const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
+      elastic += 0.125 * MASS * (omega * this.q[k]) ** 2;
+      kinetic += 0.125 * MASS * this.speed[k] ** 2;
+    }
+    const potential = -MASS * dot(this.gravity, this.position);
+    const residual = this.devices.reduce((sum, d) => sum + (0.5 * dot(d.force, d.force)) / DENT_STIFFNESS, 0);
+    const coupling = this.devices.reduce((sum, d) => sum + (0.5 * dot(d.force, d.force)) / this.coupling.stiffness, 0);
+    return [kinetic, elastic, residual, potential, coupling, this.input, this.lost, 0.1 * this.lost, 0, 1e-9 * Math.sin(this.time)];
+  }
+}

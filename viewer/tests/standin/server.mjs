@@ -1,0 +1,237 @@
+// Speaks docs/viewer-protocol.md with a made-up box.
+//   node tests/standin/server.mjs [--port 8123] [--kind live|logs|render] [--logs 2] [--cells 12] [--modes 60] [--garbage]
+
+import { createReadStream, existsSync, statSync } from "node:fs";
+import { createServer } from "node:http";
+import { extname, join, normalize } from "node:path";
+import { fileURLToPath } from "node:url";
+import { WebSocketServer } from "ws";
+import { shapesBytes, surfaceBytes } from "./box.mjs";
+import { picture } from "./encode.mjs";
+import { recordLog } from "./logs.mjs";
+import { makeScene, SCENES } from "./scenes.mjs";
+
+const DIST = fileURLToPath(new URL("../../dist/", import.meta.url));
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+
+function argument(name, otherwise) {
+  const at = process.argv.indexOf(`--${name}`);
+  return at < 0 ? otherwise : (process.argv[at + 1] ?? "");
+}
+
+export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null } = {}) {
+  const options = { cells, modes };
+  let generation = 1;
+  let scene = makeScene("bounce", generation, options);
+  let [paused, slowness, owed, boxBytes] = [false, 1, 0, null];
+  const viewers = new Set();
+  const pictures = [];
+  const recorded = kind === "live" ? [] : Array.from({ length: logs }, (_, i) => recordLog(i, options));
+
+  const say = (viewer, message) => viewer.socket.send(JSON.stringify(message));
+  const sayAll = (message) => viewers.forEach((viewer) => say(viewer, message));
+  const surfaces = () => {
+    const { box } = recorded[0] ?? scene;
+    boxBytes ??= { surface: surfaceBytes(box.surface), shapes: shapesBytes(box.surface, box.waves, box.size) };
+    return boxBytes;
+  };
+
+  function open(id) {
+    generation++;
+    const { gravity } = scene.box;
+    const same = id === scene.message.id;
+    scene = makeScene(id, generation, options);
+    if (same) scene.box.gravity = gravity;
+    for (const viewer of viewers) viewer.pointers.clear();
+    sayAll(scene.message);
+  }
+
+  const http = createServer((request, response) => {
+    const url = new URL(request.url, "http://localhost");
+    const answer = (body, type = "application/octet-stream") => response.writeHead(200, { "content-type": type }).end(body);
+    if (/^\/scene\/\d+\/object\/0\/surface$/.test(url.pathname)) return answer(surfaces().surface);
+    if (/^\/scene\/\d+\/object\/0\/shapes$/.test(url.pathname)) return answer(surfaces().shapes);
+    const log = url.pathname.match(/^\/log\/(\d+)\/(frames|series)$/);
+    if (log !== null && recorded[log[1]] !== undefined) {
+      const { frames, series } = recorded[log[1]];
+      if (log[2] === "series") return answer(JSON.stringify(series), "application/json");
+      const from = Number(url.searchParams.get("from"));
+      const part = frames.slice(from, from + Number(url.searchParams.get("count")));
+      return answer(Buffer.concat(part.flatMap((frame) => [Buffer.from(Uint32Array.of(frame.length).buffer), frame])));
+    }
+    if (request.method === "POST") {
+      const parts = [];
+      request.on("data", (part) => parts.push(part));
+      request.on("end", () => {
+        const drawn = url.pathname.match(/^\/picture\/(\d+)$/);
+        if (drawn !== null) pictures[drawn[1]] = Buffer.concat(parts);
+        else record(url.searchParams.get("name") ?? "mesh");
+        response.writeHead(drawn !== null ? 204 : 202).end();
+      });
+      return undefined;
+    }
+    const file = normalize(join(DIST, url.pathname === "/" ? "index.html" : url.pathname));
+    if (!file.startsWith(DIST) || !existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end("not found");
+    response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream" });
+    return createReadStream(file).pipe(response);
+  });
+
+  function record(job) {
+    let share = 0;
+    const timer = setInterval(() => {
+      share += 0.1;
+      const what = share < 0.3 ? "elements" : share < 0.8 ? "modes" : "residual";
+      if (share < 1) return sayAll({ type: "progress", job, what, share });
+      clearInterval(timer);
+      sayAll({ type: "progress", job, what: "certificate", share: 1, done: true });
+      return open(scene.message.id);
+    }, 300);
+    timer.unref();
+  }
+
+  function press(viewer, message) {
+    const device = scene.box.devices.findIndex((d) => d.doing === 0);
+    say(viewer, { type: "granted", pointer: message.pointer, device: device < 0 ? null : device });
+    if (device < 0) return;
+    viewer.pointers.set(message.pointer, device);
+    const d = scene.box.devices[device];
+    Object.assign(d, { doing: message.mode === "hold" ? 2 : 1, position: message.position, target: message.position, proxy: message.position, anchor: null });
+    if (message.mode !== "hold") return;
+    const { positions, corners } = scene.box.surface;
+    d.held = [0, 1, 2].map((k) => message.weights.reduce((sum, w, c) => sum + w * positions[3 * corners[3 * message.triangle + c] + k], 0));
+  }
+
+  function letGo(viewer, pointer) {
+    const device = viewer.pointers.get(pointer);
+    viewer.pointers.delete(pointer);
+    if (device !== undefined) scene.box.devices[device].doing = 0;
+  }
+
+  const acts = {
+    press,
+    move: (viewer, { pointers }) => {
+      for (const { pointer, position } of pointers) {
+        const device = viewer.pointers.get(pointer);
+        if (device !== undefined) scene.box.devices[device].target = position;
+      }
+    },
+    release: (viewer, { pointer }) => letGo(viewer, pointer),
+    pause: (_, message) => {
+      paused = message.paused;
+      status();
+    },
+    step: () => {
+      if (paused) owed += 0.001;
+    },
+    slow: (_, message) => {
+      slowness = message.slowness;
+      status();
+    },
+    reset: () => open(scene.message.id),
+    open: (_, message) => open(message.scene),
+    set: (_, { gravity, friction, coupling }) => {
+      if (gravity !== undefined) scene.box.gravity = gravity;
+      if (friction !== undefined) scene.box.friction = friction;
+      if (coupling !== undefined) scene.box.coupling = coupling;
+    },
+    material: () => record("cube"),
+    stream: (viewer, { form, every }) => Object.assign(viewer, { form, every }),
+  };
+
+  const sockets = new WebSocketServer({ server: http, path: "/session" });
+  sockets.on("connection", (socket) => {
+    const viewer = { socket, form: "modal", every: 1, count: 0, pointers: new Map(), heard: [] };
+    viewers.add(viewer);
+    say(viewer, {
+      type: "hello",
+      protocol: 1,
+      version: "stand-in",
+      kind,
+      scenes: kind === "live" ? SCENES.map(({ id, title, about }) => ({ id, title, about })) : [],
+      logs: recorded.map(({ name }) => ({ name })),
+      ...(kind === "render" ? { render } : {}),
+    });
+    if (kind === "live") say(viewer, scene.message);
+    else recorded.forEach(({ message }, log) => say(viewer, { ...message, log }));
+    socket.on("message", (data) => {
+      const message = JSON.parse(data.toString());
+      viewer.heard.push(message);
+      acts[message.type]?.(viewer, message);
+    });
+    socket.on("close", () => {
+      for (const pointer of [...viewer.pointers.keys()]) letGo(viewer, pointer);
+      viewers.delete(viewer);
+    });
+  });
+
+  let last = performance.now();
+  const timers = [];
+  function status() {
+    const spread = { p50: 21, p99: 44, p999: 90, max: 310 };
+    sayAll({
+      type: "status",
+      generation,
+      paused,
+      slowness,
+      steps: scene.box.step,
+      viewers: viewers.size,
+      force_process: { compute_us: spread, late_us: { p50: 8, p99: 60, p999: 140, max: 900 }, overruns: 3, own_overruns: 0, priority: false },
+    });
+  }
+  function live() {
+    const now = performance.now();
+    if (!paused) owed += Math.min(0.1, (now - last) / 1000) / slowness;
+    last = now;
+    for (; owed >= 0.001; owed -= 0.001) scene.box.advance();
+    for (const viewer of viewers) {
+      if (viewer.every === 0 || viewer.count++ % viewer.every !== 0 || viewer.socket.bufferedAmount > 1e6) continue;
+      viewer.socket.send(picture(scene.box, viewer.form, generation, scene.message));
+      viewer.sent = (viewer.sent ?? 0) + 1;
+      if (garbage && viewer.sent % 30 === 0) {
+        viewer.socket.send(Buffer.from("this is no picture at all, and it is binary, and it is longer than a header has to be at the very least"));
+        viewer.socket.send('{"type":"what"');
+        viewer.socket.send('{"type":"constructor"}');
+      }
+    }
+  }
+  if (kind === "live") timers.push(setInterval(live, 16), setInterval(status, 500));
+
+  const standin = {
+    http,
+    viewers,
+    pictures,
+    get scene() {
+      return scene;
+    },
+    close: () =>
+      new Promise((done) => {
+        timers.forEach(clearInterval);
+        for (const { socket } of viewers) socket.terminate();
+        sockets.close();
+        http.close(done);
+        http.closeAllConnections();
+      }),
+  };
+  return new Promise((ready, failed) => {
+    http.on("error", failed);
+    http.listen(port, "127.0.0.1", () => {
+      standin.port = http.address().port;
+      standin.url = `http://127.0.0.1:${standin.port}/`;
+      ready(standin);
+    });
+  });
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const frames = Array.from({ length: 10 }, (_, i) => 6 * i);
+  const { url } = await serve({
+    port: Number(argument("port", 8123)),
+    kind: argument("kind", "live"),
+    logs: Number(argument("logs", 1)),
+    cells: Number(argument("cells", 12)),
+    modes: Number(argument("modes", 60)),
+    garbage: process.argv.includes("--garbage"),
+    render: { frames, width: 1280, height: 720, camera: null, colour: "displacement", dark: false },
+  });
+  console.log(url);
+}
