@@ -64,6 +64,8 @@ export function helpSheet(kind: "live" | "logs"): HTMLDialogElement {
         "Red: forces on the object. Every number is computed a thousand times a second from a finite element model, whose error stands under Accuracy.",
     }),
   );
+  // Otherwise keys would go on meaning its button.
+  sheet.addEventListener("close", () => (document.activeElement as HTMLElement | null)?.blur());
   sheet.addEventListener("click", (event) => {
     if (event.target === sheet) close();
   });

@@ -27,7 +27,6 @@ test("surfaces and shapes with a wrong length, or with corners that are not ther
   expect(() => readSurface(bytes(surfaceBytes(wrong)))).toThrow("node 5000");
   const shapes = readShapes(bytes(shapesBytes(box, waves(5), 0.1)));
   expect([shapes.nodes, shapes.modes, shapes.halves.length]).toEqual([surface.nodes, 5, 15 * surface.nodes]);
-  expect(() => readShapes(new ArrayBuffer(20))).not.toThrow();
   expect(() => readShapes(bytes(shapesBytes(box, waves(5), 0.1)).slice(0, -40))).toThrow("shapes of");
 });
 
