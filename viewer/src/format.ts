@@ -17,7 +17,8 @@ const NARROW_SPACE = "\u202f";
 export function digits(value: number, count = 3): string {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
-  const size = Math.abs(value);
+  // Of the rounded number: 0.9999 is 1.00.
+  const size = Math.abs(Number(value.toPrecision(count)));
   if (size >= 1e6 || size < 1e-4) return value.toExponential(count - 1).replace("e+", "e").replaceAll("-", MINUS);
   const behind = Math.max(0, count - 1 - Math.floor(Math.log10(size)));
   return value.toFixed(Math.min(behind, 8)).replace("-", MINUS);

@@ -62,11 +62,14 @@ pub struct WholeFile {
     writer: Option<BufWriter<File>>,
     temporary: PathBuf,
     path: PathBuf,
+    /// As it was asked for: a link to the path, or another way there.
+    given: PathBuf,
 }
 
 impl WholeFile {
     /// Begin a file. A link is followed; what stands there must be a file, or nothing, and none of `inputs`.
     pub fn create(path: &Path, inputs: &[&Path]) -> Result<Self, Failure> {
+        let given = path.to_path_buf();
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
@@ -75,7 +78,7 @@ impl WholeFile {
             forget(&temporary);
             Failure::file("write", &path, &e)
         })?;
-        Ok(Self { writer: Some(BufWriter::new(file)), temporary, path })
+        Ok(Self { writer: Some(BufWriter::new(file)), temporary, path, given })
     }
 
     /// Write some bytes.
@@ -95,14 +98,14 @@ impl WholeFile {
         &self.path
     }
 
-    /// Let the file take its name; gives that.
+    /// Let the file take its name; gives the one that was asked for.
     pub fn finish(mut self) -> Result<PathBuf, Failure> {
         let failed = |e: std::io::Error| Failure::file("write", &self.path, &e);
         if let Some(writer) = self.writer.take() {
             writer.into_inner().map_err(|e| failed(e.into_error()))?.sync_all().map_err(failed)?;
         }
         std::fs::rename(&self.temporary, &self.path).map_err(failed)?;
-        Ok(self.path.clone())
+        Ok(std::mem::take(&mut self.given))
     }
 }
 

@@ -44,6 +44,8 @@ export class Frame {
       this.tabs.set(side, button);
       return button;
     };
+    const theme = iconButton("theme", "Light or dark (T)", acts.theme);
+    theme.classList.add("spare");
     const head = element(
       "header",
       { class: "head" },
@@ -56,7 +58,7 @@ export class Frame {
         tab("controls", "sliders", "Controls"),
         tab("measured", "chart", "Measured"),
       ),
-      iconButton("theme", "Light or dark (T)", acts.theme),
+      theme,
       iconButton("help", "Help and keys (?)", acts.help),
     );
     this.stageArea.append(stage.canvas, stage.overlay, this.upper, this.lower);

@@ -37,8 +37,8 @@ const VIEW_KEYS: readonly [string, string][] = [
   ["?", "This sheet"],
 ];
 
-function table(rows: readonly [string, string][]): HTMLElement {
-  const list = element("dl");
+function table(rows: readonly [string, string][], name = ""): HTMLElement {
+  const list = element("dl", { class: name });
   for (const [what, does] of rows) list.append(element("dt", { text: what }), element("dd", { text: does }));
   return list;
 }
@@ -54,9 +54,8 @@ export function helpSheet(kind: "live" | "logs"): HTMLDialogElement {
       iconButton("close", "Close (Escape)", close),
     ),
     ...(kind === "live"
-      ? [table(POINTING), element("h3", { text: "Keys" }), table(LIVE_KEYS)]
-      : [table(POINTING.slice(4, 5)), element("h3", { text: "Keys" }), table(LOG_KEYS)]),
-    table(VIEW_KEYS),
+      ? [table(POINTING), element("h3", { text: "Keys" }), table([...LIVE_KEYS, ...VIEW_KEYS], "keys")]
+      : [table(POINTING.slice(4, 5)), element("h3", { text: "Keys" }), table([...LOG_KEYS, ...VIEW_KEYS], "keys")]),
     element("h3", { text: "What you see" }),
     element("p", {
       text:
@@ -64,6 +63,8 @@ export function helpSheet(kind: "live" | "logs"): HTMLDialogElement {
         "Red: forces on the object. Every number is computed a thousand times a second from a finite element model, whose error stands under Accuracy.",
     }),
   );
+  // Otherwise keys would go on meaning its button.
+  sheet.addEventListener("close", () => (document.activeElement as HTMLElement | null)?.blur());
   sheet.addEventListener("click", (event) => {
     if (event.target === sheet) close();
   });

@@ -4,10 +4,10 @@ import { ENERGY_NAMES, type EnergyName, type Picture } from "../protocol/picture
 
 export const ENERGY_LINES: readonly { name: string; title: string; of: readonly EnergyName[]; sign?: 1 | -1 }[] = [
   { name: "Motion", title: "Kinetic energy of the objects", of: ["kinetic"] },
-  { name: "Deformation", title: "Energy in what is bent, stretched and dented", of: ["elastic", "residual"] },
+  { name: "Elastic", title: "Energy in what is bent, stretched and dented", of: ["elastic", "residual"] },
   { name: "Height", title: "Potential energy in gravity, against the lowest seen here", of: ["potential"] },
   { name: "Lost", title: "What damping, friction and impacts have taken", of: ["dissipated", "friction", "impact"] },
-  { name: "From hands", title: "Work that the hands have done", of: ["input"] },
+  { name: "By hands", title: "Work that the hands have done", of: ["input"] },
 ];
 
 export function energyOf(energies: ArrayLike<number>, names: readonly EnergyName[]): number {

@@ -34,6 +34,7 @@ export class LiveBar {
     this.modes.set(mode);
     this.pause = iconButton("pause", "Pause (Space)", () => this.togglePause(), "Pause");
     this.step = iconButton("step", "One step (.)", () => this.oneStep());
+    this.step.classList.add("spare");
     this.speed.append(
       ...SLOWNESSES.map((s) => element("option", { text: slownessName(s), attributes: { value: String(s) } })),
     );

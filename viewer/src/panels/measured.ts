@@ -75,6 +75,7 @@ export class PlotPanels {
   showSeries(series: Series): void {
     this.force.begin(series.devices.map(({ name }) => ({ name, title: `Force on ${name}` })));
     this.force.show([series.t, ...series.devices.map(({ force }) => force)], null);
+    this.energy.begin();
     const zero = series.t.map(() => 0);
     const lines = ENERGY_LINES.map((line) => {
       const parts = line.of.map((name) => series.energy[name] ?? zero);

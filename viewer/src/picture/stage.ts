@@ -166,7 +166,13 @@ export class Stage {
   private measure(now: number): void {
     const mode = this.look.colour;
     if (mode === "plain" || this.fixedRange !== null || this.measuring) return;
-    if (now >= this.measuredAt && now < this.measuredAt + MEASURE_EVERY_S && this.measuredAt >= 0) return;
+    if (this.worlds.length === 0 || (now >= this.measuredAt && now < this.measuredAt + MEASURE_EVERY_S && this.measuredAt >= 0)) return;
+    if (this.measuredAt < 0 && this.worlds.every((world) => world.picture !== null)) {
+      // The first picture has its colours at once.
+      this.measuredAt = now;
+      if (this.ranges[mode].take(this.largest(), now)) this.redraw();
+      return;
+    }
     this.measuredAt = now;
     this.measuring = true;
     const objects = this.worlds.flatMap((world) => world.objects);

@@ -111,7 +111,7 @@ export class World {
 
   /** How long an arrow of the whole range is [m]. */
   get longestArrow(): number {
-    return 0.5 * this.radius;
+    return 0.7 * this.radius;
   }
 
   dress(look: Look, colourRange: number): void {

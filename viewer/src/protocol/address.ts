@@ -1,28 +1,30 @@
 // Addresses of the server, with the token that the page was opened with.
 
-const here = new URL(window.location.href);
-const token = here.searchParams.get("token");
+function here(): URL {
+  return new URL(window.location.href);
+}
 
 function withToken(url: URL): URL {
+  const token = here().searchParams.get("token");
   if (token !== null) url.searchParams.set("token", token);
   return url;
 }
 
 /** `path` without a slash in front, so that a server under a prefix works too. */
 export function address(path: string): string {
-  return withToken(new URL(path, here)).href;
+  return withToken(new URL(path, here())).href;
 }
 
 export function sessionAddress(): string {
-  const url = withToken(new URL("session", here));
-  url.protocol = here.protocol === "https:" ? "wss:" : "ws:";
+  const url = withToken(new URL("session", here()));
+  url.protocol = here().protocol === "https:" ? "wss:" : "ws:";
   url.hash = "";
   return url.href;
 }
 
 /** `?stream=vertices`: take places from the server instead of summing modes here. */
 export function wantsVertices(): boolean {
-  return here.searchParams.get("stream") === "vertices";
+  return here().searchParams.get("stream") === "vertices";
 }
 
 /** Fetches bytes, and says how far it is. Never from a cache: generations count from 1 again when a server begins anew. */

@@ -45,15 +45,18 @@ export class KeyboardFinger {
       this.shown = true;
       this.stage.redraw();
     });
-    for (const [name, byPointer] of [
-      ["pointerdown", true],
-      ["keydown", false],
-    ] as const) {
-      document.addEventListener(name, () => {
-        this.byPointer = byPointer;
-        canvas.classList.toggle("keyed", !byPointer);
-      }, { capture: true });
-    }
+    const came = (byPointer: boolean) => {
+      this.byPointer = byPointer;
+      canvas.classList.toggle("keyed", !byPointer);
+    };
+    document.addEventListener("pointerdown", () => came(true), { capture: true });
+    document.addEventListener(
+      "keydown",
+      (event) => {
+        if (event.key === "Tab" || event.key === "Enter" || event.key in MOVES) came(false);
+      },
+      { capture: true },
+    );
     canvas.addEventListener("pointerdown", () => this.hide());
   }
 

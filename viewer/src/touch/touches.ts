@@ -14,7 +14,7 @@ const LEAST_COSINE = 0.35;
 const MOST_POINTERS = 16;
 const SEND_EVERY_MS = 7;
 
-export interface Surfacepoint {
+export interface SurfacePoint {
   object: number;
   triangle: number;
   weights: [number, number, number];
@@ -65,12 +65,12 @@ export class Touches {
   }
 
   /** What of the surfaces is at a place of the picture (−1…1). */
-  at(x: number, y: number): Surfacepoint | null {
+  at(x: number, y: number): SurfacePoint | null {
     const world = this.stage.worlds[0];
     if (world === undefined || world.picture === null) return null;
     const ray = this.stage.orbit.ray(x, y);
     let nearest = this.obstacleBefore(ray);
-    let found: Surfacepoint | null = null;
+    let found: SurfacePoint | null = null;
     world.objects.forEach((object, number) => {
       const toBody = object.group.matrixWorld.clone().invert();
       const own = ray.clone().applyMatrix4(toBody);

@@ -104,12 +104,16 @@ impl Deforming {
 
     /// Put the mesh together, with the weights of its shapes while nothing moves.
     pub fn finish(mut self, content: &mut Content, weights: &[f64]) {
-        self.primitive["targets"] = Value::Array(self.targets);
         let node = self.track.node;
-        let mesh = content.mesh(json!({
-            "name": content.nodes[node]["name"], "primitives": [self.primitive], "weights": weights,
-            "extras": { "targetNames": self.names },
-        }));
+        let mut mesh = json!({ "name": content.nodes[node]["name"] });
+        // Lists that are there are not empty.
+        if !self.targets.is_empty() {
+            self.primitive["targets"] = Value::Array(self.targets);
+            mesh["weights"] = json!(weights);
+            mesh["extras"] = json!({ "targetNames": self.names });
+        }
+        mesh["primitives"] = json!([self.primitive]);
+        let mesh = content.mesh(mesh);
         content.nodes[node]["mesh"] = json!(mesh);
     }
 }

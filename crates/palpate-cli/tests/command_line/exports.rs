@@ -7,11 +7,14 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DQuat, DVec3};
 use palpate::{
-    Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
-    Recording, Shape, State, Twist, step,
+    Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Obstacle, Pose, Recording, Shape, State, Twist, step,
 };
-use palpate_haptics::log::{Names, Reader};
+use palpate_haptics::log::{LogWriter, Names, Reader};
+use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Rest, displacement, translation and turn are rounded to single precision [m]: numbers below 0.25.
 const SINGLE: f64 = 8.0 * 0.25 * f32::EPSILON as f64;
@@ -263,6 +266,11 @@ fn a_recording_is_exported_as_the_shapes_of_its_modes() {
     // Ten are drawn and all have a row, unless it is said.
     let report = workplace.json(&["export", "cube.palp", "--gltf", "m.glb", "--csv", "m.csv", "--json"]);
     assert_eq!((&report["modes"], &report["modes_drawn"]), (&20.into(), &10.into()));
+    // Files that were there already are named as they were asked for, too.
+    assert_eq!(
+        (&report["files"][0]["path"], &report["files"][1]["path"]),
+        (&"m.csv".into(), &"m.glb".into())
+    );
     assert_eq!(Table::parse(&workplace.text("m.csv")).len(), 20);
 }
 
@@ -326,6 +334,45 @@ fn what_can_not_be_exported_is_refused_in_words_and_leaves_nothing() {
         let _ = std::fs::remove_file(workplace.path("a.glb"));
         let _ = std::fs::remove_dir_all(workplace.path("frames"));
     }
+}
+
+#[test]
+fn a_log_that_comes_out_differently_is_told_of_and_leaves_nothing() {
+    let workplace = realtime::workplace();
+    let model = model(&workplace);
+    let mut state = State::new(&model);
+    let mut input = Input { devices: vec![DeviceInput::away(); 2], obstacles: vec![Pose::IDENTITY] };
+    input.devices[0].position = DVec3::new(-0.058, 0.0, 0.05);
+    let names = Names {
+        objects: vec!["cube".into()],
+        devices: vec!["left".into(), "right".into()],
+        obstacles: vec!["floor".into()],
+    };
+    // The log carries a scene with less gravity than its steps had.
+    let scene = workplace.text("fingers.toml").replace("-9.81", "-9.8");
+    workplace.write("fingers.toml", scene);
+    let carried = ["fingers.toml", "cube.palp", "left_finger.csv", "right_finger.csv"];
+    let files = carried.map(|name| (name.to_string(), workplace.read(name)));
+    let facts = BTreeMap::from([("scene".into(), "fingers.toml".into()), ("version".into(), "0.0.1".into())]);
+    let out = Cursor::new(Vec::new());
+    let (mut hand, writer) =
+        LogWriter::new(out, names, facts, &files, (&model, &state, &input)).expect("a log in memory");
+    for number in 1..=5 {
+        step(&model, &mut state, &input);
+        hand.take(|record| {
+            record.step = number;
+            record.take(&input, &state);
+        });
+    }
+    let (steps, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
+    assert_eq!(steps, 5);
+    workplace.write("differs.mcap", out.into_inner());
+    let before = workplace.files();
+    let export = ["export", "differs.mcap", "--gltf", "a.glb", "--vtu", "a", "--csv", "a.csv"];
+    let error = workplace.fail(&export);
+    let expected = ["differs.mcap: step 1 differs: cube.", "The log is of palpate 0.0.1, this is "];
+    assert!(error.starts_with(expected[0]) && error.contains(expected[1]), "{error}");
+    assert_eq!(workplace.files(), before);
 }
 
 #[test]

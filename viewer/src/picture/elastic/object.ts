@@ -4,7 +4,6 @@ import {
   BufferAttribute,
   BufferGeometry,
   DataTexture,
-  DoubleSide,
   FloatType,
   GLSL3,
   Group,
@@ -90,6 +89,10 @@ export class ElasticObject {
     this.geometry.setAttribute("element", attribute);
     this.geometry.setIndex(new BufferAttribute(this.smooth.corners, 1));
     this.edges.setAttribute("element", attribute);
+    const atRest = new Float32Array(4 * this.smooth.vertices);
+    normalsOf(surface, this.smooth, surface.positions, atRest);
+    const restNormals = Float32Array.from({ length: 3 * this.smooth.vertices }, (_, i) => atRest[4 * Math.floor(i / 3) + (i % 3)]);
+    for (const geometry of [this.geometry, this.edges]) geometry.setAttribute("restNormal", new BufferAttribute(restNormals, 3));
     this.edges.setIndex(new BufferAttribute(this.smooth.edges, 1));
 
     this.uniforms = {
@@ -108,7 +111,6 @@ export class ElasticObject {
         vertexShader: SURFACE_VERTEX,
         fragmentShader,
         uniforms: { plane: { value: new Vector4() }, shear: { value: new Vector3() }, ...this.uniforms, ...own },
-        side: DoubleSide,
         transparent,
         depthWrite: !transparent,
       });

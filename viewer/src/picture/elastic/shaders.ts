@@ -93,6 +93,7 @@ uniform vec4 plane;           // of a shadow: normal, offset
 uniform vec3 shear;           // how far a shadow falls aside per height; 0 for what is seen
 uniform float lift;           // towards the eye, as a share of the distance: lines lie on the surface
 in vec2 element;              // node, vertex
+in vec3 restNormal;
 out vec3 seenAt;
 out vec3 facing;
 out float value;
@@ -102,7 +103,9 @@ void main() {
   vec4 normal = texelFetch(normals, ivec2(vertex % normalWidth, vertex / normalWidth), 0);
   vec4 world = modelMatrix * vec4(place.xyz, 1.0);
   seenAt = world.xyz;
-  facing = mat3(modelMatrix) * normal.xyz;
+  // Small slopes are shaded as if they were larger, so that a dent of 1 % of the object is seen; large ones as they are.
+  vec3 slope = normal.xyz - restNormal;
+  facing = mat3(modelMatrix) * (normal.xyz + 2.4 * exp(-14.0 * dot(slope, slope)) * slope);
   value = measure == 1 ? place.w / range : measure == 2 ? normal.w / range : 0.0;
   world.xyz += shear * max(0.0, dot(plane.xyz, world.xyz) - plane.w);
   vec4 eye = viewMatrix * world;
@@ -155,9 +158,7 @@ void main() {
   vec3 toEye = cameraPosition - seenAt;
   vec3 right = vec3(viewMatrix[0][0], viewMatrix[1][0], viewMatrix[2][0]);
   vec3 level = normalize(right - up * dot(right, up));
-  vec3 n = facing;
-  if (!gl_FrontFacing) { n = -n; base *= 0.45; }
-  pixel = vec4(screen(lit(base, n, toEye, level, up, 1.0) + glow * base), 1.0);
+  pixel = vec4(screen(lit(base, facing, toEye, level, up, 1.0) + glow * base), 1.0);
 }`;
 
 export const WIRE_FRAGMENT = /* glsl */ `

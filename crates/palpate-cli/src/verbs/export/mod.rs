@@ -5,6 +5,7 @@ mod recording;
 
 use crate::Failure;
 use crate::outputs::Written;
+use crate::verbs::inspect::size;
 use crate::verbs::{print, print_json};
 use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
@@ -126,7 +127,7 @@ fn tell_of(
         let path = file.path.display();
         text += &match file.kind {
             "vtu" => format!("  surfaces     {path} (open it in ParaView)\n"),
-            "gltf" => format!("  animation    {path}, {:.1} MB\n", 1e-6 * bytes(file) as f64),
+            "gltf" => format!("  animation    {path}, {}\n", size(bytes(file) as usize)),
             "contacts" => format!("  contacts     {path}\n"),
             _ => format!("  rows         {path}\n"),
         };

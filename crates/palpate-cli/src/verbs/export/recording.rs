@@ -140,18 +140,23 @@ impl Export<'_> {
         for mode in 0..self.drawn {
             object.add_shape(&mut glb, &self.shape(mode), self.name(mode))?;
         }
-        let times: Vec<f64> = (0..=KEYS).map(|key| PERIOD_S * key as f64 / KEYS as f64).collect();
-        let times = glb.times(&times);
-        for mode in 0..self.drawn {
-            let mut animation = Animation::new(times);
-            let swing = |key: usize| (TAU * key as f64 / KEYS as f64).sin() as f32;
-            let weights = (0..=KEYS).flat_map(|key| {
-                (0..self.drawn).map(move |other| if other == mode { swing(key) } else { 0.0 })
-            });
-            animation.channel(&mut glb, object.node(), "weights", weights, ("SCALAR", 1));
-            glb.content.animations.push(animation.json(&self.name(mode)));
+        if self.drawn > 0 {
+            self.swing(&mut glb, object.node());
         }
         object.finish(&mut glb.content, &vec![0.0; self.drawn]);
         glb.finish()
+    }
+
+    /// Let a mode after the other swing once, alone: an animation for each.
+    fn swing(&self, glb: &mut Glb, node: usize) {
+        let times: Vec<f64> = (0..=KEYS).map(|key| PERIOD_S * key as f64 / KEYS as f64).collect();
+        let times = glb.times(&times);
+        let weight = |key: usize| (TAU * key as f64 / KEYS as f64).sin() as f32;
+        for mode in 0..self.drawn {
+            let row = |key| (0..self.drawn).map(move |other| if other == mode { weight(key) } else { 0.0 });
+            let mut animation = Animation::new(times);
+            animation.channel(glb, node, "weights", (0..=KEYS).flat_map(row), ("SCALAR", 1));
+            glb.content.animations.push(animation.json(&self.name(mode)));
+        }
     }
 }

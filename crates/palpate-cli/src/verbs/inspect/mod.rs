@@ -325,8 +325,10 @@ fn percent(share: f64) -> String {
     }
 }
 
-fn size(bytes: usize) -> String {
+/// A number of bytes for a person.
+pub fn size(bytes: usize) -> String {
     match bytes as f64 {
+        bytes if bytes < 1e5 => format!("{:.1} kB", bytes / 1e3),
         bytes if bytes >= 1e10 => format!("{:.1} GB", bytes / 1e9),
         bytes => format!("{:.1} MB", bytes / 1e6),
     }

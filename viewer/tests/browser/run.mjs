@@ -1,0 +1,36 @@
+// Tests of the page in a browser: against the stand-in, or against the real server if PALPATE is the path of the binary.
+//   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder keeps screenshots
+
+import { mkdirSync } from "node:fs";
+import { Browser } from "./browser.mjs";
+import { liveCases } from "./live.mjs";
+import { logCases } from "./logs.mjs";
+import { touchCases } from "./touching.mjs";
+import { shapeCases } from "./shapes.mjs";
+
+if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
+const real = Boolean(process.env.PALPATE);
+const wanted = process.argv[2] ?? "";
+const cases = [...liveCases, ...touchCases, ...shapeCases, ...logCases].filter(({ name }) => name.includes(wanted));
+
+const browser = await Browser.open();
+let failed = 0;
+for (const { name, run, standinOnly } of cases) {
+  if (standinOnly && real) {
+    console.log(`skipped  ${name} (needs the stand-in)`);
+    continue;
+  }
+  const began = performance.now();
+  try {
+    await run(browser);
+    console.log(`passed   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+  } catch (error) {
+    failed++;
+    console.log(`FAILED   ${name}\n${error.stack ?? error}`);
+  } finally {
+    await browser.clear();
+  }
+}
+await browser.close();
+console.log(failed === 0 ? "all passed" : `${failed} failed`);
+process.exit(failed === 0 ? 0 : 1);

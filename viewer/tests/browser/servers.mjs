@@ -1,0 +1,41 @@
+// The server that a case speaks with: the stand-in, or `palpate serve`.
+
+import { spawn } from "node:child_process";
+import { createServer } from "node:net";
+import { serve } from "../standin/server.mjs";
+
+async function freePort() {
+  return new Promise((done, failed) => {
+    const server = createServer();
+    server.on("error", failed);
+    server.listen(0, "127.0.0.1", () => {
+      const { port } = server.address();
+      server.close(() => done(port));
+    });
+  });
+}
+
+async function serveReally(port) {
+  const child = spawn(process.env.PALPATE, ["serve", "--scene", "bounce", "--listen", `127.0.0.1:${port}`, "--no-browser"], {
+    stdio: ["ignore", "pipe", "pipe"],
+  });
+  let said = "";
+  for (const stream of [child.stdout, child.stderr]) stream.on("data", (part) => (said += part));
+  // It says its address, with a token if it wants one.
+  const deadline = Date.now() + 120_000;
+  for (;;) {
+    const url = said.match(/https?:\/\/[^\s"']+/)?.[0];
+    if (url !== undefined) {
+      const answers = await fetch(url).then((response) => response.ok).catch(() => false);
+      if (answers) return { url, port, close: () => new Promise((done) => (child.once("exit", done), child.kill("SIGTERM"))) };
+    }
+    if (child.exitCode !== null || Date.now() > deadline) throw new Error(`palpate serve did not begin:\n${said}`);
+    await new Promise((wake) => setTimeout(wake, 100));
+  }
+}
+
+/** `port`: the one from before, for a server that comes back. */
+export async function start(options = {}) {
+  const port = options.port ?? (await freePort());
+  return process.env.PALPATE && (options.kind ?? "live") === "live" && !options.garbage ? serveReally(port) : serve({ ...options, port });
+}

@@ -1,0 +1,164 @@
+// Touching: mouse, fingers, keyboard.
+
+import { assert, atRest, loaded, newest, quiet, shot, whereIs } from "./browser.mjs";
+import { start } from "./servers.mjs";
+
+const touching = (page) => page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.some((d) => d.doing !== "away"));
+const pressed = (page, least = 0.02) =>
+  page.waitForFunction((f) => window.palpate.stage.worlds[0].picture.devices.some((d) => Math.hypot(...d.force) > f), least);
+const away = (page) => page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.every((d) => d.doing === "away"));
+
+function shapeNow(page) {
+  return page.evaluate(() => {
+    const { stage } = window.palpate;
+    return [...stage.worlds[0].objects[0].currentPlaces(stage.renderer)];
+  });
+}
+
+const mostMoved = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
+
+export const touchCases = [
+  {
+    name: "a press on the object is felt, dents it, and lets go",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await loaded(page);
+      await atRest(page);
+      const before = await shapeNow(page);
+      // The top: pressed against the floor it cannot go away.
+      await page.evaluate(() => window.palpate.stage.orbit.turn(0, 0.7));
+      const { x, y } = await whereIs(page, 0, 0.35);
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await pressed(page, 0.05);
+      for (let i = 0; i < 4; i++) {
+        await page.mouse.wheel(0, -120);
+        await page.waitForTimeout(80);
+      }
+      await page.waitForTimeout(300);
+      const during = await shapeNow(page);
+      const moved = mostMoved(before, during);
+      assert(moved > 5e-4, `the shape changes by ${moved} m only`);
+      assert(/\d/.test(await page.textContent(".reading .number")), "no number");
+      assert(!(await page.isVisible(".hint")), "the hint stays");
+      await shot(page, "poke");
+      await page.keyboard.press("c");
+      await page.waitForTimeout(500);
+      await shot(page, "poke-stretch");
+      await page.keyboard.press("c");
+      await page.waitForTimeout(400);
+      await shot(page, "poke-plain");
+      await page.click('[title="Measured"]').catch(() => undefined);
+      await page.mouse.up();
+      await away(page);
+      assert(!(await page.isVisible(".reading")), "the number stays");
+      quiet(page);
+    },
+  },
+  {
+    name: "a grab pulls the object along and throws it; a drag elsewhere turns the view",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url, { dark: true });
+      await loaded(page);
+      await atRest(page);
+      await page.keyboard.press("g");
+      await page.click('[title="Measured"]');
+      const { x, y } = await whereIs(page, 0, 0.2);
+      const { pose } = await newest(page);
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await touching(page);
+      await page.mouse.move(x + 40, y - 130, { steps: 12 });
+      await page.waitForTimeout(1200);
+      const held = await newest(page);
+      assert(held.devices.some((d) => d.doing === "holds" && d.force > 0.05), `nothing is held: ${JSON.stringify(held.devices)}`);
+      assert(held.pose[1] > pose[1] + 0.01, `it was not lifted: ${pose[1]} to ${held.pose[1]}`);
+      await shot(page, "grab");
+      await page.mouse.up();
+      await away(page);
+
+      const camera = () => page.evaluate(() => window.palpate.stage.orbit.camera.position.toArray());
+      const from = await camera();
+      await page.mouse.move(60, 130);
+      await page.mouse.down();
+      await page.mouse.move(160, 150, { steps: 4 });
+      await page.mouse.up();
+      const to = await camera();
+      assert(Math.hypot(...from.map((v, k) => v - to[k])) > 0.02, "the view does not turn");
+      assert((await newest(page)).devices.every((d) => d.doing === "away"), "turning the view touched something");
+      quiet(page);
+    },
+  },
+  {
+    name: "two fingers on a touch screen pinch the object",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url, { width: 390, height: 844, touch: true, scale: 2 });
+      await loaded(page);
+      await atRest(page);
+      const screen = await page.context().newCDPSession(page);
+      const touch = (type, points) => screen.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(({ x, y }, id) => ({ x, y, id })) });
+      const [a, b] = [await whereIs(page, -0.35, 0), await whereIs(page, 0.35, 0)];
+      await touch("touchStart", [a]);
+      await touch("touchStart", [a, b]);
+      await page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.filter((d) => d.doing !== "away").length === 2);
+      for (let i = 1; i <= 8; i++) {
+        await touch("touchMove", [
+          { x: a.x + 3 * i, y: a.y },
+          { x: b.x - 3 * i, y: b.y },
+        ]);
+        await page.waitForTimeout(60);
+      }
+      await page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.filter((d) => Math.hypot(...d.force) > 0.02).length === 2);
+      assert((await page.locator(".reading .number").count()) === 2, "not two numbers");
+      await shot(page, "pinch");
+      await touch("touchEnd", []);
+      await away(page);
+      quiet(page);
+    },
+  },
+  {
+    name: "a keyboard's finger moves, presses and lets go",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await loaded(page);
+      await atRest(page);
+      await page.keyboard.press("Tab");
+      await page.focus("canvas[tabindex]");
+      await page.keyboard.down("ArrowDown");
+      await page.waitForTimeout(250);
+      await page.keyboard.up("ArrowDown");
+      await page.keyboard.press("Enter");
+      await touching(page);
+      await shot(page, "keyboard");
+      await page.keyboard.press("Enter");
+      await away(page);
+      quiet(page);
+    },
+  },
+  {
+    name: "everything can be reached by Tab, and has a name",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await loaded(page);
+      const nameless = await page.evaluate(() =>
+        [...document.querySelectorAll("button, input, select, summary, canvas[tabindex]")]
+          .filter((e) => e.getClientRects().length > 0)
+          .filter((e) => ((e.getAttribute("aria-label") ?? "") + e.textContent + (e.closest("label")?.textContent ?? "")).trim() === "")
+          .map((e) => e.outerHTML.slice(0, 80)),
+      );
+      assert(nameless.length === 0, nameless.join("\n"));
+      const seen = new Set();
+      for (let i = 0; i < 60; i++) {
+        await page.keyboard.press("Tab");
+        seen.add(await page.evaluate(() => document.activeElement.getAttribute("aria-label") ?? document.activeElement.textContent.trim().slice(0, 30)));
+      }
+      for (const name of ["Help and keys (?)", "Pause (Space)", "Begin anew (R)"]) assert(seen.has(name), `Tab does not reach ${name}: ${[...seen].join(" | ")}`);
+      quiet(page);
+    },
+  },
+];
