@@ -5,6 +5,7 @@
 
 mod dense;
 mod failure;
+mod log_shows;
 mod logged_run;
 mod outputs;
 mod plot;
@@ -43,6 +44,7 @@ enum Verb {
     Run(verbs::run::Arguments),
     Serve(verbs::serve::Arguments),
     Replay(verbs::replay::Arguments),
+    Render(verbs::render::Arguments),
     Export(verbs::export::Arguments),
     Device(Box<verbs::device::Arguments>),
     Devices(verbs::devices::Arguments),
@@ -69,6 +71,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
         Verb::Run(arguments) => verbs::run::run(&arguments),
         Verb::Serve(arguments) => verbs::serve::serve(&arguments),
+        Verb::Render(arguments) => verbs::render::render(&arguments),
         Verb::Replay(arguments) => verbs::replay::replay(&arguments),
         Verb::Export(arguments) => verbs::export::export(&arguments),
         Verb::Device(arguments) => verbs::device::device(&arguments),

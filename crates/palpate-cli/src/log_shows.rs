@@ -42,8 +42,7 @@ impl ShownLog {
         let about = format!("{:.1} s at {:.0} Hz", run.steps as f64 * step_s, 1.0 / step_s);
         let description = describe(&run.scene, (None, name.clone(), about), |_, _| false);
         let (model, frames) = (run.scene.model.clone(), run.steps / every + 1);
-        let (show, maker) =
-            LogShow::new(number, name, model, description, frames, every as f64 * step_s);
+        let (show, maker) = LogShow::new(number, name, model, description, frames, every as f64 * step_s);
         Ok(Self { run, every, maker, show })
     }
 

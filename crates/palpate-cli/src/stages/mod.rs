@@ -109,28 +109,15 @@ impl Stages {
             let file = object.get("recording").and_then(Value::as_str).unwrap_or_default();
             current.path.parent().unwrap_or(Path::new("")).join(file)
         });
-        let described: Vec<ObjectDescription> = scene
-            .model
-            .recordings()
-            .zip(&scene.object_names)
-            .zip(files)
-            .map(|((recording, name), file)| {
-                if let Some(recipe) = recipe_of(recording) {
-                    current.recipes.entry(file.clone()).or_insert(recipe);
-                }
-                let recordable = current.recipes.contains_key(&file);
-                ObjectDescription::new(name, recording, certificate_lines(recording), recordable)
-            })
-            .collect();
-        let devices: Vec<(String, bool)> =
-            scene.devices.iter().map(|device| (device.name.clone(), device.pointer)).collect();
-        let description = SceneDescription::new(
-            (current.id.clone(), current.title.clone(), current.about.clone()),
-            &scene.model,
-            described,
-            &scene.names().obstacles,
-            &devices,
-        );
+        let files: Vec<PathBuf> = files.collect();
+        let titles = (current.id.clone(), current.title.clone(), current.about.clone());
+        let description = describe(&scene, titles, |at, recording| {
+            let Some(file) = files.get(at) else { return false };
+            if let Some(recipe) = recipe_of(recording) {
+                current.recipes.entry(file.clone()).or_insert(recipe);
+            }
+            current.recipes.contains_key(file)
+        });
         Stage {
             description,
             model: scene.model.clone(),
@@ -326,6 +313,23 @@ impl Workshop for Stages {
     fn record(&self, upload: Upload, tell: Tell) -> Result<Stage, String> {
         self.record_upload(upload, tell).map_err(|failure| failure.0)
     }
+}
+
+/// A scene as pages are told of it: its id, title and what there is to do; and whether an object, by its number, can be
+/// recorded again.
+pub fn describe(
+    scene: &Scene,
+    titles: (Option<String>, String, String),
+    mut recordable: impl FnMut(usize, &Recording) -> bool,
+) -> SceneDescription {
+    let recordings = scene.model.recordings().enumerate().zip(&scene.object_names);
+    let objects = recordings.map(|((at, recording), name)| {
+        ObjectDescription::new(name, recording, certificate_lines(recording), recordable(at, recording))
+    });
+    let objects = objects.collect();
+    let device = |device: &scene_file::SceneDevice| (device.name.clone(), device.pointer);
+    let devices: Vec<(String, bool)> = scene.devices.iter().map(device).collect();
+    SceneDescription::new(titles, &scene.model, objects, &scene.names().obstacles, &devices)
 }
 
 /// Set a key of a table.

@@ -16,7 +16,10 @@ pub fn write_gif(pictures: &[PathBuf], apart_s: f64, path: &Path) -> Result<(), 
     let inputs: Vec<&Path> = pictures.iter().map(PathBuf::as_path).collect();
     let mut file = WholeFile::create(path, &inputs)?;
     let failed = |e: gif::EncodingError| Failure(format!("cannot write {}: {e}", path.display()));
-    let mut encoder = None;
+    let Some(first) = pictures.first() else { return Err(Failure("there are no pictures".into())) };
+    let (_, width, height) = read_png(first)?;
+    let mut encoder = Encoder::new(&mut file, width, height, &[]).map_err(failed)?;
+    encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let mut time = 0.0;
     for picture in pictures {
         let (mut pixels, width, height) = read_png(picture)?;
@@ -25,17 +28,10 @@ pub fn write_gif(pictures: &[PathBuf], apart_s: f64, path: &Path) -> Result<(), 
         let (from, to) = (time * 100.0, (time + apart_s) * 100.0);
         frame.delay = ((to.round() - f64::round(from)) as u16).max(2);
         time += apart_s;
-        if encoder.is_none() {
-            let mut new = Encoder::new(&mut file, width, height, &[]).map_err(failed)?;
-            new.set_repeat(Repeat::Infinite).map_err(failed)?;
-            encoder = Some(new);
-        }
-        if let Some(encoder) = &mut encoder {
-            encoder.write_frame(&frame).map_err(failed)?;
-        }
+        encoder.write_frame(&frame).map_err(failed)?;
     }
     drop(encoder);
-    file.finish()
+    file.finish().map(|_| ())
 }
 
 /// Pixels as RGBA, width and height.
@@ -49,6 +45,7 @@ fn read_png(path: &Path) -> Result<(Vec<u8>, u16, u16), Failure> {
     let mut pixels = vec![0; size];
     let info = reader.next_frame(&mut pixels).map_err(failed)?;
     pixels.truncate(info.buffer_size());
-    let small = |size: u32| u16::try_from(size).map_err(|_| Failure(format!("{} is too large", path.display())));
+    let small =
+        |size: u32| u16::try_from(size).map_err(|_| Failure(format!("{} is too large", path.display())));
     Ok((pixels, small(info.width)?, small(info.height)?))
 }

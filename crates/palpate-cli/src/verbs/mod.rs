@@ -1,5 +1,6 @@
 //! One verb, one file.
 
+mod animation;
 pub mod bench;
 pub mod demo;
 pub mod device;
@@ -7,6 +8,7 @@ pub mod devices;
 pub mod export;
 pub mod inspect;
 pub mod record;
+pub mod render;
 pub mod replay;
 pub mod reproduce;
 pub mod run;

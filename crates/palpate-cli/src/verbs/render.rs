@@ -184,7 +184,7 @@ fn find_browser(given: Option<&Path>) -> Result<PathBuf, Failure> {
     match given {
         Some(given) if runs(given) => Ok(given.to_path_buf()),
         Some(given) => Err(Failure(format!("the browser {} can't be started", given.display()))),
-        None => known.into_iter().find(runs).ok_or_else(|| {
+        None => known.into_iter().find(|program| runs(program)).ok_or_else(|| {
             Failure(
                 "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one with --browser"
                     .into(),
@@ -201,7 +201,8 @@ struct Browser {
 
 impl Browser {
     fn open(program: &Path, address: &str, (width, height): (u32, u32)) -> Result<Self, Failure> {
-        let profile = TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the browser: {e}")))?;
+        let profile =
+            TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the browser: {e}")))?;
         let mut command = Command::new(program);
         // Drawn by software, the same bytes on every machine with the same browser.
         command
@@ -268,7 +269,9 @@ fn collect(
             Err(RecvTimeoutError::Disconnected) => break,
             Err(RecvTimeoutError::Timeout) => {
                 if let Ok(Some(status)) = browser.child.try_wait() {
-                    return Err(Failure(format!("the browser has ended ({status}) before all pictures were drawn")));
+                    return Err(Failure(format!(
+                        "the browser has ended ({status}) before all pictures were drawn"
+                    )));
                 }
                 if last.elapsed() > PATIENCE {
                     return Err(Failure(format!(

@@ -1,6 +1,7 @@
-//! `palpate serve`: a scene, live, in the browser.
+//! `palpate serve`: a scene, live, in the browser; or logs.
 
 use crate::Failure;
+use crate::log_shows::ShownLog;
 use crate::stages::{BUILT_IN, Stages};
 use crate::whole_file::stop_on_interrupt;
 use clap::Args;
@@ -9,7 +10,7 @@ use palpate_haptics::Scheduling;
 use palpate_viewer::{Exhibit, Live, Server, Settings, Stage, Workshop};
 use std::io::IsTerminal;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -17,18 +18,19 @@ use std::sync::Arc;
 ///
 /// The scene runs in real time, as `palpate run --realtime` does; the page shows it at display rate and its pointers are
 /// devices. Scenes without `pointer = true` get four pointers of a size that suits their objects. Without a scene file
-/// there are built-in scenes.
+/// there are built-in scenes. Logs of `palpate run --realtime --log` are shown with a time line; two of them side by side.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "For example:
   palpate serve                        # the built-in scenes
   palpate serve scene.toml
+  palpate serve run.mcap               # a log; two logs: side by side
   palpate serve --listen 0.0.0.0:7400 --token 4f0c9d2e71   # for other machines, tablets and phones too")]
 pub struct Arguments {
-    /// A scene file; without one, the built-in scenes
-    #[arg(value_name = "FILE")]
-    file: Option<PathBuf>,
+    /// A scene file, or one or two logs (.mcap); without one, the built-in scenes
+    #[arg(value_name = "FILE", num_args = 0..=2)]
+    files: Vec<PathBuf>,
     /// The built-in scene to begin with: bounce, shake, pinch, stack, ball, slab
-    #[arg(long, value_name = "ID", conflicts_with = "file")]
+    #[arg(long, value_name = "ID", conflicts_with = "files")]
     scene: Option<String>,
     /// How it is served
     #[command(flatten)]
@@ -58,16 +60,39 @@ pub struct Serving {
 /// The port of the page when none is asked for.
 const PORT: u16 = 7400;
 
+/// Pictures per second of a log.
+const PICTURES_HZ: f64 = 60.0;
+
 /// Real-time priority of the force process.
 const PRIORITY: u8 = 80;
 
 /// Run the verb.
 pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { file, scene, serving } = arguments;
-    match file {
-        Some(file) => serve_live(serving, |stages| stages.open_file(file)),
-        None => serve_built_in(serving, scene.as_deref().unwrap_or(BUILT_IN[0].id)),
+    let Arguments { files, scene, serving } = arguments;
+    match files.as_slice() {
+        [] => serve_built_in(serving, scene.as_deref().unwrap_or(BUILT_IN[0].id)),
+        logs if logs.iter().all(|file| is_log(file)) => serve_logs(serving, logs),
+        [file] => serve_live(serving, |stages| stages.open_file(file)),
+        _ => Err(Failure("one scene is served at a time; of logs (.mcap) two can stand side by side".into())),
     }
+}
+
+fn is_log(path: &Path) -> bool {
+    path.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("mcap"))
+}
+
+fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
+    let server = serving.bind()?;
+    let logs: Result<Vec<ShownLog>, Failure> =
+        paths.iter().enumerate().map(|(number, path)| ShownLog::read(path, number, PICTURES_HZ)).collect();
+    let logs = logs?;
+    let shows = logs.iter().map(|log| log.show.clone()).collect();
+    let stop = stop_on_interrupt();
+    std::thread::scope(|scope| {
+        // The page tells of a log that can't be computed again; it shows what there is of it.
+        scope.spawn(|| logs.into_iter().for_each(|log| drop(log.make(stop))));
+        serving.serve(server, Exhibit::Logs(shows))
+    })
 }
 
 /// Serve the built-in scenes, one of them first.
