@@ -7,7 +7,8 @@
 //! ẍ = ω²·(told − x) − 2ω·ẋ
 //! ```
 //!
-//! which follows a steady motion 2/ω behind.
+//! which follows a steady motion 2/ω behind. It begins to go when the force process has seen where it was pressed: what begins
+//! inside an object touches nothing, and a step may be late, slow, or paused.
 
 use glam::DVec3;
 use palpate::DeviceMode;
@@ -32,6 +33,8 @@ struct Pointer {
     position: DVec3,
     velocity: DVec3,
     sequence: u64,
+    /// The motion that tells of the press.
+    pressed: u64,
 }
 
 impl Pointers {
@@ -46,6 +49,7 @@ impl Pointers {
             position: DVec3::ZERO,
             velocity: DVec3::ZERO,
             sequence: 0,
+            pressed: 0,
         };
         Self(ports.into_iter().map(pointer).collect())
     }
@@ -56,6 +60,7 @@ impl Pointers {
         let free = self.0.iter_mut().find(|pointer| pointer.holder.is_none())?;
         free.holder = Some(holder);
         free.mode = mode;
+        free.pressed = free.sequence + 1;
         (free.told, free.position, free.velocity) = (position, position, DVec3::ZERO);
         Some(free.device)
     }
@@ -86,7 +91,9 @@ impl Pointers {
     /// Advance all hands by a time [s], and tell the force process where they are now.
     pub fn advance(&mut self, dt: f64, now_s: f64) {
         for pointer in &mut self.0 {
-            pointer.follow(dt);
+            if pointer.port.newest().answers >= pointer.pressed {
+                pointer.follow(dt);
+            }
             pointer.sequence += 1;
             pointer.port.tell(Motion {
                 sequence: pointer.sequence,
@@ -114,7 +121,7 @@ impl Pointer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_haptics::{ForcePort, port};
+    use palpate_haptics::{Effort, ForcePort, port};
 
     fn pointers(count: usize) -> (Pointers, Vec<ForcePort>) {
         let (devices, forces): (Vec<_>, Vec<_>) = (0..count).map(|_| port()).unzip();
@@ -133,6 +140,7 @@ mod tests {
             pointers.go((1, 7), DVec3::X * 0.1 * frame);
             pointers.advance(1e-3, t);
             let motion = forces[0].newest();
+            forces[0].answer(Effort { sequence: motion.sequence, answers: motion.sequence, ..Effort::default() });
             assert_eq!((motion.mode, motion.sequence), (Some(DeviceMode::Touch), u64::from(tick)));
             let now = (motion.position - last).length() / 1e-3;
             jerk = jerk.max((now - speed).abs());
@@ -144,6 +152,19 @@ mod tests {
         assert!(jerk < 0.03, "velocity jumps by {jerk} m/s in a step");
         assert!(behind > 1e-4 && behind < 4e-3, "{behind} m behind");
         assert!((last - DVec3::X * 0.05).length() < 1e-9, "{last}");
+    }
+
+    #[test]
+    fn a_hand_waits_where_it_was_pressed_until_that_was_seen() {
+        let (mut pointers, mut forces) = pointers(1);
+        pointers.press((1, 1), DeviceMode::Touch, DVec3::Y);
+        pointers.go((1, 1), DVec3::ZERO);
+        (0..100).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
+        let motion = forces[0].newest();
+        assert_eq!(motion.position, DVec3::Y);
+        forces[0].answer(Effort { answers: motion.sequence, ..Effort::default() });
+        (100..300).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
+        assert!(forces[0].newest().position.length() < 1e-6);
     }
 
     #[test]

@@ -295,16 +295,28 @@ impl SceneDescription {
     }
 }
 
-/// The ball about the objects at the start, and the obstacles that are not endless.
+/// The ball about the objects at the start, the obstacles that are not endless, and where objects come to lie on planes.
 fn view(model: &Model) -> View {
     let state = palpate::State::new(model);
     let objects = state.output().objects.iter().zip(model.recordings());
     let mut balls: Vec<(DVec3, f64)> =
         objects.map(|(object, recording)| (object.pose.position, recording.surface.radius())).collect();
+    let objects = balls.len();
     let biggest = balls.iter().map(|ball| ball.1).fold(0.0, f64::max);
     for obstacle in &model.parameters().obstacles {
         let radius = match &obstacle.shape {
-            Shape::Plane { .. } => continue,
+            Shape::Plane { normal } => {
+                let normal = obstacle.pose.orientation * *normal;
+                let fallen = balls[..objects].iter().map(|&(center, radius)| {
+                    let height = normal.dot(center - obstacle.pose.position) - radius;
+                    (center - normal * height, radius, height)
+                });
+                // A plane far away is out of the picture.
+                let near = fallen.filter(|(_, _, height)| (0.0..6.0 * biggest).contains(height));
+                let near: Vec<(DVec3, f64)> = near.map(|(center, radius, _)| (center, radius)).collect();
+                balls.extend(near);
+                continue;
+            }
             Shape::Sphere { radius } => *radius,
             Shape::Box { half_extents } => half_extents.length(),
             Shape::Capsule { radius, half_length } => radius + half_length,

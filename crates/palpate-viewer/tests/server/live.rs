@@ -61,8 +61,10 @@ fn a_pointer_presses_the_body_and_both_forms_show_the_same_dent() {
     page.send(r#"{"type":"pause","paused":true}"#);
     while page.wait("status")["paused"] != true {}
     other.send(r#"{"type":"stream","form":"vertices","every":1}"#);
+    // The first it gets is of the scene at its start; from then on it counts.
+    other.picture(&shapes, |picture| picture.form == 2);
     page.send(r#"{"type":"step"}"#);
-    let vertices = other.picture(&shapes, |picture| picture.form == 2);
+    let vertices = other.picture(&shapes, |picture| picture.form == 2 && picture.step > 0);
     let modal = page.picture(&shapes, |picture| picture.step == vertices.step);
     let rest = recording().surface.positions.clone();
     let moved = |places: &[DVec3]| -> f64 {
