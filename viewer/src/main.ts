@@ -142,7 +142,9 @@ function start(): void {
   });
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-    const at = event.target as HTMLElement;
+    const target = event.target as HTMLElement;
+    // A sheet that was just closed may still have the focus.
+    const at = target.closest("dialog:not([open])") === null ? target : document.body;
     if (at.closest("input:not([type=radio], [type=checkbox], [type=range]), select, dialog") !== null) return;
     if (event.key === " " && at.closest("button, summary, input") !== null) return;
     const acts: Record<string, () => void> = {

@@ -8,7 +8,9 @@ export class TimeLine {
   readonly parts: HTMLElement[];
   private readonly play: HTMLButtonElement;
   private readonly slider = element("input", { type: "range", class: "scrubber", attributes: { min: "0", max: "1", step: "any", value: "0", "aria-label": "Time" } });
-  private readonly clock = element("output", { class: "clock" });
+  private readonly now = element("span");
+  private readonly whole = element("span", { class: "spare" });
+  private readonly clock = element("output", { class: "clock" }, this.now, this.whole);
   private readonly speed = element("select", { title: "Speed ([ and ])", attributes: { "aria-label": "Speed" } });
   private shownPlaying = false;
 
@@ -22,6 +24,8 @@ export class TimeLine {
     this.speed.addEventListener("change", () => {
       player.speed = Number(this.speed.value);
     });
+    const wide = iconButton("home", "The view as at first (V)", home);
+    wide.classList.add("spare");
     this.parts = [
       this.play,
       iconButton("back", "One picture back (←)", () => player.hop(-1)),
@@ -29,7 +33,7 @@ export class TimeLine {
       this.slider,
       this.clock,
       this.speed,
-      iconButton("home", "The view as at first (V)", home),
+      wide,
     ];
   }
 
@@ -39,7 +43,8 @@ export class TimeLine {
     this.slider.value = String(player.time);
     this.slider.setAttribute("aria-valuetext", seconds(player.time));
     this.slider.style.setProperty("--share", `${(100 * player.time) / Math.max(player.duration, 1e-9)}%`);
-    this.clock.textContent = `${player.time.toFixed(2)} / ${seconds(player.duration)}`;
+    this.now.textContent = seconds(player.time);
+    this.whole.textContent = ` of ${seconds(player.duration)}`;
     if (document.activeElement !== this.speed) this.speed.value = String(player.speed);
     if (player.playing === this.shownPlaying) return;
     this.shownPlaying = player.playing;

@@ -6,6 +6,8 @@ import type { Vector } from "../protocol/picture";
 const FIELD_OF_VIEW = 32;
 const FIRST_AZIMUTH = 0.52;
 const FIRST_ELEVATION = 0.36;
+// How much more than the scene the picture holds: things move.
+const AROUND = 1.65;
 const STEEPEST = 1.5;
 const LOWEST_ABOVE_FLOOR = 0.03;
 
@@ -61,7 +63,7 @@ export class OrbitCamera {
   private fitting(): number {
     const half = (FIELD_OF_VIEW * Math.PI) / 360;
     const across = Math.atan(Math.tan(half) * Math.min(1, this.camera.aspect));
-    return (this.radius / Math.sin(across)) * 1.02;
+    return (this.radius / Math.sin(across)) * AROUND;
   }
 
   resize(aspect: number): void {

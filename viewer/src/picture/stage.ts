@@ -135,11 +135,15 @@ export class Stage {
     renderer.setScissorTest(false);
     renderer.setViewport(0, 0, size.width, size.height);
     if (this.worlds.length === 0) renderer.clear();
-    this.worlds.forEach((world, i) => this.drawWorld(world, this.viewOf(i)));
+    if (this.look.colour === "displacement" && this.fixedRange === null) {
+      const about = this.worlds.flatMap((world) => world.objects.map((object) => object.displacementAbout));
+      this.ranges.displacement.take(Math.max(0, ...about), now);
+    }
+    this.worlds.forEach((world, i) => this.drawWorld(world, this.viewOf(i), i === 0));
     this.measure(now);
   }
 
-  private drawWorld(world: World, view: Rectangle): void {
+  private drawWorld(world: World, view: Rectangle, first: boolean): void {
     const { pen, renderer, palette, size, look } = this;
     const camera = this.orbit.camera;
     renderer.setScissorTest(false);
@@ -151,7 +155,8 @@ export class Stage {
     renderer.setScissorTest(true);
     renderer.render(world.scene, camera);
 
-    const bar = drawColourBar(pen, look.colour, this.colourRange, view, palette);
+    // All share one scale.
+    const bar = !first ? 0 : drawColourBar(pen, look.colour, this.colourRange, view, palette);
     if (look.arrows && world.labels.length > 0) {
       const pixels = (world.longestArrow / this.orbit.heightAt(camera.position.distanceTo(world.center))) * view.height;
       drawArrowScale(pen, world.forceRange.value, pixels, view, bar, palette);

@@ -7,8 +7,8 @@ import type { Stage } from "../picture/stage";
 import { pick } from "./pick";
 
 /** How far a press goes in by itself, as a share of the object's radius. */
-const PRESS_DEPTH = 0.1;
-const PRESS_SECONDS = 0.16;
+const PRESS_DEPTH = 0.09;
+const PRESS_SECONDS = 0.28;
 const START_OUTSIDE = 1.35;
 const LEAST_COSINE = 0.35;
 const MOST_POINTERS = 16;

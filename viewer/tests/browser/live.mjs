@@ -120,10 +120,13 @@ export const liveCases = [
           document.dispatchEvent(new Event("visibilitychange"));
         }, hidden);
       await look(true);
-      await page.waitForTimeout(500);
-      const { step } = await newest(page);
-      await page.waitForTimeout(800);
-      assert((await newest(page)).step === step, "pictures come although nobody looks");
+      // Those that are under way still come.
+      let [step, before] = [0, -1];
+      for (let i = 0; i < 8 && step !== before; i++) {
+        await page.waitForTimeout(900);
+        [before, step] = [step, (await newest(page)).step];
+      }
+      assert(step === before, "pictures come although nobody looks");
       await look(false);
       await page.waitForFunction((before) => window.palpate.stage.worlds[0].picture.step > before, step);
       quiet(page);

@@ -3,6 +3,7 @@
 import { spawn } from "node:child_process";
 import { createServer } from "node:net";
 import { serve } from "../standin/server.mjs";
+import { hasPage, stand } from "./front.mjs";
 
 async function freePort() {
   return new Promise((done, failed) => {
@@ -27,7 +28,8 @@ async function serveReally(port) {
     const url = said.match(/https?:\/\/[^\s"']+/)?.[0];
     if (url !== undefined) {
       const answers = await fetch(url).then((response) => response.ok).catch(() => false);
-      if (answers) return { url, port, close: () => new Promise((done) => (child.once("exit", done), child.kill("SIGTERM"))) };
+      const end = () => new Promise((done) => (child.once("exit", done), child.kill("SIGTERM")));
+      if (answers) return { url, end };
     }
     if (child.exitCode !== null || Date.now() > deadline) throw new Error(`palpate serve did not begin:\n${said}`);
     await new Promise((wake) => setTimeout(wake, 100));
@@ -37,5 +39,12 @@ async function serveReally(port) {
 /** `port`: the one from before, for a server that comes back. */
 export async function start(options = {}) {
   const port = options.port ?? (await freePort());
-  return process.env.PALPATE && (options.kind ?? "live") === "live" && !options.garbage ? serveReally(port) : serve({ ...options, port });
+  if (!process.env.PALPATE) return serve({ ...options, port });
+  const behind = await serveReally(port);
+  if (await hasPage(behind.url)) return { url: behind.url, port, close: behind.end };
+  await behind.end();
+  const inner = await freePort();
+  const { url, end } = await serveReally(inner);
+  const front = await stand(url, port);
+  return { url: front.url, port, close: async () => (await front.close(), await end()) };
 }

@@ -61,7 +61,7 @@ export function makeScene(id, generation, options) {
     ],
     obstacles: found.obstacles,
     devices,
-    view: { center: [0, found.id === "float" ? 0.05 : 0.06, 0], radius: 0.17 },
+    view: { center: box.position, radius: found.obstacles.length > 1 ? 0.17 : 0.087 },
   };
   return { box, message };
 }

@@ -3,6 +3,7 @@ import { smoothParts } from "../../src/picture/elastic/creases";
 import { halfTable } from "../../src/picture/elastic/half";
 import { layShapes, modeAt, planeFor, shapeLayout, spread } from "../../src/picture/elastic/layout";
 import { normalsOf, placesOf, triangleStrain } from "../../src/picture/elastic/reconstruct";
+import { leastUsed } from "../../src/picture/elastic/passes";
 import { readShapes, readSurface } from "../../src/protocol/surface";
 // @ts-expect-error: the stand-in is plain JavaScript.
 import { boxSurface, shapesBytes, surfaceBytes, toHalf, waves } from "../standin/box.mjs";
@@ -99,4 +100,10 @@ test("the strain of a triangle is the change of length where it is largest", () 
   // Turned by 90°: no strain.
   expect(triangleStrain(rest, [0, 1, 0, -1, 0.3, 0])).toBeCloseTo(0, 10);
   expect(triangleStrain([1, 0, 0, 2, 0, 0], rest)).toBe(0);
+});
+
+test("modes that are left out stay below the bound together", () => {
+  expect(leastUsed(Float32Array.of(0.5, -0.125, 0.25, 0), 0.2)).toBe(0.25);
+  expect(leastUsed(Float32Array.of(0.25, -0.25), 0.3)).toBe(0.25);
+  expect(leastUsed(Float32Array.of(1, 2), 5)).toBe(Infinity);
 });

@@ -24,6 +24,7 @@ import { smoothParts, type Smooth } from "./creases";
 import { planeFor, type Limits, type Plane } from "./layout";
 import { dataTexture, GpuReconstruction, restTexture } from "./passes";
 import { normalsOf, placesOf } from "./reconstruct";
+import { Sample } from "./sample";
 import { SHADOW_FRAGMENT, SURFACE_FRAGMENT, SURFACE_VERTEX, WIRE_FRAGMENT } from "./shaders";
 
 export class PictureDoesNotFit extends Error {}
@@ -41,6 +42,7 @@ export class ElasticObject {
   private readonly uniforms: Record<string, { value: unknown }>;
   private readonly gpu: GpuReconstruction | null;
   private readonly shapes: Shapes | null;
+  private readonly sample: Sample | null;
   private readonly wires: LineSegments;
   private readonly solid: Mesh;
   /** The same surface for the picture of its shadow. */
@@ -79,6 +81,7 @@ export class ElasticObject {
     this.gpu = shapes !== null && onGpu ? GpuReconstruction.make(surface, shapes, this.smooth, this.rest, info.radius, limits) : null;
     // The GPU has them, and they may be large.
     this.shapes = this.gpu === null ? shapes : null;
+    this.sample = shapes === null ? null : new Sample(shapes);
 
     const element = new Float32Array(2 * this.smooth.vertices);
     for (let v = 0; v < this.smooth.vertices; v++) {
@@ -220,6 +223,12 @@ export class ElasticObject {
       this.known = this.surface.positions;
     }
     return this.known;
+  }
+
+  /** About the largest displacement [m] now, without waiting. */
+  get displacementAbout(): number {
+    const shape = this.latest?.shape;
+    return shape?.form === "modal" ? (this.sample?.largest(shape) ?? 0) : 0;
   }
 
   /** The largest displacement [m] or strain now. Waits for the GPU. */

@@ -30,8 +30,9 @@ import type { Smooth } from "./creases";
 import { layShapes, modeAt, planeFor, shapeLayout, spread, type Limits, type Plane, type ShapeLayout } from "./layout";
 import { NORMALS, PLACES, WHOLE_TARGET } from "./shaders";
 
-// Modes that move nothing by more than this share of the object's size are left out of the sum.
-const INVISIBLE = 1e-7;
+// The smallest modes are left out of the sum, as long as they move nothing by more than this share of the object's size
+// together: often most of them, and each costs a look-up per node.
+const INVISIBLE = 1e-5;
 
 export function limitsOf(renderer: WebGLRenderer): Limits {
   const gl = renderer.getContext() as WebGL2RenderingContext;
@@ -186,8 +187,9 @@ export class GpuReconstruction {
   draw(renderer: WebGLRenderer, shape: ModalShape): void {
     const weights = this.weights.image.data as Float32Array;
     let count = 0;
+    const least = leastUsed(shape.q, this.invisible);
     for (let mode = 0; mode < Math.min(this.modes, shape.q.length); mode++) {
-      if (Math.abs(shape.q[mode]) <= this.invisible) continue;
+      if (Math.abs(shape.q[mode]) < least) continue;
       const { layer, row } = modeAt(mode, this.layout);
       weights.set([shape.q[mode], layer, row, 0], 4 * count++);
     }
@@ -233,6 +235,16 @@ export class GpuReconstruction {
     this.placePass.dispose();
     this.normalPass.dispose();
   }
+}
+
+/** All modes smaller than this add up to no more than `most`. */
+export function leastUsed(q: Float32Array, most: number): number {
+  let sum = 0;
+  for (const size of q.map(Math.abs).sort()) {
+    sum += size;
+    if (sum > most) return size;
+  }
+  return Infinity;
 }
 
 function readTarget(renderer: WebGLRenderer, from: WebGLRenderTarget): Float32Array {
