@@ -3,7 +3,7 @@
 
 use crate::contact::ContactPoints;
 use crate::response::{Acting, Body, NodalForces, Place, Reading, ResponseState};
-use crate::surface::{Centre, Moving, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
+use crate::surface::{Centre, Moving, Surface, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -62,7 +62,7 @@ impl NodeCache {
             some_dents: false,
             moment: None,
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
-            tight: vec![(0.0, 0); body.tree(Reading::Point).0.spheres()],
+            tight: vec![(0.0, 0); body.tree(Reading::Point).spheres()],
             visits: vec![0; nodes],
             visit: 0,
         }
@@ -189,6 +189,11 @@ impl<'a> Sight<'a> {
         self.body.bounds(self.reading).reach(&self.visit)
     }
 
+    /// The surface that the reading knows.
+    pub(crate) fn surface(&self) -> &'a Surface {
+        self.body.surface(self.reading)
+    }
+
     fn rest(&self, node: usize) -> DVec3 {
         self.body.recording.surface.positions[node]
     }
@@ -234,7 +239,7 @@ impl<'a> Sight<'a> {
 
     /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
     pub(crate) fn deformation(&mut self, found: &Found) -> f64 {
-        let corners = self.body.recording.surface.triangles[found.triangle as usize];
+        let corners = self.surface().triangles[found.triangle as usize];
         let mut most = 0.0_f64;
         for node in corners {
             most = most.max((self.free_node(node as usize) - self.smooth(node as usize)).length());
@@ -301,7 +306,7 @@ impl<'a> Sight<'a> {
 
     /// Where the corners of a triangle are.
     pub(crate) fn corners(&mut self, triangle: u32) -> [DVec3; 3] {
-        let [a, b, c] = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        let [a, b, c] = self.surface().triangles[triangle as usize].map(|n| n as usize);
         [self.node(a), self.node(b), self.node(c)]
     }
 
@@ -324,7 +329,7 @@ impl<'a> Sight<'a> {
         self.walk(
             |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
             |sight, triangle, _| {
-                for node in sight.body.recording.surface.triangles[triangle as usize] {
+                for node in sight.surface().triangles[triangle as usize] {
                     let place = sight.smooth(node as usize).dot(direction) + beside;
                     farthest.set(farthest.get().max(place));
                 }
@@ -355,7 +360,7 @@ impl<'a> Sight<'a> {
     ) {
         let body = self.body;
         let visit = self.visit;
-        let (tree, _) = body.tree(self.reading);
+        let tree = body.tree(self.reading);
         tree.walk((body.bounds(self.reading), &visit), self, near, found);
     }
 }
@@ -394,7 +399,7 @@ impl Moving for Sight<'_> {
     }
 
     fn corners_of(&self, triangle: u32) -> [usize; 3] {
-        self.body.tree(self.reading).1[triangle as usize].map(|node| node as usize)
+        self.surface().triangles[triangle as usize].map(|node| node as usize)
     }
 
     fn tight(&self, sphere: usize) -> Option<f64> {

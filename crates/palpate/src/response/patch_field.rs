@@ -10,7 +10,7 @@
 //! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band};
+use crate::surface::{Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band, coarser};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -39,8 +39,12 @@ pub(crate) struct PatchField {
 pub(crate) struct SomeNodes {
     /// Which of them every surface node is; [`NONE`] for the others.
     numbers: Vec<u32>,
-    /// Each as a triangle without extent, and the tree over these.
-    pub(crate) triangles: Vec<[u32; 3]>,
+    nodes: Vec<u32>,
+    /// Triangles between them; each as a triangle without extent where they make no surface.
+    pub(crate) surface: Surface,
+    pub(crate) is_surface: bool,
+    /// One of its triangles for each.
+    triangle: Vec<u32>,
     pub(crate) tree: SurfaceTree,
 }
 
@@ -51,9 +55,29 @@ impl SomeNodes {
     pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
         let mut numbers = vec![NONE; surface.positions.len()];
         nodes.iter().enumerate().for_each(|(number, &node)| numbers[node as usize] = number as u32);
-        let triangles: Vec<[u32; 3]> = nodes.iter().map(|&node| [node; 3]).collect();
+        let between = coarser(surface, nodes);
+        let is_surface = between.is_some();
+        let triangles = between.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
+        let mut triangle = vec![0; nodes.len()];
+        for (t, corners) in triangles.iter().enumerate() {
+            corners.iter().for_each(|node| triangle[numbers[*node as usize] as usize] = t as u32);
+        }
         let tree = SurfaceTree::new(&surface.positions, &triangles);
-        Self { numbers, triangles, tree }
+        let surface = Surface { triangles, ..surface.clone() };
+        Self { numbers, nodes: nodes.to_vec(), surface, is_surface, triangle, tree }
+    }
+
+    /// Their nodes.
+    pub(super) fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// A node as a point of the surface between them.
+    pub(super) fn node_point(&self, node: usize) -> SurfacePoint {
+        let triangle = self.triangle[self.numbers[node] as usize];
+        let corners = self.surface.triangles[triangle as usize];
+        let first = corners.iter().position(|corner| *corner as usize == node);
+        SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
     }
 }
 
@@ -74,7 +98,7 @@ impl PatchField {
         let some = SomeNodes::new(&recording.surface, nodes);
         let field = Self { some: Some(some), ..Self::without_bounds(recording, nodes, radius) };
         let some = field.some.as_ref();
-        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.triangles));
+        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.surface.triangles));
         Self { bounds: bounds.unwrap_or_default(), ..field }
     }
 
@@ -145,11 +169,18 @@ impl PatchField {
         self.some.as_ref().map_or(node, |some| some.numbers[node] as usize)
     }
 
+    /// The surface between the nodes that have a patch.
+    ///
+    /// # Real time
+    pub(crate) fn surface<'a>(&'a self, recording: &'a Recording) -> &'a Surface {
+        self.some.as_ref().map_or(&recording.surface, |some| &some.surface)
+    }
+
     /// A at a surface point.
     ///
     /// # Real time
     pub(crate) fn root_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
-        let corners = recording.surface.corners(point);
+        let corners = self.surface(recording).corners(point);
         let used = corners.iter().filter(|corner| corner.1 != 0.0);
         used.map(|&(node, w)| self.roots[self.number(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
@@ -179,10 +210,39 @@ impl PatchField {
         2.11 / self.range
     }
 
-    /// K [m/N] between two places.
+    /// K·f [m] at the patch about a node, for a force on the patches about the corners of a surface between some nodes.
+    ///
+    /// # Real time
+    pub(crate) fn dent_of_corners(&self, node: usize, point: &SurfacePoint, force: DVec3) -> DVec3 {
+        let Some(some) = &self.some else { return DVec3::ZERO };
+        let used = some.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
+        used.map(|(corner, weight)| self.between_nodes(&some.surface, node, corner) * (force * weight)).sum()
+    }
+
+    /// K [m/N] between the patches about two nodes.
+    fn between_nodes(&self, surface: &Surface, a: usize, b: usize) -> DMat3 {
+        let distance = (surface.positions[a] - surface.positions[b]).length();
+        if distance >= self.range {
+            return DMat3::ZERO;
+        }
+        let root = |node| self.roots[self.number(node)];
+        root(a) * root(b).transpose() * NearField::taper(distance / self.range)
+    }
+
+    /// K [m/N] between two places. Between some nodes a place is its corners, as far as the modes go as well.
     ///
     /// # Real time
     pub(crate) fn residual(&self, recording: &Recording, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
+        if let Some(SomeNodes { surface, .. }) = &self.some {
+            let used = |point| surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
+            let mut sum = DMat3::ZERO;
+            for (i, wi) in used(a) {
+                for (j, wj) in used(b) {
+                    sum += self.between_nodes(surface, i, j) * (wi * wj);
+                }
+            }
+            return sum;
+        }
         let distance = (recording.surface.rest_position(a) - recording.surface.rest_position(b)).length();
         if distance >= self.range {
             return DMat3::ZERO;
