@@ -228,7 +228,12 @@ impl State {
             levels: vec![Level::default(); model.objects.len() * model.others()],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
-                solver: Solver::new(model.objects.len(), devices, contacts, parameters.thins_faces(model.objects.len())),
+                solver: Solver::new(
+                    model.objects.len(),
+                    devices,
+                    contacts,
+                    parameters.thins_faces(model.objects.len()),
+                ),
                 search: Search::new(),
                 caches: model.objects.iter().map(|o| NodeCache::new(&o.body)).collect(),
                 vicinities: (0..devices)

@@ -26,7 +26,7 @@ pub(super) const FEATURES: u64 = 1 << 40;
 const ADVANCES: usize = 30;
 
 /// A weight below this is none: the point is on the edge, or nearly.
-const ON_EDGE: f64 = 0.02;
+pub(super) const ON_EDGE: f64 = 0.02;
 
 /// An object and an obstacle over a step.
 struct Encounter<'a> {
@@ -277,7 +277,7 @@ impl Encounter<'_> {
                 let known = known.map(|at| self.own.points.of(contacts[at].slot).place.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(place));
                 let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
-                let approach = Approach { point, way, known, edge: self.body.edge };
+                let approach = Approach { point, way, facing: DVec3::ZERO, known, edge: self.body.edge };
                 if let Some((point, normal)) = meeting(search, sight, &approach) {
                     let of = Place { point, reading: Reading::Point };
                     self.want(wanted, feature as u64, of, start.orientation * normal, place);

@@ -1,7 +1,7 @@
 //! Elastic objects against one another: the surface nodes of each against the surface of the other. Where many come near,
 //! some of them stand for all, on both sides: places against the coarser surface between places.
 
-use super::against::FEATURES;
+use super::against::{FEATURES, ON_EDGE};
 use super::meeting::{Approach, MARGIN, SPARE, meeting};
 use super::search::Search;
 use super::sight::Sight;
@@ -47,25 +47,29 @@ impl Finding<'_> {
         let (first, left_out) = (self.wanted.list.len(), self.wanted.left_out);
         loop {
             let found = match self.facing(a, b) {
-                Some([of_a, of_b]) => [self.nodes_against(a, b, of_a), self.nodes_against(b, a, of_b)],
+                Some([of_a, of_b]) => {
+                    [self.nodes_against(a, b, of_a, first), self.nodes_against(b, a, of_b, first)]
+                }
                 None => [0; 2],
             };
             let sides = [(a, b, found[0]), (b, a, found[1])];
-            let too_many = sides.map(|(own, other, found)| found > most && self.can_be_coarser(own, other));
-            if !too_many.contains(&true) {
-                for (own, other, found) in sides {
-                    let level = self.level_at(own, other);
-                    self.levels[level] = self.levels[level].after(found, most, self.step);
-                }
+            let near =
+                sides.map(|(own, other, found)| if self.can_be_coarser(own, other) { found } else { 0 });
+            let too_many = self.wanted.list.len() - first > most;
+            // A side that has too many near, or the one that has more of them.
+            let coarser =
+                near.map(|found| found > most || too_many && found > 0 && found == near[0].max(near[1]));
+            for ((own, other, found), coarser) in sides.into_iter().zip(coarser) {
+                let at = self.level_at(own, other);
+                let level = self.levels[at];
+                self.levels[at] =
+                    if coarser { level.coarser(self.step) } else { level.after(found, most, self.step) };
+            }
+            if !coarser.contains(&true) {
                 return;
             }
-            // Fewer stand for them.
             self.wanted.list.truncate(first);
             self.wanted.left_out = left_out;
-            for ((own, other, _), _) in sides.into_iter().zip(too_many).filter(|(_, too_many)| *too_many) {
-                let level = self.level_at(own, other);
-                self.levels[level] = self.levels[level].coarser(self.step);
-            }
         }
     }
 
@@ -130,13 +134,16 @@ impl Finding<'_> {
 
     /// The nodes of one object, beyond a plane, against the surface of another. Gives how many meet it, or one more than are
     /// allowed where fewer can stand for them.
-    fn nodes_against(&mut self, nodes_of: usize, surface_of: usize, beyond: Beyond) -> usize {
+    fn nodes_against(&mut self, nodes_of: usize, surface_of: usize, beyond: Beyond, first: usize) -> usize {
         let can_be_coarser = self.can_be_coarser(nodes_of, surface_of);
         let enough = if can_be_coarser { self.model.parameters.most_places } else { usize::MAX };
         let readings = [self.reading(nodes_of, surface_of), self.reading(surface_of, nodes_of)];
         let levels = [(nodes_of, surface_of), (surface_of, nodes_of)]
             .map(|(own, other)| self.levels[self.level_at(own, other)].number as u64);
         let features = (levels[0] * LEVELS + levels[1]) * FEATURES;
+        // What places of one side keep apart between them needs none of the other.
+        let thinned = levels != [0; 2];
+        let other_features = (levels[1] * LEVELS + levels[0]) * FEATURES;
         let Finding { model, objects, contacts, caches, search, near, wanted, step, .. } = self;
         let Ok([cache, base_cache]) = caches.get_disjoint_mut([nodes_of, surface_of]) else { return 0 };
         let side = |number: usize, reading, cache| {
@@ -151,12 +158,25 @@ impl Finding<'_> {
         let mut found = 0;
         for &node in near.iter() {
             let feature = features + u64::from(node);
-            if let Some(contact) = meet(&mut nodes, &mut base, (node as usize, feature), way, contacts, search) {
+            if let Some(contact) =
+                meet(&mut nodes, &mut base, (node as usize, feature), way, contacts, search)
+            {
                 found += 1;
-                if found > enough {
+                let is_wanted = |node: usize| {
+                    let other = Key {
+                        other: Against::Object(surface_of),
+                        object: nodes_of,
+                        feature: other_features + node as u64,
+                    };
+                    wanted.list[first..].iter().any(|wanted| wanted.key == other)
+                };
+                let mut corners = base.object.body.corners(&contact.place).into_iter();
+                if !(thinned && corners.all(|(node, weight)| weight < ON_EDGE || is_wanted(node))) {
+                    wanted.push(contact);
+                }
+                if found.max(wanted.list.len() - first) > enough {
                     break;
                 }
-                wanted.push(contact);
             }
         }
         found
@@ -232,6 +252,8 @@ fn meet(
     let mut approach = Approach {
         point: in_base(smooth),
         way: way + deforms,
+        facing: base_pose.orientation.inverse()
+            * (pose.orientation * nodes.object.body.facing(nodes.reading, node)),
         known: known.map(|(_, point)| point.triangle),
         edge: nodes.object.body.edge.min(base.object.body.edge),
     };

@@ -3,7 +3,9 @@
 
 use crate::contact::ContactPoints;
 use crate::response::{Acting, Body, NodalForces, Place, Reading, ResponseState};
-use crate::surface::{Centre, Moving, Surface, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
+use crate::surface::{
+    Centre, Moving, Surface, Visit, area_normal, at_weights, low_modes, nearest_on_triangle,
+};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -182,6 +184,10 @@ impl<'a> Sight<'a> {
             self.cache.whole_now += 1;
             self.cache.some_dents = true;
         }
+    }
+
+    fn dents_have_a_shape(&self) -> bool {
+        self.visit.slope.is_finite()
     }
 
     /// How far any node can be from its place at rest [m].
@@ -375,18 +381,12 @@ impl Moving for Sight<'_> {
             return None;
         }
         let smooth = Sight::low(self, node);
-        Some(match self.reading {
-            Reading::Point => smooth,
-            Reading::Patch(_) => self.with_dents(node, smooth),
-        })
+        Some(if self.dents_have_a_shape() { self.with_dents(node, smooth) } else { smooth })
     }
 
     /// With dents where they have a shape, else they count for a sphere's radius.
     fn moved(&mut self, node: usize) -> DVec3 {
-        match self.reading {
-            Reading::Point => self.smooth(node),
-            Reading::Patch(_) => self.node(node),
-        }
+        if self.dents_have_a_shape() { self.node(node) } else { self.smooth(node) }
     }
 
     /// Patches are looked at by few: what their dents do is not kept.

@@ -3,7 +3,9 @@
 use super::dot::{dot3, dot3_single};
 use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
-use crate::surface::{Bands, Bounds, Surface, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around};
+use crate::surface::{
+    Bands, Bounds, Surface, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around,
+};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -51,8 +53,8 @@ pub(crate) struct Acting {
     pub(crate) force: DVec3,
     /// Where at rest [m, body].
     pub(crate) rest: DVec3,
-    /// For patches Aᵀ·f [√J] of the patch field's equation.
-    pull: DVec3,
+    /// For patches Aᵀ·f [√J] of the patch field's equation, and where; between places that stand for others at each corner.
+    pulls: [(DVec3, DVec3); 3],
 }
 
 /// One object's body; immutable.
@@ -189,6 +191,12 @@ impl Body {
         self.surface(place.reading).corners(&place.point)
     }
 
+    /// The way that a place which stands for others faces at rest [body]; zero for nodes, which stand for themselves.
+    pub(crate) fn facing(&self, reading: Reading, node: usize) -> DVec3 {
+        let some = self.patch(reading).and_then(|patch| patch.some.as_ref());
+        some.map_or(DVec3::ZERO, |some| some.facing(node))
+    }
+
     /// Where a place is at rest [m, body].
     pub(crate) fn rest_position(&self, place: &Place) -> DVec3 {
         self.surface(place.reading).rest_position(&place.point)
@@ -247,9 +255,11 @@ impl Body {
         }
     }
 
-    /// What of a dent can change over a distance, as a share per metre.
+    /// What of a dent can change over a distance, as a share per metre; infinite where dents have no shape that is worth
+    /// looking at: between nodes, and between places that stand for others.
     pub(crate) fn dent_slope(&self, reading: Reading) -> f64 {
-        self.patch(reading).map_or(f64::INFINITY, PatchField::dent_slope)
+        let patch = self.patch(reading).filter(|patch| patch.some.is_none());
+        patch.map_or(f64::INFINITY, PatchField::dent_slope)
     }
 
     /// How far the surface can go, as a reading sees it.
@@ -285,9 +295,9 @@ impl Body {
     /// # Real time
     pub(crate) fn acting(&self, place: Place, force: DVec3) -> Acting {
         let rest = self.rest_position(&place);
-        let root = self.patch(place.reading).map(|patch| patch.root_at(&self.recording, &place.point));
-        let pull = root.map_or(DVec3::ZERO, |root| root.transpose() * force);
-        Acting { place, force, rest, pull }
+        let patch = self.patch(place.reading);
+        let pulls = patch.map(|patch| patch.pulls(&self.recording, &place.point, rest, force));
+        Acting { place, force, rest, pulls: pulls.unwrap_or_default() }
     }
 
     /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
@@ -296,10 +306,7 @@ impl Body {
     /// # Real time
     pub(crate) fn dent(&self, node: usize, acting: &Acting, flat: f64) -> DVec3 {
         match self.patch(acting.place.reading) {
-            Some(patch) if patch.some.is_some() => {
-                patch.dent_of_corners(node, &acting.place.point, acting.force)
-            }
-            Some(patch) => patch.dent(&self.recording, node, acting.rest, acting.pull, flat),
+            Some(patch) => patch.dent(&self.recording, node, &acting.pulls, flat),
             None => self.residual_of_node(node, &acting.place) * acting.force,
         }
     }

@@ -36,7 +36,8 @@ impl NodeCompliance {
         for (node, rows) in places.iter().zip(rows.chunks_exact_mut(width.max(1))) {
             body.add_rows(reading, *node as usize, 1.0, rows);
         }
-        let place = |number: usize| Place { point: body.node_point(reading, places[number] as usize), reading };
+        let place =
+            |number: usize| Place { point: body.node_point(reading, places[number] as usize), reading };
         let of = |number: usize| &rows[number * width..(number + 1) * width];
         let mut weighted = vec![0.0; width];
         let mut blocks = Vec::with_capacity(nodes * (nodes + 1) / 2);

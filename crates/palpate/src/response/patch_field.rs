@@ -10,7 +10,9 @@
 //! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band, coarser};
+use crate::surface::{
+    Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band, coarser, facing,
+};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -43,6 +45,8 @@ pub(crate) struct SomeNodes {
     /// Triangles between them; each as a triangle without extent where they make no surface.
     pub(crate) surface: Surface,
     pub(crate) is_surface: bool,
+    /// Outward directions at rest; zero where there is none.
+    facing: Vec<DVec3>,
     /// One of its triangles for each.
     triangle: Vec<u32>,
     pub(crate) tree: SurfaceTree,
@@ -62,14 +66,20 @@ impl SomeNodes {
         for (t, corners) in triangles.iter().enumerate() {
             corners.iter().for_each(|node| triangle[numbers[*node as usize] as usize] = t as u32);
         }
+        let facing = facing(surface);
+        let facing = nodes.iter().map(|&node| facing[node as usize]).collect();
         let tree = SurfaceTree::new(&surface.positions, &triangles);
         let surface = Surface { triangles, ..surface.clone() };
-        Self { numbers, nodes: nodes.to_vec(), surface, is_surface, triangle, tree }
+        Self { numbers, nodes: nodes.to_vec(), surface, is_surface, facing, triangle, tree }
     }
 
     /// Their nodes.
     pub(super) fn nodes(&self) -> &[u32] {
         &self.nodes
+    }
+
+    pub(super) fn facing(&self, node: usize) -> DVec3 {
+        self.facing[self.numbers[node] as usize]
     }
 
     /// A node as a point of the surface between them.
@@ -185,38 +195,50 @@ impl PatchField {
         used.map(|&(node, w)| self.roots[self.number(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position, around which it is flat.
+    /// K·f [m] at the patch about a node, for pulls Aᵀ·f with their places at rest, around which it is flat.
     ///
     /// # Real time
     pub(crate) fn dent(
         &self,
         recording: &Recording,
         node: usize,
-        rest: DVec3,
-        pull: DVec3,
+        pulls: &[(DVec3, DVec3); 3],
         flat: f64,
     ) -> DVec3 {
-        let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
-        if distance < self.range {
-            self.roots[self.number(node)] * pull * NearField::taper(distance / self.range)
-        } else {
-            DVec3::ZERO
+        let mut sum = DVec3::ZERO;
+        for &(rest, pull) in pulls.iter().filter(|(_, pull)| *pull != DVec3::ZERO) {
+            let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
+            if distance < self.range {
+                sum += self.roots[self.number(node)] * pull * NearField::taper(distance / self.range);
+            }
         }
+        sum
+    }
+
+    /// Aᵀ·f for a force at a point with this rest position, and where: of a surface between some nodes at its corners.
+    ///
+    /// # Real time
+    pub(super) fn pulls(
+        &self,
+        recording: &Recording,
+        point: &SurfacePoint,
+        rest: DVec3,
+        force: DVec3,
+    ) -> [(DVec3, DVec3); 3] {
+        if let Some(some) = &self.some {
+            return some.surface.corners(point).map(|(node, weight)| {
+                let pull = self.roots[self.number(node)].transpose() * (force * weight);
+                (some.surface.positions[node], pull)
+            });
+        }
+        let none = (rest, DVec3::ZERO);
+        [(rest, self.root_at(recording, point).transpose() * force), none, none]
     }
 
     /// Steepest slope of ψ [1/m].
     pub(crate) fn dent_slope(&self) -> f64 {
         // ψ′ = −20·s·(1 − s)³ is steepest at a quarter.
         2.11 / self.range
-    }
-
-    /// K·f [m] at the patch about a node, for a force on the patches about the corners of a surface between some nodes.
-    ///
-    /// # Real time
-    pub(crate) fn dent_of_corners(&self, node: usize, point: &SurfacePoint, force: DVec3) -> DVec3 {
-        let Some(some) = &self.some else { return DVec3::ZERO };
-        let used = some.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
-        used.map(|(corner, weight)| self.between_nodes(&some.surface, node, corner) * (force * weight)).sum()
     }
 
     /// K [m/N] between the patches about two nodes.

@@ -110,9 +110,7 @@ impl Coarse<'_> {
         // Both have two neighbours in common, else the surface would fold together.
         let beside = |other: &&u32| {
             **other != into
-                && self.around[**other as usize]
-                    .iter()
-                    .any(|t| self.triangles[*t as usize].contains(&into))
+                && self.around[**other as usize].iter().any(|t| self.triangles[*t as usize].contains(&into))
         };
         if ring.iter().filter(beside).count() != 2 {
             return None;
