@@ -132,8 +132,8 @@ impl Finding<'_> {
         Sight::new(body, reading, &own.response, &own.points, &mut self.caches[at], Ok(self.step))
     }
 
-    /// The nodes of one object, beyond a plane, against the surface of another. Gives how many meet it, or one more than are
-    /// allowed where fewer can stand for them.
+    /// The nodes of one object, beyond a plane, against the surface of another. Gives how many come near it, as far as that is
+    /// no more than are allowed, where fewer can stand for them.
     fn nodes_against(&mut self, nodes_of: usize, surface_of: usize, beyond: Beyond, first: usize) -> usize {
         let can_be_coarser = self.can_be_coarser(nodes_of, surface_of);
         let enough = if can_be_coarser { self.model.parameters.most_places } else { usize::MAX };
@@ -158,25 +158,24 @@ impl Finding<'_> {
         let mut found = 0;
         for &node in near.iter() {
             let feature = features + u64::from(node);
-            if let Some(contact) =
-                meet(&mut nodes, &mut base, (node as usize, feature), way, contacts, search)
-            {
-                found += 1;
+            let key = Key { other: Against::Object(nodes_of), object: surface_of, feature };
+            let known = contacts.binary_search_by(|c| c.key.cmp(&key)).ok().map(|at| &contacts[at]);
+            let node = node as usize;
+            let Some(approach) = approach(&mut nodes, &mut base, node, way, known) else { continue };
+            found += 1;
+            if let Some(contact) = meet(&mut nodes, &mut base, (node, approach), key, known, search) {
                 let is_wanted = |node: usize| {
-                    let other = Key {
-                        other: Against::Object(surface_of),
-                        object: nodes_of,
-                        feature: other_features + node as u64,
-                    };
+                    let feature = other_features + node as u64;
+                    let other = Key { other: Against::Object(surface_of), object: nodes_of, feature };
                     wanted.list[first..].iter().any(|wanted| wanted.key == other)
                 };
                 let mut corners = base.object.body.corners(&contact.place).into_iter();
                 if !(thinned && corners.all(|(node, weight)| weight < ON_EDGE || is_wanted(node))) {
                     wanted.push(contact);
                 }
-                if found.max(wanted.list.len() - first) > enough {
-                    break;
-                }
+            }
+            if found.max(wanted.list.len() - first) > enough {
+                break;
             }
         }
         found
@@ -196,6 +195,15 @@ impl Side<'_> {
     /// How far the rigid motion moves it in the step without contact force, at most [m].
     fn way(&self) -> f64 {
         self.own.rigid.pose.way(&self.own.free.end.pose, self.object.radius)
+    }
+
+    /// A place [m] or a direction in its body as the other has it in its own.
+    fn seen_from(&self, base: &Side, place: DVec3) -> DVec3 {
+        base.own.rigid.pose.body_from_world(self.own.rigid.pose.world_from_body(place))
+    }
+
+    fn direction_from(&self, base: &Side, direction: DVec3) -> DVec3 {
+        base.own.rigid.pose.orientation.inverse() * (self.own.rigid.pose.orientation * direction)
     }
 
     /// The nodes beyond a plane that are near the box around the other, which is moved out as far as the other can deform.
@@ -230,59 +238,70 @@ impl Side<'_> {
     }
 }
 
+/// Where a contact has its points: the slot of the node's, and the place on the surface.
+fn points_of(base: &Side, contact: &Contact) -> Option<(usize, Place)> {
+    match contact.other {
+        Other::Object { slot, .. } => Some((slot, base.own.points.of(contact.slot).place)),
+        _ => None,
+    }
+}
+
+/// How a node that the modes move comes near the surface of another object, if it does.
+fn approach(
+    nodes: &mut Side,
+    base: &mut Side,
+    node: usize,
+    way: f64,
+    known: Option<&Contact>,
+) -> Option<Approach> {
+    let smooth = nodes.sight.smooth(node);
+    let deforms = (nodes.sight.free_node(node) - smooth).length();
+    let approach = Approach {
+        point: nodes.seen_from(base, smooth),
+        way: way + deforms,
+        facing: nodes.direction_from(base, nodes.object.body.facing(nodes.reading, node)),
+        known: known.and_then(|contact| points_of(base, contact)).map(|(_, place)| place.point.triangle),
+        edge: nodes.object.body.edge.min(base.object.body.edge),
+    };
+    // Without its dent, which costs more, most that come near reach nothing.
+    let reach = approach.reach() + nodes.sight.most_dent();
+    base.sight.may_reach(approach.point, reach).then_some(approach)
+}
+
 /// The contact of a node that comes near the surface of another object.
 fn meet(
     nodes: &mut Side,
     base: &mut Side,
-    (node, feature): (usize, u64),
-    way: f64,
-    contacts: &[Contact],
+    (node, approach): (usize, Approach),
+    key: Key,
+    known: Option<&Contact>,
     search: &mut Search,
 ) -> Option<Wanted> {
-    let key = Key { other: Against::Object(nodes.number), object: base.number, feature };
-    let known = contacts.binary_search_by(|c| c.key.cmp(&key)).ok().map(|at| &contacts[at]);
-    let known = known.and_then(|contact| match contact.other {
-        Other::Object { slot, .. } => Some((slot, base.own.points.of(contact.slot).place.point)),
-        _ => None,
-    });
-    let smooth = nodes.sight.smooth(node);
-    let deforms = (nodes.sight.free_node(node) - smooth).length();
-    let (pose, base_pose) = (nodes.own.rigid.pose, base.own.rigid.pose);
-    let in_base = |place: DVec3| base_pose.body_from_world(pose.world_from_body(place));
-    let mut approach = Approach {
-        point: in_base(smooth),
-        way: way + deforms,
-        facing: base_pose.orientation.inverse()
-            * (pose.orientation * nodes.object.body.facing(nodes.reading, node)),
-        known: known.map(|(_, point)| point.triangle),
-        edge: nodes.object.body.edge.min(base.object.body.edge),
-    };
-    // Without its dent, which costs more, most that come near reach nothing.
-    if !base.sight.may_reach(approach.point, approach.reach() + nodes.sight.most_dent()) {
-        return None;
-    }
-    approach.point = in_base(match known {
+    let known = known.and_then(|contact| points_of(base, contact));
+    let place = match known {
         Some((slot, _)) => {
             let point = nodes.own.points.of(slot);
             point.rest + point.placed.displacement
         }
         None => nodes.sight.node(node),
-    });
-    let (mut point, normal) = meeting(search, &mut base.sight, &approach)?;
+    };
+    let approach = Approach { point: nodes.seen_from(base, place), ..approach };
+    let (point, normal) = meeting(search, &mut base.sight, &approach)?;
+    let mut place = Place { point, reading: base.reading };
     if let (Some((_, last)), Reading::Patch(_)) = (known, base.reading) {
-        let surface = base.sight.surface();
-        let gone = (surface.rest_position(&point) - surface.rest_position(&last)).length();
-        point = if gone < STAYS * approach.edge { last } else { point };
+        let rest = |place| base.object.body.rest_position(place);
+        if (rest(&place) - rest(&last)).length() < STAYS * approach.edge {
+            place = last;
+        }
     }
+    let Side { reading, .. } = *nodes;
+    let of_node = Place { point: nodes.object.body.node_point(reading, node), reading };
     Some(Wanted {
         key,
-        place: Place { point, reading: base.reading },
-        other: WantedOther::Object {
-            number: nodes.number,
-            place: Place { point: nodes.object.body.node_point(nodes.reading, node), reading: nodes.reading },
-        },
+        place,
+        other: WantedOther::Object { number: nodes.number, place: of_node },
         law: Law::Touch { friction: libm::sqrt(nodes.object.friction * base.object.friction) },
-        normal: base_pose.orientation * normal,
+        normal: base.own.rigid.pose.orientation * normal,
         distance: 0.0,
     })
 }

@@ -182,8 +182,7 @@ impl Solver {
             let hopeless = touching && (worn || self.whirls(parts));
             let spent = iterations == MAX_ITERATIONS || hopeless;
             if miss <= tight || stalled || enough || spent || !miss.is_finite() {
-                status.iterations =
-                    status.iterations.max(iterations) + 1000 * sweeps + 1_000_000 * self.members.len() as u32;
+                status.iterations = status.iterations.max(iterations);
                 // Points that repeat others can't be met where their hands differ, and need not be.
                 let loose = self.accuracy(visits, size).max(LOOSE * size);
                 let allowed = if touching { loose } else { UNSOLVED * reach };
