@@ -25,6 +25,9 @@ const DESCENT: usize = 64;
 /// Places that are less than this [m] apart are one.
 const SAME: f64 = 1e-9;
 
+/// A distance that is larger by this is larger whatever was rounded.
+const ROUNDED: f64 = 1.0 + 1e-9;
+
 /// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
 pub(super) const ONE_FACE: f64 = 0.85;
 
@@ -132,6 +135,12 @@ impl Search {
         sight.walk(
             |_, _, centre, radius| (p - centre).length() - radius < least.get(),
             |sight, triangle, _| {
+                // Most are farther by the box around them.
+                let [a, b, c] = sight.corners(triangle);
+                let in_box = p.clamp(a.min(b).min(c), a.max(b).max(c));
+                if (p - in_box).length() > least.get() * ROUNDED {
+                    return;
+                }
                 let one = sight.nearest_on(triangle, p);
                 if one.distance < least.get() && meets(&one) {
                     least.set(least.get().min(one.distance + SAME));
