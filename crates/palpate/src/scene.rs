@@ -69,7 +69,7 @@ pub struct ModelParameters {
     pub obstacles: Vec<Obstacle>,
     /// Most contact points of one object, 9·n² numbers of memory. Beyond it contacts are left out, and the status says so.
     pub most_contact_points: usize,
-    /// Most places at which an object meets an obstacle. Where more of its surface nodes come near, fewer stand for all, each
+    /// Most places at which an object meets an obstacle or another object. Where more of its surface nodes come near, fewer stand for all, each
     /// for the patch around it.
     pub most_places: usize,
 }
@@ -168,9 +168,10 @@ impl Model {
         for (at, obstacle) in parameters.obstacles.iter().enumerate() {
             obstacle.check(at)?;
         }
+        let count = objects.len();
         let objects = objects.into_iter().enumerate();
         let objects: Result<Vec<SceneObject>, _> =
-            objects.map(|(at, object)| SceneObject::new(at, object, &parameters)).collect();
+            objects.map(|(at, object)| SceneObject::new(at, object, &parameters, count)).collect();
         let mut objects = objects?;
         if parameters.touches_surfaces(objects.len()) {
             for at in 0..objects.len() {
@@ -192,6 +193,11 @@ impl Model {
         self.objects.iter().map(|object| &*object.body.recording)
     }
 
+    /// How many things an object can lie on: obstacles, and objects.
+    pub(crate) fn others(&self) -> usize {
+        self.parameters.obstacles.len() + self.objects.len()
+    }
+
     /// Whether a grasp names an object, a triangle and weights that exist.
     pub(crate) fn accepts(&self, grasp: &Grasp) -> bool {
         self.objects.get(grasp.object).is_some_and(|object| {
@@ -201,9 +207,9 @@ impl Model {
 }
 
 impl ModelParameters {
-    /// Whether few places may stand for many nodes.
-    pub(crate) fn thins_faces(&self) -> bool {
-        self.most_places < usize::MAX && !self.obstacles.is_empty()
+    /// Whether few places may stand for many nodes, of so many objects.
+    pub(crate) fn thins_faces(&self, objects: usize) -> bool {
+        self.most_places < usize::MAX && self.touches_surfaces(objects)
     }
 
     /// Whether objects, so many, have something to lie on: obstacles, or one another.
@@ -237,7 +243,12 @@ impl DeviceParameters {
 }
 
 impl SceneObject {
-    fn new(at: usize, object: ModelObject, parameters: &ModelParameters) -> Result<Self, Error> {
+    fn new(
+        at: usize,
+        object: ModelObject,
+        parameters: &ModelParameters,
+        objects: usize,
+    ) -> Result<Self, Error> {
         let ModelObject { recording, response, start, friction } = object;
         let ObjectStart { mut pose, twist } = start;
         let refusal = |what| Error::Model(format!("object {at}: {what}"));
@@ -272,7 +283,7 @@ impl SceneObject {
         radii.retain(|radius| *radius > 0.0);
         radii.sort_unstable_by(f64::total_cmp);
         radii.dedup();
-        let thins = parameters.thins_faces() && matches!(response, Response::Modal(_));
+        let thins = parameters.thins_faces(objects) && matches!(response, Response::Modal(_));
         let body = Body::new(recording, &radii, if thins { parameters.most_places } else { usize::MAX });
         Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
     }

@@ -174,7 +174,7 @@ pub struct State {
     pub(crate) contacts: Vec<Contact>,
     /// Whether a device is inside an object, where it came to without crossing the surface: devices × objects.
     pub(crate) inside: Vec<bool>,
-    /// How coarsely each object meets each obstacle: objects × obstacles.
+    /// How coarsely each object meets each obstacle, and each other object: objects × (obstacles + objects).
     pub(crate) levels: Vec<Level>,
     /// What virtual couplings did.
     pub(crate) couplings: EnergyLedger,
@@ -225,10 +225,15 @@ impl State {
             devices: vec![DeviceState::new(); devices],
             contacts: Vec::with_capacity(contacts),
             inside: vec![false; devices * model.objects.len()],
-            levels: vec![Level::default(); model.objects.len() * parameters.obstacles.len()],
+            levels: vec![Level::default(); model.objects.len() * model.others()],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
-                solver: Solver::new(model.objects.len(), devices, contacts, parameters.thins_faces()),
+                solver: Solver::new(
+                    model.objects.len(),
+                    devices,
+                    contacts,
+                    parameters.thins_faces(model.objects.len()),
+                ),
                 search: Search::new(),
                 caches: model.objects.iter().map(|o| NodeCache::new(&o.body)).collect(),
                 vicinities: (0..devices)

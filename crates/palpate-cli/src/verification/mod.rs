@@ -152,7 +152,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "places",
-        about: "cubes and a ball that lie, fall and lean on fewer places than they have nodes",
+        about: "cubes and a ball that lie, fall and lean, and cubes on one another, on fewer places than they have nodes",
         run: places::places,
     },
     Case {

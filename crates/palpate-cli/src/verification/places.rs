@@ -4,7 +4,7 @@ use super::Check;
 use super::scene::{G, PAPER, Stuff, Watch, at, floor};
 use crate::Failure;
 use glam::DVec3;
-use palpate::{Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
+use palpate::{Against, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::{ball_mesh, box_mesh};
 use std::sync::Arc;
@@ -15,7 +15,12 @@ const ALL: usize = usize::MAX;
 /// As many as a run in real time takes.
 const USUAL: usize = 48;
 
-fn scene(most_places: usize, step_s: f64, friction: f64, object: ModelObject) -> Result<Model, Failure> {
+fn scene(
+    most_places: usize,
+    step_s: f64,
+    friction: f64,
+    objects: Vec<ModelObject>,
+) -> Result<Model, Failure> {
     let parameters = ModelParameters {
         step_s,
         gravity: DVec3::Y * -G,
@@ -23,7 +28,7 @@ fn scene(most_places: usize, step_s: f64, friction: f64, object: ModelObject) ->
         most_places,
         ..ModelParameters::default()
     };
-    Ok(Model::new(parameters, vec![object])?)
+    Ok(Model::new(parameters, objects)?)
 }
 
 /// Bodies on a floor at rest and in a fall, by places and by nodes.
@@ -38,6 +43,8 @@ pub fn places() -> Result<Vec<Check>, Failure> {
     checks.extend(rest("ball", &ball, 0.05, &[(USUAL, 0.03), (24, 0.06)])?);
     checks.extend(fall()?);
     checks.extend(topple()?);
+    checks.extend(stacked()?);
+    checks.extend(overhang()?);
     Ok(checks)
 }
 
@@ -48,7 +55,7 @@ fn rest(name: &str, body: &Arc<Recording>, half: f64, cases: &[(usize, f64)]) ->
     const LATE: u32 = 1000;
     let weight = body.mass() * G;
     let lie = |most: usize| -> Result<(f64, f64, Watch), Failure> {
-        let model = scene(most, 1e-3, 0.5, at(body, DVec3::Y * half, DVec3::ZERO))?;
+        let model = scene(most, 1e-3, 0.5, vec![at(body, DVec3::Y * half, DVec3::ZERO)])?;
         let (mut state, mut watch, mut force) = (State::new(&model), Watch::default(), 0.0);
         watch.look(state.output());
         for number in 0..STEPS {
@@ -76,7 +83,7 @@ fn rest(name: &str, body: &Arc<Recording>, half: f64, cases: &[(usize, f64)]) ->
 fn fall() -> Result<Vec<Check>, Failure> {
     let cube = PAPER.body(box_mesh([0.1; 3], [12; 3])?, Order::Linear, 200)?;
     let rebound = |most: usize, step_s: f64| -> Result<(f64, Watch), Failure> {
-        let model = scene(most, step_s, 0.0, at(&cube, DVec3::Y * 0.1, DVec3::ZERO))?;
+        let model = scene(most, step_s, 0.0, vec![at(&cube, DVec3::Y * 0.1, DVec3::ZERO)])?;
         let (mut state, mut watch) = (State::new(&model), Watch::default());
         let (mut lowest, mut top) = (f64::INFINITY, 0.0_f64);
         watch.look(state.output());
@@ -99,6 +106,82 @@ fn fall() -> Result<Vec<Check>, Failure> {
     Ok(checks)
 }
 
+/// A cube on another: how far each sags, and what the lower one carries. By all nodes that takes its time, so the cubes are
+/// coarser than elsewhere.
+fn stacked() -> Result<Vec<Check>, Failure> {
+    const STEPS: u32 = 3000;
+    const LATE: u32 = 1000;
+    let calm = Stuff { beta: 4e-3, ..PAPER };
+    let cube = calm.body(box_mesh([0.1; 3], [8; 3])?, Order::Linear, 200)?;
+    let weight = cube.mass() * G;
+    let lie = |most: usize| -> Result<([f64; 2], f64, Watch), Failure> {
+        let cubes = [0.05, 0.15].map(|y| at(&cube, DVec3::Y * y, DVec3::ZERO));
+        let model = scene(most, 1e-3, 0.5, cubes.to_vec())?;
+        let (mut state, mut watch, mut carried) = (State::new(&model), Watch::default(), 0.0);
+        let mut sag = [0.0; 2];
+        watch.look(state.output());
+        for number in 0..STEPS {
+            let output = step(&model, &mut state, &Input::default());
+            watch.look(output);
+            if number < STEPS - LATE {
+                continue;
+            }
+            for contact in &output.contacts {
+                let on_the_upper = match (contact.object, contact.against) {
+                    (1, Against::Object(_)) => contact.force.y,
+                    (_, Against::Object(_)) => -contact.force.y,
+                    _ => 0.0,
+                };
+                carried += on_the_upper / f64::from(LATE);
+            }
+            for (at, sag) in sag.iter_mut().enumerate() {
+                *sag += (0.05 + 0.1 * at as f64 - output.objects[at].pose.position.y) / f64::from(LATE);
+            }
+        }
+        Ok((sag, carried, watch))
+    };
+    let (expected, ..) = lie(ALL)?;
+    let mut checks = Vec::new();
+    for (most, allowed) in [(USUAL, 0.04), (24, 0.08)] {
+        let (sag, carried, watch) = lie(most)?;
+        for (at, name) in ["lower", "upper"].into_iter().enumerate() {
+            let quantity = format!("{name} of two cubes, {most} places: sag, by all nodes [m]");
+            checks.push(Check::new(quantity, sag[at], expected[at], allowed));
+        }
+        let of = format!("two cubes, {most} places");
+        checks.push(Check::new(format!("{of}: force between them [N]"), carried, weight, 5e-3));
+        checks.extend(watch.checks(&of));
+    }
+    Ok(checks)
+}
+
+/// A block on another stays while its centre is over it: few places are as wide as all nodes on both sides.
+fn overhang() -> Result<Vec<Check>, Failure> {
+    const STIFF: Stuff = Stuff { young: 2e6, poisson: 0.3, density: 1000.0, beta: 3e-4 };
+    let size = [0.1, 0.05, 0.05];
+    let block = STIFF.body(box_mesh(size, [16, 8, 8])?, Order::Linear, 40)?;
+    let falls = |most: usize, share: f64| -> Result<bool, Failure> {
+        let lower = at(&block, DVec3::Y * (0.5 * size[1]), DVec3::ZERO);
+        let upper = at(&block, DVec3::new(0.5 * size[0] * share, 1.5 * size[1], 0.0), DVec3::ZERO);
+        let model = scene(most, 1e-3, 0.9, vec![lower, upper])?;
+        let mut state = State::new(&model);
+        for _ in 0..1000 {
+            step(&model, &mut state, &Input::default());
+        }
+        Ok(state.output().objects[1].pose.position.y < 1.2 * size[1])
+    };
+    let mut checks = Vec::new();
+    for most in [ALL, USUAL, 16] {
+        let name = if most == ALL { "all nodes".to_string() } else { format!("{most} places") };
+        for (share, expected) in [(0.95, 0.0), (1.05, 1.0)] {
+            let fallen = f64::from(u8::from(falls(most, share)?));
+            let quantity = format!("a block with its centre at {share} of the other's half falls, {name}");
+            checks.push(Check::new(quantity, fallen, expected, 0.0));
+        }
+    }
+    Ok(checks)
+}
+
 /// A block that leans stands until its centre is beyond the edge that it leans on: few places are as wide as all nodes.
 fn topple() -> Result<Vec<Check>, Failure> {
     /// Twice as high as wide, of something stiff: it tips beyond atan(1/2) = 26.6°.
@@ -113,7 +196,7 @@ fn topple() -> Result<Vec<Check>, Failure> {
         let mut object = at(&block, -(orientation * edge), DVec3::ZERO);
         object.start.pose = Pose { orientation, ..object.start.pose };
         object.start.twist = Twist::ZERO;
-        let model = scene(most, 1e-3, 0.9, object)?;
+        let model = scene(most, 1e-3, 0.9, vec![object])?;
         let mut state = State::new(&model);
         for _ in 0..1500 {
             step(&model, &mut state, &Input::default());

@@ -19,27 +19,14 @@ use glam::DVec3;
 /// one node to the next.
 const PUSHED: f64 = 0.3;
 
-/// After so many steps with less than this part of the places that are allowed, finer ones are tried.
-const FEW_PLACES: usize = 6;
-const FINER_AFTER: u64 = 50;
-
 /// What numbers of one level's features are below.
-const FEATURES: u64 = 1 << 40;
+pub(super) const FEATURES: u64 = 1 << 40;
 
 /// Steps of conservative advancement.
 const ADVANCES: usize = 30;
 
 /// A weight below this is none: the point is on the edge, or nearly.
-const ON_EDGE: f64 = 0.02;
-
-/// How coarsely an object meets an obstacle.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Level {
-    /// Which places stand for its surface: 0 for all nodes.
-    number: usize,
-    /// The step in which many of them were near the last time.
-    since: u64,
-}
+pub(super) const ON_EDGE: f64 = 0.02;
 
 /// An object and an obstacle over a step.
 struct Encounter<'a> {
@@ -85,7 +72,7 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         beside: if way > 0.5 * obstacle.shape.size() { way } else { 0.0 },
     };
     let most = scene.model.parameters.most_places;
-    let level = at * scene.model.parameters.obstacles.len() + number;
+    let level = at * scene.model.others() + number;
     let (first, left_out) = (scene.wanted.list.len(), scene.wanted.left_out);
     loop {
         encounter.level = scene.levels[level].number;
@@ -103,15 +90,10 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
             // Too many: fewer stand for them.
             scene.wanted.list.truncate(first);
             scene.wanted.left_out = left_out;
-            scene.levels[level] = Level { number: encounter.level + 1, since: scene.step };
+            scene.levels[level] = scene.levels[level].coarser(scene.step);
             continue;
         }
-        if found >= most / FEW_PLACES {
-            scene.levels[level].since = scene.step;
-        } else if encounter.level > 0 && scene.step - scene.levels[level].since >= FINER_AFTER {
-            // So few for so long that there is room for those that they stand for.
-            scene.levels[level] = Level { number: encounter.level - 1, since: scene.step };
-        }
+        scene.levels[level] = scene.levels[level].after(found, most, scene.step);
         break;
     }
     if obstacle.shape.has_corners() {
@@ -135,7 +117,7 @@ impl Encounter<'_> {
     /// The nodes, and for round obstacles the middles of triangles.
     fn nodes(&self, sight: &mut Sight, known: &[Contact], wanted: &mut WantedList, most: usize) {
         let reading = self.body.level(self.level);
-        let (_, triangles) = self.body.tree(reading);
+        let triangles = &self.body.surface(reading).triangles;
         let enough = core::cell::Cell::new(false);
         let dent = sight.most_dent();
         sight.begin_visit();
@@ -180,7 +162,7 @@ impl Encounter<'_> {
                         }
                     };
                     let free = sight.free_node(node);
-                    let place_of = Place { point: self.body.node_point(node), reading };
+                    let place_of = Place { point: self.body.node_point(reading, node), reading };
                     self.meet(wanted, place, free, place_of, self.feature(node));
                 }
                 if self.level == 0 {
@@ -295,7 +277,7 @@ impl Encounter<'_> {
                 let known = known.map(|at| self.own.points.of(contacts[at].slot).place.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(place));
                 let way = (free.body_from_world(self.after.world_from_body(place)) - point).length();
-                let approach = Approach { point, way, known, edge: self.body.edge };
+                let approach = Approach { point, way, facing: DVec3::ZERO, known, edge: self.body.edge };
                 if let Some((point, normal)) = meeting(search, sight, &approach) {
                     let of = Place { point, reading: Reading::Point };
                     self.want(wanted, feature as u64, of, start.orientation * normal, place);

@@ -22,6 +22,8 @@ pub(crate) struct Approach {
     pub(crate) point: DVec3,
     /// How far it and the surface go relative to each other in the step [m], the surface's deformation apart.
     pub(crate) way: f64,
+    /// The way that it faces itself [body], if it faces one: nothing that faces the same way comes against it.
+    pub(crate) facing: DVec3,
     /// The triangle that it was in contact with.
     pub(crate) known: Option<u32>,
     /// The mean edge [m] that its distances are measured by.
@@ -44,9 +46,9 @@ pub(crate) fn meeting(
     sight: &mut Sight,
     approach: &Approach,
 ) -> Option<(SurfacePoint, DVec3)> {
-    let Approach { point, way, known, edge } = *approach;
+    let Approach { point, way, facing, known, edge } = *approach;
     let (near, reach) = (MARGIN * edge, approach.reach());
-    search.closest(sight, point, reach, known);
+    search.closest(sight, (point, facing), reach, known);
     let nearest = search.found.first().copied()?;
     let inside = search.is_inside(point);
     let gap = if inside { -nearest.distance } else { nearest.distance };
@@ -60,5 +62,5 @@ pub(crate) fn meeting(
     let clear = !inside && nearest.distance > 1e-3 * edge && !on_face;
     let normal = if clear { (point - nearest.position) / nearest.distance } else { nearest.normal };
     let place = SurfacePoint { triangle: nearest.triangle, weights: nearest.weights };
-    (normal != DVec3::ZERO).then_some((place, normal))
+    (normal != DVec3::ZERO && normal.dot(facing) <= 0.0).then_some((place, normal))
 }

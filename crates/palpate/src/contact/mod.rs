@@ -3,6 +3,7 @@
 mod against;
 mod cone;
 mod held;
+mod level;
 mod meeting;
 mod pairs;
 mod parts;
@@ -14,8 +15,9 @@ mod solver;
 mod touch;
 mod wanted;
 
-pub(crate) use against::{Level, against};
+pub(crate) use against::against;
 pub(crate) use held::HeldSystem;
+pub(crate) use level::Level;
 pub(crate) use parts::{Lift, Parts};
 pub(crate) use points::{ContactPoint, ContactPoints};
 pub(crate) use search::{Search, Vicinity};

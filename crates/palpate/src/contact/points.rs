@@ -128,10 +128,10 @@ impl ContactPoints {
         let at = self.at[slot];
         self.drop_force(at);
         let placed = responding.place(slot, &place);
-        let rest = responding.body.recording.surface.rest_position(&place.point);
+        let rest = responding.body.rest_position(&place);
         let point = &mut self.points[at];
         (point.place, point.rest, point.placed, point.fresh) = (place, rest, placed, true);
-        let corners = responding.body.recording.surface.corners(&place.point);
+        let corners = responding.body.corners(&place);
         point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
         let Self { points, compliance, stride, .. } = self;
         responding.compliance((slot, &place), points, |other, block| {

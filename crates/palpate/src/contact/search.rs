@@ -25,6 +25,9 @@ const DESCENT: usize = 64;
 /// Places that are less than this [m] apart are one.
 const SAME: f64 = 1e-9;
 
+/// A distance that is larger by this is larger whatever was rounded.
+const ROUNDED: f64 = 1.0 + 1e-9;
+
 /// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
 pub(super) const ONE_FACE: f64 = 0.85;
 
@@ -111,20 +114,35 @@ impl Search {
     }
 
     /// Find the triangles that hold the nearest point of the surface, if it is within a reach [m] of a body point. One that
-    /// was nearest a moment ago saves looking far.
+    /// was nearest a moment ago saves looking far. What faces the way that the point itself faces does not count; a point
+    /// that faces no way meets all.
     ///
     /// # Real time
     /// Costs the triangles that come near to that.
-    pub(crate) fn closest(&mut self, sight: &mut Sight, p: DVec3, reach: f64, known: Option<u32>) {
+    pub(crate) fn closest(
+        &mut self,
+        sight: &mut Sight,
+        (p, facing): (DVec3, DVec3),
+        reach: f64,
+        known: Option<u32>,
+    ) {
         let found = &mut self.found;
         found.clear();
-        let first = known.map_or(f64::INFINITY, |triangle| sight.nearest_on(triangle, p).distance + SAME);
+        let meets = |one: &Found| one.normal.dot(facing) <= 0.0;
+        let first = known.map(|triangle| sight.nearest_on(triangle, p)).filter(meets);
+        let first = first.map_or(f64::INFINITY, |one| one.distance + SAME);
         let least = core::cell::Cell::new(reach.min(first));
         sight.walk(
             |_, _, centre, radius| (p - centre).length() - radius < least.get(),
             |sight, triangle, _| {
+                // Most are farther by the box around them.
+                let [a, b, c] = sight.corners(triangle);
+                let in_box = p.clamp(a.min(b).min(c), a.max(b).max(c));
+                if (p - in_box).length() > least.get() * ROUNDED {
+                    return;
+                }
                 let one = sight.nearest_on(triangle, p);
-                if one.distance < least.get() {
+                if one.distance < least.get() && meets(&one) {
                     least.set(least.get().min(one.distance + SAME));
                     found.retain(|other| other.distance < least.get());
                     if found.len() < MOST_FOUND {
@@ -319,9 +337,9 @@ mod tests {
                     .fold(f64::INFINITY, f64::min);
                 assert!(sight.may_reach(p, least * 1.001 + 1e-12), "case {case}");
                 let known = (other > 1).then_some(0);
-                search.closest(&mut sight, p, f64::INFINITY, known);
+                search.closest(&mut sight, (p, DVec3::ZERO), f64::INFINITY, known);
                 assert_eq!(search.found[0].distance, least, "case {case}");
-                search.closest(&mut sight, p, least, known);
+                search.closest(&mut sight, (p, DVec3::ZERO), least, known);
                 assert!(search.found.is_empty(), "case {case}");
             }
 

@@ -3,7 +3,9 @@
 
 use crate::contact::ContactPoints;
 use crate::response::{Acting, Body, NodalForces, Place, Reading, ResponseState};
-use crate::surface::{Centre, Moving, Visit, area_normal, at_weights, low_modes, nearest_on_triangle};
+use crate::surface::{
+    Centre, Moving, Surface, Visit, area_normal, at_weights, low_modes, nearest_on_triangle,
+};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -62,7 +64,7 @@ impl NodeCache {
             some_dents: false,
             moment: None,
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
-            tight: vec![(0.0, 0); body.tree(Reading::Point).0.spheres()],
+            tight: vec![(0.0, 0); body.tree(Reading::Point).spheres()],
             visits: vec![0; nodes],
             visit: 0,
         }
@@ -184,9 +186,18 @@ impl<'a> Sight<'a> {
         }
     }
 
+    fn dents_have_a_shape(&self) -> bool {
+        self.visit.slope.is_finite()
+    }
+
     /// How far any node can be from its place at rest [m].
     pub(crate) fn reach(&self) -> f64 {
         self.body.bounds(self.reading).reach(&self.visit)
+    }
+
+    /// The surface that the reading knows.
+    pub(crate) fn surface(&self) -> &'a Surface {
+        self.body.surface(self.reading)
     }
 
     fn rest(&self, node: usize) -> DVec3 {
@@ -234,7 +245,7 @@ impl<'a> Sight<'a> {
 
     /// How far the step without contact force moves the corners of a triangle by deformation, at most [m].
     pub(crate) fn deformation(&mut self, found: &Found) -> f64 {
-        let corners = self.body.recording.surface.triangles[found.triangle as usize];
+        let corners = self.surface().triangles[found.triangle as usize];
         let mut most = 0.0_f64;
         for node in corners {
             most = most.max((self.free_node(node as usize) - self.smooth(node as usize)).length());
@@ -301,7 +312,7 @@ impl<'a> Sight<'a> {
 
     /// Where the corners of a triangle are.
     pub(crate) fn corners(&mut self, triangle: u32) -> [DVec3; 3] {
-        let [a, b, c] = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        let [a, b, c] = self.surface().triangles[triangle as usize].map(|n| n as usize);
         [self.node(a), self.node(b), self.node(c)]
     }
 
@@ -324,7 +335,7 @@ impl<'a> Sight<'a> {
         self.walk(
             |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
             |sight, triangle, _| {
-                for node in sight.body.recording.surface.triangles[triangle as usize] {
+                for node in sight.surface().triangles[triangle as usize] {
                     let place = sight.smooth(node as usize).dot(direction) + beside;
                     farthest.set(farthest.get().max(place));
                 }
@@ -355,7 +366,7 @@ impl<'a> Sight<'a> {
     ) {
         let body = self.body;
         let visit = self.visit;
-        let (tree, _) = body.tree(self.reading);
+        let tree = body.tree(self.reading);
         tree.walk((body.bounds(self.reading), &visit), self, near, found);
     }
 }
@@ -370,18 +381,12 @@ impl Moving for Sight<'_> {
             return None;
         }
         let smooth = Sight::low(self, node);
-        Some(match self.reading {
-            Reading::Point => smooth,
-            Reading::Patch(_) => self.with_dents(node, smooth),
-        })
+        Some(if self.dents_have_a_shape() { self.with_dents(node, smooth) } else { smooth })
     }
 
     /// With dents where they have a shape, else they count for a sphere's radius.
     fn moved(&mut self, node: usize) -> DVec3 {
-        match self.reading {
-            Reading::Point => self.smooth(node),
-            Reading::Patch(_) => self.node(node),
-        }
+        if self.dents_have_a_shape() { self.node(node) } else { self.smooth(node) }
     }
 
     /// Patches are looked at by few: what their dents do is not kept.
@@ -394,7 +399,7 @@ impl Moving for Sight<'_> {
     }
 
     fn corners_of(&self, triangle: u32) -> [usize; 3] {
-        self.body.tree(self.reading).1[triangle as usize].map(|node| node as usize)
+        self.surface().triangles[triangle as usize].map(|node| node as usize)
     }
 
     fn tight(&self, sphere: usize) -> Option<f64> {

@@ -1,9 +1,8 @@
 //! Which contacts a step has: those that were found, matched with those of the last step.
 
-use super::against::Level;
 use super::search::{Search, Vicinity};
 use super::sight::NodeCache;
-use super::{Contact, Law, Other};
+use super::{Contact, Law, Level, Other};
 use crate::response::{Place, Responding};
 use crate::scene::Model;
 use crate::state::{ObjectState, StepStatus};
@@ -77,7 +76,7 @@ pub(crate) struct Finding<'a> {
     pub(crate) search: &'a mut Search,
     /// Of each device on each object.
     pub(crate) vicinities: &'a mut [Vicinity],
-    /// How coarsely each object meets each obstacle.
+    /// How coarsely each object meets each obstacle, and each other object.
     pub(crate) levels: &'a mut [Level],
     /// Room for nodes, and for modal coordinates.
     pub(crate) near: &'a mut Vec<u32>,

@@ -3,7 +3,9 @@
 use super::dot::{dot3, dot3_single};
 use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
-use crate::surface::{Bands, Bounds, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around};
+use crate::surface::{
+    Bands, Bounds, Surface, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around,
+};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -51,8 +53,8 @@ pub(crate) struct Acting {
     pub(crate) force: DVec3,
     /// Where at rest [m, body].
     pub(crate) rest: DVec3,
-    /// For patches Aᵀ·f [√J] of the patch field's equation.
-    pull: DVec3,
+    /// For patches Aᵀ·f [√J] of the patch field's equation, and where; between places that stand for others at each corner.
+    pulls: [(DVec3, DVec3); 3],
 }
 
 /// One object's body; immutable.
@@ -123,8 +125,11 @@ impl Body {
         self.around(a as usize).iter().copied().find(|&t| has(t))
     }
 
-    /// A node as a surface point, always the same.
-    pub(crate) fn node_point(&self, node: usize) -> SurfacePoint {
+    /// A node that a reading knows as a surface point, always the same.
+    pub(crate) fn node_point(&self, reading: Reading, node: usize) -> SurfacePoint {
+        if let Some(some) = self.patch(reading).and_then(|patch| patch.some.as_ref()) {
+            return some.node_point(node);
+        }
         let triangle = self.around(node)[0];
         let corners = self.recording.surface.triangles[triangle as usize];
         let weights = corners.map(|corner| if corner as usize == node { 1.0 } else { 0.0 });
@@ -164,18 +169,43 @@ impl Body {
         self.patches.len() - self.devices
     }
 
-    /// The tree over the places of a reading, and its triangles.
-    pub(crate) fn tree(&self, reading: Reading) -> (&SurfaceTree, &[[u32; 3]]) {
-        match self.patch(reading).and_then(|patch| patch.some.as_ref()) {
-            Some(some) => (&some.tree, &some.triangles),
-            None => (&self.tree, &self.recording.surface.triangles),
-        }
+    /// The coarsest of these that, with all before it, is a surface that other objects can meet.
+    pub(crate) fn coarsest_surface(&self) -> usize {
+        let is_surface = |patch: &&PatchField| patch.some.as_ref().is_some_and(|some| some.is_surface);
+        self.patches[self.devices..].iter().take_while(is_surface).count()
+    }
+
+    /// The surface that a reading knows: all of it, or a coarser one between places.
+    pub(crate) fn surface(&self, reading: Reading) -> &Surface {
+        self.patch(reading).map_or(&self.recording.surface, |patch| patch.surface(&self.recording))
+    }
+
+    /// The tree over it.
+    pub(crate) fn tree(&self, reading: Reading) -> &SurfaceTree {
+        let some = self.patch(reading).and_then(|patch| patch.some.as_ref());
+        some.map_or(&self.tree, |some| &some.tree)
+    }
+
+    /// The corners of a place's triangle with their weights.
+    pub(crate) fn corners(&self, place: &Place) -> [(usize, f64); 3] {
+        self.surface(place.reading).corners(&place.point)
+    }
+
+    /// The way that a place which stands for others faces at rest [body]; zero for nodes, which stand for themselves.
+    pub(crate) fn facing(&self, reading: Reading, node: usize) -> DVec3 {
+        let some = self.patch(reading).and_then(|patch| patch.some.as_ref());
+        some.map_or(DVec3::ZERO, |some| some.facing(node))
+    }
+
+    /// Where a place is at rest [m, body].
+    pub(crate) fn rest_position(&self, place: &Place) -> DVec3 {
+        self.surface(place.reading).rest_position(&place.point)
     }
 
     /// The nodes that a reading knows.
     pub(super) fn places(&self, reading: Reading) -> Vec<u32> {
         match self.patch(reading).and_then(|patch| patch.some.as_ref()) {
-            Some(some) => some.triangles.iter().map(|corners| corners[0]).collect(),
+            Some(some) => some.nodes().to_vec(),
             None => (0..self.recording.surface.positions.len() as u32).collect(),
         }
     }
@@ -225,9 +255,11 @@ impl Body {
         }
     }
 
-    /// What of a dent can change over a distance, as a share per metre.
+    /// What of a dent can change over a distance, as a share per metre; infinite where dents have no shape that is worth
+    /// looking at: between nodes, and between places that stand for others.
     pub(crate) fn dent_slope(&self, reading: Reading) -> f64 {
-        self.patch(reading).map_or(f64::INFINITY, PatchField::dent_slope)
+        let patch = self.patch(reading).filter(|patch| patch.some.is_none());
+        patch.map_or(f64::INFINITY, PatchField::dent_slope)
     }
 
     /// How far the surface can go, as a reading sees it.
@@ -262,10 +294,10 @@ impl Body {
     ///
     /// # Real time
     pub(crate) fn acting(&self, place: Place, force: DVec3) -> Acting {
-        let rest = self.recording.surface.rest_position(&place.point);
-        let root = self.patch(place.reading).map(|patch| patch.root_at(&self.recording, &place.point));
-        let pull = root.map_or(DVec3::ZERO, |root| root.transpose() * force);
-        Acting { place, force, rest, pull }
+        let rest = self.rest_position(&place);
+        let patch = self.patch(place.reading);
+        let pulls = patch.map(|patch| patch.pulls(&self.recording, &place.point, rest, force));
+        Acting { place, force, rest, pulls: pulls.unwrap_or_default() }
     }
 
     /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
@@ -274,14 +306,14 @@ impl Body {
     /// # Real time
     pub(crate) fn dent(&self, node: usize, acting: &Acting, flat: f64) -> DVec3 {
         match self.patch(acting.place.reading) {
-            Some(patch) => patch.dent(&self.recording, node, acting.rest, acting.pull, flat),
+            Some(patch) => patch.dent(&self.recording, node, &acting.pulls, flat),
             None => self.residual_of_node(node, &acting.place) * acting.force,
         }
     }
 
     /// The nodes that a force at a place acts on, with their weights; a node may come more than once.
     pub(super) fn spread(&self, place: &Place, mut give: impl FnMut(usize, f64)) {
-        for (corner, weight) in self.recording.surface.corners(&place.point) {
+        for (corner, weight) in self.corners(place) {
             match self.patch(place.reading) {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),

@@ -125,7 +125,7 @@ impl SampledModes {
         gravity: DVec3,
     ) -> Placed {
         let m = self.len();
-        let corners = body.recording.surface.corners(&place.point);
+        let corners = body.corners(place);
         // J·Φ: the weighted rows of the triangle's corners.
         let rows = &mut state.rows[3 * m * slot..3 * m * (slot + 1)];
         rows.fill(0.0);
@@ -154,13 +154,12 @@ impl SampledModes {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        let surface = &body.recording.surface;
         let known = self.known.iter().find(|known| known.reading == place.reading);
-        let own = surface.corners(&place.point);
+        let own = body.corners(place);
         let mut weighed = false;
         for (at, point) in points.iter().enumerate() {
             if let Some(known) = known.filter(|known| known.reading == point.place.reading) {
-                give(at, known.between(body, &own, &surface.corners(&point.place.point)));
+                give(at, known.between(body, &own, &body.corners(&point.place)));
                 continue;
             }
             if !weighed {

@@ -36,7 +36,8 @@ impl NodeCompliance {
         for (node, rows) in places.iter().zip(rows.chunks_exact_mut(width.max(1))) {
             body.add_rows(reading, *node as usize, 1.0, rows);
         }
-        let place = |number: usize| Place { point: body.node_point(places[number] as usize), reading };
+        let place =
+            |number: usize| Place { point: body.node_point(reading, places[number] as usize), reading };
         let of = |number: usize| &rows[number * width..(number + 1) * width];
         let mut weighted = vec![0.0; width];
         let mut blocks = Vec::with_capacity(nodes * (nodes + 1) / 2);
@@ -91,8 +92,9 @@ mod tests {
             let mut points = ContactPoints::new(4);
             let mut responding =
                 Responding { response, body: &body, state: &mut state, gravity: DVec3::ZERO };
+            let node = |node| body.node_point(Reading::Point, node);
             let between = SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] };
-            for point in [body.node_point(7), between, body.node_point(2), body.node_point(11)] {
+            for point in [node(7), between, node(2), node(11)] {
                 points.add(&mut responding, Place { point, reading: Reading::Point }).expect("room");
             }
             (0..16).map(|k| points.block(k / 4, k % 4)).collect::<Vec<_>>()

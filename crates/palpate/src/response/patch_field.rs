@@ -10,7 +10,9 @@
 //! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band};
+use crate::surface::{
+    Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band, coarser, facing,
+};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -39,8 +41,14 @@ pub(crate) struct PatchField {
 pub(crate) struct SomeNodes {
     /// Which of them every surface node is; [`NONE`] for the others.
     numbers: Vec<u32>,
-    /// Each as a triangle without extent, and the tree over these.
-    pub(crate) triangles: Vec<[u32; 3]>,
+    nodes: Vec<u32>,
+    /// Triangles between them; each as a triangle without extent where they make no surface.
+    pub(crate) surface: Surface,
+    pub(crate) is_surface: bool,
+    /// Outward directions at rest; zero where there is none.
+    facing: Vec<DVec3>,
+    /// One of its triangles for each.
+    triangle: Vec<u32>,
     pub(crate) tree: SurfaceTree,
 }
 
@@ -51,9 +59,35 @@ impl SomeNodes {
     pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
         let mut numbers = vec![NONE; surface.positions.len()];
         nodes.iter().enumerate().for_each(|(number, &node)| numbers[node as usize] = number as u32);
-        let triangles: Vec<[u32; 3]> = nodes.iter().map(|&node| [node; 3]).collect();
+        let between = coarser(surface, nodes);
+        let is_surface = between.is_some();
+        let triangles = between.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
+        let mut triangle = vec![0; nodes.len()];
+        for (t, corners) in triangles.iter().enumerate() {
+            corners.iter().for_each(|node| triangle[numbers[*node as usize] as usize] = t as u32);
+        }
+        let facing = facing(surface);
+        let facing = nodes.iter().map(|&node| facing[node as usize]).collect();
         let tree = SurfaceTree::new(&surface.positions, &triangles);
-        Self { numbers, triangles, tree }
+        let surface = Surface { triangles, ..surface.clone() };
+        Self { numbers, nodes: nodes.to_vec(), surface, is_surface, facing, triangle, tree }
+    }
+
+    /// Their nodes.
+    pub(super) fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    pub(super) fn facing(&self, node: usize) -> DVec3 {
+        self.facing[self.numbers[node] as usize]
+    }
+
+    /// A node as a point of the surface between them.
+    pub(super) fn node_point(&self, node: usize) -> SurfacePoint {
+        let triangle = self.triangle[self.numbers[node] as usize];
+        let corners = self.surface.triangles[triangle as usize];
+        let first = corners.iter().position(|corner| *corner as usize == node);
+        SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
     }
 }
 
@@ -74,7 +108,7 @@ impl PatchField {
         let some = SomeNodes::new(&recording.surface, nodes);
         let field = Self { some: Some(some), ..Self::without_bounds(recording, nodes, radius) };
         let some = field.some.as_ref();
-        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.triangles));
+        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.surface.triangles));
         Self { bounds: bounds.unwrap_or_default(), ..field }
     }
 
@@ -145,32 +179,60 @@ impl PatchField {
         self.some.as_ref().map_or(node, |some| some.numbers[node] as usize)
     }
 
+    /// The surface between the nodes that have a patch.
+    ///
+    /// # Real time
+    pub(crate) fn surface<'a>(&'a self, recording: &'a Recording) -> &'a Surface {
+        self.some.as_ref().map_or(&recording.surface, |some| &some.surface)
+    }
+
     /// A at a surface point.
     ///
     /// # Real time
     pub(crate) fn root_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
-        let corners = recording.surface.corners(point);
+        let corners = self.surface(recording).corners(point);
         let used = corners.iter().filter(|corner| corner.1 != 0.0);
         used.map(|&(node, w)| self.roots[self.number(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// K·f [m] at the patch about a node, for pull = Aᵀ·f at a place with this rest position, around which it is flat.
+    /// K·f [m] at the patch about a node, for pulls Aᵀ·f with their places at rest, around which it is flat.
     ///
     /// # Real time
     pub(crate) fn dent(
         &self,
         recording: &Recording,
         node: usize,
-        rest: DVec3,
-        pull: DVec3,
+        pulls: &[(DVec3, DVec3); 3],
         flat: f64,
     ) -> DVec3 {
-        let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
-        if distance < self.range {
-            self.roots[self.number(node)] * pull * NearField::taper(distance / self.range)
-        } else {
-            DVec3::ZERO
+        let mut sum = DVec3::ZERO;
+        for &(rest, pull) in pulls.iter().filter(|(_, pull)| *pull != DVec3::ZERO) {
+            let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
+            if distance < self.range {
+                sum += self.roots[self.number(node)] * pull * NearField::taper(distance / self.range);
+            }
         }
+        sum
+    }
+
+    /// Aᵀ·f for a force at a point with this rest position, and where: of a surface between some nodes at its corners.
+    ///
+    /// # Real time
+    pub(super) fn pulls(
+        &self,
+        recording: &Recording,
+        point: &SurfacePoint,
+        rest: DVec3,
+        force: DVec3,
+    ) -> [(DVec3, DVec3); 3] {
+        if let Some(some) = &self.some {
+            return some.surface.corners(point).map(|(node, weight)| {
+                let pull = self.roots[self.number(node)].transpose() * (force * weight);
+                (some.surface.positions[node], pull)
+            });
+        }
+        let none = (rest, DVec3::ZERO);
+        [(rest, self.root_at(recording, point).transpose() * force), none, none]
     }
 
     /// Steepest slope of ψ [1/m].
@@ -179,10 +241,30 @@ impl PatchField {
         2.11 / self.range
     }
 
-    /// K [m/N] between two places.
+    /// K [m/N] between the patches about two nodes.
+    fn between_nodes(&self, surface: &Surface, a: usize, b: usize) -> DMat3 {
+        let distance = (surface.positions[a] - surface.positions[b]).length();
+        if distance >= self.range {
+            return DMat3::ZERO;
+        }
+        let root = |node| self.roots[self.number(node)];
+        root(a) * root(b).transpose() * NearField::taper(distance / self.range)
+    }
+
+    /// K [m/N] between two places. Between some nodes a place is its corners, as far as the modes go as well.
     ///
     /// # Real time
     pub(crate) fn residual(&self, recording: &Recording, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
+        if let Some(SomeNodes { surface, .. }) = &self.some {
+            let used = |point| surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
+            let mut sum = DMat3::ZERO;
+            for (i, wi) in used(a) {
+                for (j, wj) in used(b) {
+                    sum += self.between_nodes(surface, i, j) * (wi * wj);
+                }
+            }
+            return sum;
+        }
         let distance = (recording.surface.rest_position(a) - recording.surface.rest_position(b)).length();
         if distance >= self.range {
             return DMat3::ZERO;

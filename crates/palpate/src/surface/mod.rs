@@ -4,14 +4,16 @@
 //! Σ w·u over its corners; a force at the point enters the corners with the same weights, so
 //! that work is the same on both sides and reciprocity holds.
 
+mod coarser;
 mod face;
 mod patch;
 mod thin;
 mod tree;
 mod triangle;
 
+pub(crate) use coarser::coarser;
 pub(crate) use patch::{PatchWeights, triangles_around};
-pub(crate) use thin::thinned;
+pub(crate) use thin::{facing, thinned};
 pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, band, low_modes};
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 

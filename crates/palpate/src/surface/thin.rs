@@ -10,14 +10,20 @@ use glam::DVec3;
 const CORNER: f64 = 0.65;
 const EDGE: f64 = 0.85;
 
+/// The mean of the directions of the triangles around every node; zero where they have none together.
+pub(crate) fn facing(surface: &Surface) -> Vec<DVec3> {
+    let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
+    let sum = |own: &Vec<u32>| own.iter().map(unit).sum::<DVec3>().normalize_or_zero();
+    triangles_around(surface).iter().map(sum).collect()
+}
+
 /// Nodes that are at least so far apart [m], and no node is farther from one of them: corners first, then edges, so that
 /// what stands on them stands as the whole surface does. The two sides of a thin part have nodes of their own;
 /// a side that has no direction counts for both.
 pub(crate) fn thinned(surface: &Surface, apart: f64) -> Vec<u32> {
     let around = triangles_around(surface);
     let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
-    let normals: Vec<DVec3> = around.iter().map(|own| own.iter().map(unit).sum::<DVec3>()).collect();
-    let normals: Vec<DVec3> = normals.into_iter().map(DVec3::normalize_or_zero).collect();
+    let normals = facing(surface);
     let rank = |node: &u32| {
         let (own, normal) = (&around[*node as usize], normals[*node as usize]);
         let least = own.iter().map(|t| unit(t).dot(normal)).fold(1.0, f64::min);

@@ -47,7 +47,10 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         (0.0, 1, PLACES, "lies on a floor, 48 places"),
         (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
         (0.05, 1, PLACES, "falls on a floor from 5 cm, contact steps, 48 places"),
+        (0.0, 2, ALL, "one on another on a floor"),
+        (0.0, 2, PLACES, "one on another on a floor, 48 places"),
         (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
+        (0.001, 2, PLACES, "one on another, falls on a floor, contact steps, 48 places"),
     ];
     // What is to lie still has to lose its energy.
     let calm = Arc::new(damped(&cube));
