@@ -150,12 +150,14 @@ export const liveCases = [
         [1700, 800],
       ]) {
         await page.setViewportSize({ width, height });
+        await page.waitForFunction(
+          ([w, h]) => {
+            const { canvas } = window.palpate.stage;
+            return innerWidth === w && innerHeight === h && canvas.width === canvas.clientWidth && canvas.height === canvas.clientHeight;
+          },
+          [width, height],
+        );
         await page.waitForTimeout(400);
-        const sizes = await page.evaluate(() => {
-          const { canvas } = window.palpate.stage;
-          return [canvas.width, canvas.clientWidth, canvas.height, canvas.clientHeight];
-        });
-        assert(sizes[0] === sizes[1] && sizes[2] === sizes[3], `canvas ${sizes}`);
         const lying = await overlaps(page, PARTS.slice(0, 4));
         assert(lying.length === 0, `${width}×${height}: ${lying.join("; ")}`);
         await shot(page, `window-${width}`);
@@ -218,12 +220,12 @@ export const liveCases = [
       await loaded(page);
       await page.evaluate(() => {
         const data = new DataTransfer();
-        data.items.add(new File(["solid x"], "liver.stl"));
+        data.items.add(new File(["solid x"], "liver.msh"));
         window.dispatchEvent(new DragEvent("dragover", { dataTransfer: data }));
       });
       await page.evaluate(() => {
         const data = new DataTransfer();
-        data.items.add(new File(["solid x"], "liver.stl"));
+        data.items.add(new File(["solid x"], "liver.msh"));
         window.dispatchEvent(new DragEvent("drop", { dataTransfer: data }));
       });
       await page.waitForSelector("dialog.drop[open]");
