@@ -176,7 +176,8 @@ export class Live implements Kind {
 
   pictureCame(picture: Picture): void {
     const world = this.stage.worlds[0];
-    if (world === undefined || picture.generation !== world.info.generation) return;
+    // A server that began anew counts its generations from the beginning: the number alone does not tell.
+    if (world === undefined || world.info !== this.wanted || picture.generation !== world.info.generation) return;
     this.plots.take(picture);
     this.picture = picture;
     this.fresh = true;

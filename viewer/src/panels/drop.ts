@@ -16,7 +16,7 @@ const SCALES: readonly [string, number][] = [
 export class MeshDrop {
   readonly section: HTMLElement;
   readonly dialog = element("dialog", { class: "drop", attributes: { "aria-labelledby": "drop-title" } });
-  private readonly veil = element("div", { class: "veil", text: "Drop a mesh here to touch it (.msh, .vtk, .obj, .stl)" });
+  private readonly veil = element("div", { class: "veil", text: "Drop a mesh of tetrahedra here to touch it (.msh, .vtk)" });
   private readonly scale = element("select");
   private readonly modes = element("input", { type: "number", attributes: { min: "1", max: "2000", value: "200" } });
   private readonly fields = new MaterialFields();
@@ -33,7 +33,7 @@ export class MeshDrop {
     this.section = section(
       "Your own object",
       false,
-      element("p", { class: "quiet", text: "Drop a mesh file onto the page, or choose one: .msh or .vtk with tetrahedra, .obj or .stl with a closed surface." }),
+      element("p", { class: "quiet", text: "Drop a mesh of tetrahedra onto the page, or choose one: .msh of Gmsh, or .vtk. Surfaces alone (.obj, .stl) have no inside yet; Gmsh or fTetWild fill them." }),
       button,
       input,
     );

@@ -98,7 +98,7 @@ export class Plot {
       {
         width: this.canvas.clientWidth,
         height: this.height,
-        padding: [10, 8, 0, 0],
+        padding: [10, 18, 0, 0],
         cursor: { y: false, drag: { x: false, y: false }, points: { size: 5 } },
         legend: { show: false },
         scales: {

@@ -244,7 +244,7 @@ export class Ground {
     const reach = 2.2 * this.radius;
     const shear = this.across.clone().cross(this.normal).multiplyScalar(-SHEAR_ASIDE).addScaledVector(this.across, -SHEAR_BACK);
     setPlane(new Vector4(this.normal.x, this.normal.y, this.normal.z, offset), shear, reach);
-    this.shadow.draw(renderer, casters, middle, this.normal, this.across, 2 * this.radius, 12 * this.radius);
+    this.shadow.draw(renderer, casters, middle, this.normal, this.across, 3.2 * this.radius, 12 * this.radius);
   }
 
   dispose(): void {

@@ -49,7 +49,7 @@ export function drawLabels(
   const taken: Rectangle[] = [...keepOut];
   for (const label of labels) {
     const at = (label.at.clone() as Vector3).project(camera);
-    if (Math.abs(at.z) > 1) continue;
+    if (Math.max(Math.abs(at.x), Math.abs(at.y), Math.abs(at.z)) > 1) continue;
     const width = pen.measureText(label.text).width;
     const x = Math.min(view.x + view.width - width - 6, Math.max(view.x + 6, view.x + (0.5 + 0.5 * at.x) * view.width + 9));
     let y = Math.min(view.y + view.height - 12, Math.max(view.y + 12, view.y + (0.5 - 0.5 * at.y) * view.height - 9));

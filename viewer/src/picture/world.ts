@@ -148,7 +148,9 @@ export class World {
     for (const object of this.objects) object.reconstruct(renderer);
     if (!this.shadowsStale) return;
     this.shadowsStale = false;
-    const around = this.middleOfObjects();
+    // Obstacles stay where the view is; objects may have gone.
+    const objects = this.middleOfObjects();
+    const around = objects.distanceTo(this.center) < 1.6 * this.radius ? this.center : objects;
     const setPlane = (plane: Vector4, shear: Vector3, reach: number) => {
       const materials = [...this.objects, ...this.obstacles.values(), ...this.fingers].map((x) => x.shadowMaterial);
       for (const material of materials) {
