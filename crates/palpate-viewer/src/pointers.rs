@@ -140,7 +140,11 @@ mod tests {
             pointers.go((1, 7), DVec3::X * 0.1 * frame);
             pointers.advance(1e-3, t);
             let motion = forces[0].newest();
-            forces[0].answer(Effort { sequence: motion.sequence, answers: motion.sequence, ..Effort::default() });
+            forces[0].answer(Effort {
+                sequence: motion.sequence,
+                answers: motion.sequence,
+                ..Effort::default()
+            });
             assert_eq!((motion.mode, motion.sequence), (Some(DeviceMode::Touch), u64::from(tick)));
             let now = (motion.position - last).length() / 1e-3;
             jerk = jerk.max((now - speed).abs());

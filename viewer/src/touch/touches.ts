@@ -146,7 +146,8 @@ export class Touches {
     const { orbit } = this.stage;
     const ray = orbit.ray(touch.x, touch.y);
     const along = touch.planeDistance / Math.max(0.2, ray.direction.dot(orbit.looksAlong));
-    const share = Math.min(1, (now - touch.begun) / (1000 * PRESS_SECONDS));
+    // A frame may carry a time before the press that it comes after.
+    const share = Math.min(1, Math.max(0, (now - touch.begun) / (1000 * PRESS_SECONDS)));
     const eased = share * share * (3 - 2 * share);
     return ray.at(along - touch.outside + eased * (touch.outside + touch.depth), new Vector3());
   }
