@@ -283,11 +283,16 @@ impl Running<'_> {
         let mut unsolved = 0;
         let period = clock.deadline(1) - clock.deadline(0);
         let mut tick = clock.next_after(0);
-        let mut picture_at = tick;
+        let (mut picture_at, mut pictured_step) = (tick, 0);
         let begun_all = clock.deadline(tick);
         while most.is_none_or(|most| process.steps() < most) && !stop.load(Ordering::Relaxed) {
             let late = clock.wait(tick);
             if !playback.goes(tick) {
+                // A run that pauses shows where.
+                if playback.is_paused() && picture_every > 0 && pictured_step < process.steps() {
+                    pictured_step = process.steps();
+                    showing.show(process.steps(), process.input(), process.state());
+                }
                 tick = clock.next_after(tick);
                 continue;
             }
@@ -296,7 +301,7 @@ impl Running<'_> {
             unsolved += u64::from(output.status.unsolved_objects > 0 || output.status.dropped_contacts > 0);
             let pictured = picture_every > 0 && (tick >= picture_at || playback.is_paused());
             if pictured {
-                picture_at = tick + picture_every;
+                (picture_at, pictured_step) = (tick + picture_every, process.steps());
                 showing.show(process.steps(), process.input(), process.state());
             }
             let took = begun.elapsed();

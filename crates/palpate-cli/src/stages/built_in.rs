@@ -126,7 +126,7 @@ normal = [0.0, 1.0, 0.0]
     BuiltIn {
         id: "ball",
         title: "A soft ball among obstacles",
-        about: "A ball rolls down a ramp between a post and a rail. Catch it, press it through, send it back.",
+        about: "A ball rolls down a ramp into a tray with a post and a rail. Catch it, press it through, send it back.",
         text: r#"
 gravity = [0.0, -9.81, 0.0]
 [[object]]
@@ -151,6 +151,22 @@ name = "rail"
 capsule = { radius = 0.012, half_length = 0.12 }
 position = [0.22, 0.02, 0.0]
 orientation = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
+[[obstacle]]
+name = "left"
+box = { half_extents = [0.006, 0.025, 0.17] }
+position = [-0.26, 0.025, 0.0]
+[[obstacle]]
+name = "right"
+box = { half_extents = [0.006, 0.025, 0.17] }
+position = [0.32, 0.025, 0.0]
+[[obstacle]]
+name = "front"
+box = { half_extents = [0.284, 0.025, 0.006] }
+position = [0.03, 0.025, 0.164]
+[[obstacle]]
+name = "back"
+box = { half_extents = [0.284, 0.025, 0.006] }
+position = [0.03, 0.025, -0.164]
 "#,
         paths: &[],
         beat_s: 0.0,

@@ -31,10 +31,10 @@ fn unknown_keys_are_errors_with_their_line() {
             "mode = \"held\"",
             "mode = \"held\"\nforce = 1",
             11,
-            "`name`, `mode`, `attach`, `path`, `linked`, `tip_radius`, `patch_radius`, `friction`, `coupling`, `simulated`, \
-             `driver`, `mount`",
+            "`name`, `mode`, `attach`, `path`, `linked`, `pointer`, `tip_radius`, `patch_radius`, `friction`, `coupling`, \
+             `simulated`, `driver`, `mount`",
         ),
-        ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "`file`"),
+        ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "expected `file` or `repeat`"),
     ] {
         let error = broken(&workplace, old, new);
         assert!(

@@ -10,4 +10,5 @@ mod glb;
 mod realtime;
 mod results;
 mod stores;
+mod viewer;
 mod workplace;

@@ -185,7 +185,7 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
         (
             "path = { file = \"left_finger.csv\" }\n",
             "",
-            "line 13: the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, or linked = true",
+            "line 13: the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, linked = true",
         ),
         (
             "simulated = {",

@@ -1,5 +1,6 @@
 //! `palpate bench`: step times with percentiles, and how they grow.
 
+mod pictures;
 mod touch;
 
 use crate::Failure;
@@ -17,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor
+/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor; and pictures
 ///
 /// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
 /// for another machine. Recording the largest cube takes about a minute the first time.

@@ -1,21 +1,22 @@
 //! Steps with contacts: fingers on meshes of different fineness, a cube on a floor.
 
-use super::{Case, timed_step};
+use super::{Case, pictures, timed_step};
 use crate::Failure;
 use glam::{DMat3, DVec3};
 use palpate::{
     DeviceInput, DeviceParameters, Input, ModalBasis, Model, ModelObject, ModelParameters, NearField,
     ObjectStart, Obstacle, Pose, Recording, ResidualCompliance, Shape, State, Surface, Twist,
 };
+use palpate_viewer::Form;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Fingers like these are on every haptic workbench.
-const FINGER: DeviceParameters =
+pub const FINGER: DeviceParameters =
     DeviceParameters { tip_radius: 0.005, patch_radius: 0.004, friction: 0.6, coupling: None };
 
 /// Half the side of the cubes [m].
-const HALF: f64 = 0.05;
+pub const HALF: f64 = 0.05;
 
 /// All nodes, or few places that stand for them.
 const ALL: usize = usize::MAX;
@@ -41,6 +42,10 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
             recording = Arc::new(refined(&recording));
         }
         fingers(recording.clone(), false);
+    }
+    for form in [Form::Modal, Form::Vertices] {
+        cases.push(pictures::case(recording.clone(), form, false));
+        cases.push(pictures::case(cube.clone(), form, true));
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),
