@@ -17,10 +17,13 @@ pub struct BuiltIn {
     /// The scene file; a recording that begins with `@` is one of [`recipe`]'s.
     pub text: &'static str,
     /// Paths that it names, over one beat.
-    pub paths: &'static [(&'static str, fn(f64) -> [f64; 3])],
+    pub paths: &'static [(&'static str, Path)],
     /// How long a beat is [s].
     pub beat_s: f64,
 }
+
+/// Where a hand is [m, world] at a time [s].
+type Path = fn(f64) -> [f64; 3];
 
 /// How far apart the rows of paths are [s].
 const PATH_EVERY_S: f64 = 0.002;
@@ -219,7 +222,7 @@ pub fn recipe(name: &str) -> Option<Recipe> {
 }
 
 /// A path of so many seconds as a file.
-pub fn path_text(at: fn(f64) -> [f64; 3], beat_s: f64) -> String {
+pub fn path_text(at: Path, beat_s: f64) -> String {
     let mut text = String::from("t,x,y,z\n");
     for row in 0..=(beat_s / PATH_EVERY_S).round() as u32 {
         let t = f64::from(row) * PATH_EVERY_S;

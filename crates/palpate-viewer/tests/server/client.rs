@@ -181,6 +181,11 @@ impl Cursor<'_> {
         u32::from_le_bytes(self.take())
     }
 
+    /// So many numbers of four bytes.
+    fn skip(&mut self, count: usize) {
+        self.0 = &self.0[4 * count..];
+    }
+
     fn f32(&mut self) -> f64 {
         f64::from(f32::from_le_bytes(self.take()))
     }
@@ -213,13 +218,12 @@ pub fn read_picture(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Picture {
     assert_eq!(&cursor.take(), b"PLPF");
     let (form, generation, step) = (cursor.u32(), cursor.u32(), cursor.u32());
     let time_s = f64::from_le_bytes(cursor.take());
-    (0..10).for_each(|_| drop(cursor.f32()));
+    cursor.skip(10);
     let counts: [u32; 4] = std::array::from_fn(|_| cursor.u32());
     assert_eq!(&counts[..3], [1, 1, 2]);
-    cursor.u32();
-    cursor.u32();
+    cursor.skip(2);
     let position = cursor.vector();
-    (0..4).for_each(|_| drop(cursor.f32()));
+    cursor.skip(4);
     let mut places = recording().surface.positions.clone();
     let count = cursor.u32() as usize;
     if form == 1 {
@@ -240,7 +244,7 @@ pub fn read_picture(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Picture {
     } else {
         places.iter_mut().take(count).for_each(|place| *place = cursor.vector());
     }
-    (0..7).for_each(|_| drop(cursor.f32()));
+    cursor.skip(7);
     let device = |cursor: &mut Cursor| {
         let (doing, position) = (cursor.u32(), cursor.vector());
         cursor.vector();
