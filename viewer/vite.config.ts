@@ -5,7 +5,7 @@ const server = process.env.PALPATE_SERVER ?? "http://127.0.0.1:8123";
 
 export default defineConfig({
   base: "./",
-  build: { target: "es2022", chunkSizeWarningLimit: 1000, assetsInlineLimit: 0, modulePreload: { polyfill: false } },
+  build: { target: "es2022", chunkSizeWarningLimit: 1000, assetsInlineLimit: 0, license: { fileName: "licences.md" }, modulePreload: { polyfill: false } },
   server: {
     proxy: {
       "/session": { target: server, ws: true, changeOrigin: true, headers: { origin: server } },

@@ -77,13 +77,19 @@ pub fn need_node() -> Result<(), String> {
 /// A browser that draws without a screen, for the viewer's tests and for rendering logs.
 pub fn need_chromium() -> Result<PathBuf, String> {
     let known = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-    let find = || known.into_iter().find(|name| runs(name, &["--version"]));
+    let find = || known.into_iter().filter(|name| runs(name, &["--version"])).find_map(place);
     if find().is_none() {
         install(&["chromium"]);
     }
-    find().map(PathBuf::from).ok_or_else(|| {
+    find().ok_or_else(|| {
         "Chromium is missing and could not be installed: install chromium, so that `chromium --version` works".into()
     })
+}
+
+/// Where a program of the path lies.
+fn place(program: &str) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file())
 }
 
 /// Install Debian packages where that is possible: apt, as root.

@@ -17,14 +17,17 @@ pub fn build() -> Result<(), String> {
     npm(&folder, &["run", "build", "--silent"], &[])
 }
 
-/// Its unit tests, and those in a real browser against a palpate.
+/// Its unit tests, and those in a real browser: against a stand-in for the server, which can also do what no server should, and
+/// against a palpate.
 pub fn test(palpate: &Path) -> Result<(), String> {
     let folder = root().join("viewer");
     machine::need_node()?;
     let chromium = machine::need_chromium()?;
     install(&folder)?;
     npm(&folder, &["test", "--silent"], &[])?;
-    npm(&folder, &["run", "test:browser", "--silent"], &[("PALPATE", palpate), ("CHROMIUM", &chromium)])
+    let browser = ["run", "test:browser", "--silent"];
+    npm(&folder, &browser, &[("CHROMIUM", &chromium)])?;
+    npm(&folder, &browser, &[("PALPATE", palpate), ("CHROMIUM", &chromium)])
 }
 
 /// The packages of `package-lock.json`, if they are not there.

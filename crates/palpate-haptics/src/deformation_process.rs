@@ -2,7 +2,7 @@
 
 use crate::moment::Moment;
 use glam::DVec3;
-use palpate::{Model, Pose};
+use palpate::{Model, PictureMemory, Pose};
 use std::sync::Arc;
 
 /// The surfaces of all objects at one moment.
@@ -31,6 +31,7 @@ pub struct DeformationProcess {
     frame: Frame,
     displacement: Vec<DVec3>,
     sums: Vec<DVec3>,
+    memories: Vec<PictureMemory>,
 }
 
 impl DeformationProcess {
@@ -44,20 +45,20 @@ impl DeformationProcess {
             normals: vec![[0.0; 3]; nodes],
         };
         let frame = Frame { time_s: 0.0, objects: nodes.into_iter().map(empty).collect() };
-        Self { model, frame, displacement: vec![DVec3::ZERO; most], sums: vec![DVec3::ZERO; most] }
+        let memories = vec![PictureMemory::default(); frame.objects.len()];
+        Self { model, frame, displacement: vec![DVec3::ZERO; most], sums: vec![DVec3::ZERO; most], memories }
     }
 
     /// Make the surfaces of a moment.
     pub fn cycle(&mut self, moment: &Moment) -> &Frame {
         let Moment { time_s, objects, .. } = moment;
         self.frame.time_s = *time_s;
-        for ((deformation, frame), recording) in
-            objects.iter().zip(&mut self.frame.objects).zip(self.model.recordings())
-        {
+        let drawn = objects.iter().zip(&mut self.frame.objects).zip(&mut self.memories);
+        for (((deformation, frame), memory), recording) in drawn.zip(self.model.recordings()) {
             let surface = &recording.surface;
             let nodes = surface.positions.len();
             let (places, sums) = (&mut self.displacement[..nodes], &mut self.sums[..nodes]);
-            deformation.surface_displacement(&self.model, places);
+            deformation.remembered_displacement(&self.model, memory, places);
             places.iter_mut().zip(&surface.positions).for_each(|(place, rest)| *place += *rest);
             sums.fill(DVec3::ZERO);
             for triangle in &surface.triangles {

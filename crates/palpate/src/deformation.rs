@@ -1,6 +1,6 @@
 //! What the picture of an object takes, so that it can be made beside the force (paper, section 3.2).
 
-use crate::response::Deformed;
+use crate::response::{Answers, Deformed};
 use crate::scene::{Model, SceneObject};
 use crate::spatial::Pose;
 use crate::state::State;
@@ -27,6 +27,11 @@ pub struct Deformation {
     pub(crate) pose: Pose,
     pub(crate) deformed: Deformed,
 }
+
+/// What was computed for the pictures of one object and will be needed again: what contact patches do to its surface.
+/// Pictures that share it cost less where the same places press.
+#[derive(Debug, Clone, Default)]
+pub struct PictureMemory(Answers);
 
 impl Deformation {
     /// The object's place in the model.
@@ -59,9 +64,9 @@ impl Deformation {
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.
-    pub fn dents(&self, model: &Model, out: &mut [DVec3]) {
+    pub fn dents(&self, model: &Model, memory: &mut PictureMemory, out: &mut [DVec3]) {
         let (object, gravity) = self.drawn(model, out);
-        self.deformed.dents(&object.response, &object.body, gravity, out);
+        self.deformed.dents((&object.response, &object.body), gravity, &mut memory.0, out);
     }
 
     /// Elastic displacement [m, body] of every surface node. Costs nodes × modes, with a table nodes × forces of the last T
@@ -70,8 +75,17 @@ impl Deformation {
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, out: &mut [DVec3]) {
+        self.remembered_displacement(model, &mut PictureMemory::default(), out);
+    }
+
+    /// The same with a memory that pictures of the object share.
+    ///
+    /// # Panics
+    /// When `out` does not have one entry per surface node.
+    pub fn remembered_displacement(&self, model: &Model, memory: &mut PictureMemory, out: &mut [DVec3]) {
         let (object, gravity) = self.drawn(model, out);
-        self.deformed.surface_displacement(&object.response, &object.body, gravity, out);
+        let drawn = (&object.response, &object.body);
+        self.deformed.surface_displacement(drawn, gravity, &mut memory.0, out);
     }
 
     /// The object, and gravity [m/s², body] as it is turned.

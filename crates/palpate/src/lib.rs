@@ -40,7 +40,7 @@ mod step;
 mod surface;
 
 pub use contact::{Against, Grasp};
-pub use deformation::Deformation;
+pub use deformation::{Deformation, PictureMemory};
 pub use energy::EnergyLedger;
 pub use error::Error;
 pub use motion::MotionRule;

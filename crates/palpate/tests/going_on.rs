@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
-    Recording, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart,
+    PictureMemory, Pose, Recording, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ fn a_surface_is_its_modes_and_its_dents() {
     let mut whole = vec![DVec3::ZERO; recording.surface.positions.len()];
     let mut dents = whole.clone();
     deformation.surface_displacement(&model, &mut whole);
-    deformation.dents(&model, &mut dents);
+    deformation.dents(&model, &mut PictureMemory::default(), &mut dents);
     let (q, mut deepest) = (deformation.modal_coordinates(), 0.0_f64);
     assert_eq!(q.len(), recording.modes.len());
     for (node, (u, dent)) in whole.iter().zip(&dents).enumerate() {
@@ -94,4 +94,36 @@ fn a_surface_is_its_modes_and_its_dents() {
         deepest = deepest.max(dent.length());
     }
     assert!(deepest > 1e-5, "the hand makes a dent: {deepest} m");
+}
+
+#[test]
+fn a_picture_with_a_memory_is_that_without() {
+    let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let parameters = ModelParameters { devices: vec![finger; 2], ..ModelParameters::default() };
+    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
+    let surface = &model.recordings().next().expect("an object").surface;
+    let edge = surface.positions.iter().map(|place| place.x).fold(0.0, f64::max);
+    let mut state = State::new(&model);
+    let mut memory = PictureMemory::default();
+    let mut deepest = 0.0_f64;
+    for number in 0..300 {
+        // They press, and wander over patches that are new and known.
+        let (press, along) =
+            (0.004 * (f64::from(number) / 100.0).min(1.0), 0.02 * (f64::from(number) / 40.0).sin());
+        let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (edge + 0.0105 - press), along, 0.01));
+        step(&model, &mut state, &Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() });
+        let mut with = vec![DVec3::ZERO; surface.positions.len()];
+        let mut without = with.clone();
+        let deformation = state.deformation(0);
+        deformation.remembered_displacement(&model, &mut memory, &mut with);
+        deformation.surface_displacement(&model, &mut without);
+        let size = without.iter().map(|u| u.length()).fold(0.0, f64::max);
+        let off = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+        assert!(off <= 1e-6 * size, "{number}: {off} of {size}");
+        deepest = deepest.max(size);
+    }
+    assert!(deepest > 1e-4, "they press: {deepest} m");
 }

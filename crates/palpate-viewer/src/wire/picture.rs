@@ -3,7 +3,7 @@
 use super::bytes::Bytes;
 use super::surface::mode_scales;
 use glam::DVec3;
-use palpate::{Against, ContactOutput, DeviceMode, Model};
+use palpate::{Against, ContactOutput, DeviceMode, Model, PictureMemory};
 use palpate_haptics::Moment;
 use std::sync::Arc;
 
@@ -33,6 +33,7 @@ pub struct PictureMaker {
     /// Of every object's modes.
     scales: Vec<Vec<f64>>,
     places: Vec<DVec3>,
+    memories: Vec<PictureMemory>,
     strongest: Vec<ContactOutput>,
 }
 
@@ -42,7 +43,8 @@ impl PictureMaker {
         let scales = model.recordings().map(|recording| mode_scales(&recording.modes)).collect();
         let most = model.recordings().map(|recording| recording.surface.positions.len()).max();
         let places = vec![DVec3::ZERO; most.unwrap_or(0)];
-        Self { model, generation, scales, places, strongest: Vec::new() }
+        let memories = vec![PictureMemory::default(); model.recordings().count()];
+        Self { model, generation, scales, places, memories, strongest: Vec::new() }
     }
 
     /// The picture of a moment. Modal: costs modes, and nodes near contacts; vertices: nodes × modes.
@@ -71,16 +73,17 @@ impl PictureMaker {
                 continue;
             };
             let places = &mut self.places[..surface.positions.len()];
+            let memory = &mut self.memories[at];
             match form {
                 Form::Modal => {
                     let q = object.modal_coordinates();
                     out.u32(q.len() as u32);
                     q.iter().zip(&self.scales[at]).for_each(|(q, scale)| out.f32(q * scale));
-                    object.dents(&self.model, places);
+                    object.dents(&self.model, memory, places);
                     write_dents(places, &mut out);
                 }
                 Form::Vertices => {
-                    object.surface_displacement(&self.model, places);
+                    object.remembered_displacement(&self.model, memory, places);
                     out.u32(places.len() as u32);
                     let moved = places.iter().zip(&surface.positions);
                     moved.for_each(|(u, rest)| out.vector(*rest + *u));

@@ -217,7 +217,7 @@ impl Body {
         self.patch(reading).map_or(node, |patch| patch.number(node))
     }
 
-    fn patch(&self, reading: Reading) -> Option<&PatchField> {
+    pub(super) fn patch(&self, reading: Reading) -> Option<&PatchField> {
         match reading {
             Reading::Point => None,
             Reading::Patch(at) => self.patches.get(at as usize),
@@ -325,7 +325,7 @@ impl Body {
     }
 
     /// Residual compliance from a place to the surface node itself [m/N].
-    fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
+    pub(super) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
         let mut sum = DMat3::ZERO;
         self.spread(place, |other, weight| sum += self.recording.residual.block(node, other) * weight);
         sum

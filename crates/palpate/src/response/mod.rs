@@ -1,6 +1,7 @@
 //! How a body answers forces, in one of two forms behind one small interface: modal with residual compliance,
 //! or the paper's recorded table.
 
+mod answers;
 mod body;
 mod dot;
 mod fir;
@@ -11,6 +12,7 @@ mod nodes;
 mod oscillator;
 mod patch_field;
 
+pub(crate) use answers::Answers;
 pub(crate) use body::{Acting, Body, Place, Placed, Reading};
 pub(crate) use dot::dot;
 pub(crate) use loads::NodalForces;
@@ -339,24 +341,32 @@ impl Deformed {
     }
 
     /// The part of the surface's displacement that is not the modes' [m, body].
-    pub(crate) fn dents(&self, response: &Response, body: &Body, gravity: DVec3, out: &mut [DVec3]) {
+    pub(crate) fn dents(
+        &self,
+        (response, body): (&Response, &Body),
+        gravity: DVec3,
+        answers: &mut Answers,
+        out: &mut [DVec3],
+    ) {
         match (response, self) {
-            (Response::Modal(modes), Self::Modal(deformed)) => modes.dents(body, deformed, gravity, out),
-            _ => self.surface_displacement(response, body, gravity, out),
+            (Response::Modal(modes), Self::Modal(deformed)) => {
+                modes.dents(body, deformed, gravity, answers, out)
+            }
+            _ => self.surface_displacement((response, body), gravity, answers, out),
         }
     }
 
     /// Displacement of every surface node [m, body].
     pub(crate) fn surface_displacement(
         &self,
-        response: &Response,
-        body: &Body,
+        (response, body): (&Response, &Body),
         gravity: DVec3,
+        answers: &mut Answers,
         out: &mut [DVec3],
     ) {
         match (response, self) {
             (Response::Modal(modes), Self::Modal(deformed)) => {
-                modes.surface_displacement(body, deformed, gravity, out);
+                modes.surface_displacement(body, deformed, gravity, answers, out);
             }
             (Response::Fir(fir), Self::Fir(history)) => history.surface_displacement(fir, gravity, out),
             _ => {}

@@ -3,6 +3,7 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
+use super::answers::Answers;
 use super::dot::{dot, dot3, dot9, dots};
 use super::loads::{NodalForces, add_dents};
 use super::nodes::NodeCompliance;
@@ -284,10 +285,11 @@ impl SampledModes {
         body: &Body,
         deformed: &ModalDeformation,
         gravity: DVec3,
+        answers: &mut Answers,
         out: &mut [DVec3],
     ) {
         let modes = &body.recording.modes;
-        self.dents(body, deformed, gravity, out);
+        self.dents(body, deformed, gravity, answers, out);
         for (node, u) in out.iter_mut().enumerate() {
             let row = |axis: usize| modes.row(node, axis);
             *u += DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
@@ -295,27 +297,36 @@ impl SampledModes {
     }
 
     /// The part of it that is not the modes', S·f with what the body's weight adds.
-    pub(crate) fn dents(&self, body: &Body, deformed: &ModalDeformation, gravity: DVec3, out: &mut [DVec3]) {
+    pub(crate) fn dents(
+        &self,
+        body: &Body,
+        deformed: &ModalDeformation,
+        gravity: DVec3,
+        answers: &mut Answers,
+        out: &mut [DVec3],
+    ) {
         let recording = &body.recording;
-        // All forces as forces on nodes: patches share theirs.
-        let mut loads = deformed.loaded.clone();
-        for Acting { place, force, .. } in &deformed.patches {
-            body.spread(place, |node, weight| loads.push((node as u32, *force * weight)));
-        }
-        loads.sort_unstable_by_key(|(node, _)| *node);
-        loads.dedup_by(|next, kept| {
-            let same = next.0 == kept.0;
-            if same {
-                kept.1 += next.1;
-            }
-            same
-        });
         match &recording.gravity {
             Some(response) => {
                 let sag = |node: usize| response.residual_displacement(node, gravity);
                 out.iter_mut().enumerate().for_each(|(node, u)| *u = sag(node));
             }
             None => out.fill(DVec3::ZERO),
+        }
+        let mut loads = deformed.loaded.clone();
+        if !answers.add(body, &deformed.patches, out) {
+            // All forces as forces on nodes: patches share theirs.
+            for Acting { place, force, .. } in &deformed.patches {
+                body.spread(place, |node, weight| loads.push((node as u32, *force * weight)));
+            }
+            loads.sort_unstable_by_key(|(node, _)| *node);
+            loads.dedup_by(|next, kept| {
+                let same = next.0 == kept.0;
+                if same {
+                    kept.1 += next.1;
+                }
+                same
+            });
         }
         add_dents(&recording.residual, &loads, out);
     }
