@@ -1,6 +1,6 @@
 //! The cost of direct convolution against what section 2.5 of the paper says of it.
 
-use super::{Chapter, Effort, csv, cube, table_in_memory};
+use super::{Chapter, Effort, Finding, csv, cube, table_in_memory};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
@@ -241,7 +241,38 @@ pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> 
         "observed_dofs,contact_dofs,samples,force_p50_us,force_p99_us,deformation_p50_us,table_bytes",
         rows,
     );
+    let finding = |what: &str, paper: &str, ours: String| Finding {
+        what: what.into(),
+        place: "section 2.5",
+        paper: paper.into(),
+        ours,
+        section: "cost",
+    };
+    let grows = |costs: &[Cost], x: fn(&Cost) -> usize, y: fn(&Cost) -> f64| {
+        format!("{:.2}", power(&of(costs, x, y)))
+    };
+    let findings = vec![
+        finding(
+            "cost of a force, as the observed degrees of freedom n grow",
+            "does not depend on n",
+            format!("n to the power {}", grows(&by_nodes, observed, force)),
+        ),
+        finding(
+            "cost of a force, as the window T grows",
+            "O(n_c²·T)",
+            format!("T to the power {}", grows(&by_samples, samples, force)),
+        ),
+        finding(
+            "cost of the deformation",
+            "O(n·n_c·T)",
+            format!(
+                "n to the power {}, n_c·T to the power {}",
+                grows(&by_nodes, observed, deformation),
+                grows(&by_samples, history, deformation)
+            ),
+        ),
+    ];
     let section =
         Section { id: "cost".into(), heading: "Cost (section 2.5 of the paper)".into(), body: html };
-    Ok(Chapter { section, data: vec![data] })
+    Ok(Chapter { section, data: vec![data], findings })
 }
