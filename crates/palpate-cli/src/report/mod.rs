@@ -71,7 +71,7 @@ tbody{border-bottom:2px solid var(--ink)}
 code,pre{font:.88rem/1.5 ui-monospace,'Cascadia Mono',Menlo,Consolas,'DejaVu Sans Mono',monospace}
 pre{background:var(--shade);padding:.8rem 1rem;border-radius:6px;overflow-x:auto;max-width:44rem}
 .listing th,.listing td,.listing thead tr>*{text-align:left;padding:.45rem 1.1rem .45rem .2rem}
-.listing td code{font-size:.8rem}
+.listing table{font-size:.9rem}.listing td code{font-size:.78rem;white-space:nowrap}
 .image{margin:0;color:var(--soft);font-size:.82rem;line-height:1.35}
 .image img{display:block;width:100%;height:auto;border-radius:4px;margin-bottom:.35rem}
 .gallery{display:grid;gap:.6rem 1rem;max-width:calc(15rem*var(--columns) + 1rem*(var(--columns) - 1));

@@ -9,7 +9,7 @@ pub struct Finding {
     pub what: String,
     /// Where the paper tells of it.
     pub place: &'static str,
-    /// What the paper says.
+    /// What the paper says; empty where it says nothing.
     pub paper: String,
     /// What was measured.
     pub ours: String,
@@ -20,7 +20,7 @@ pub struct Finding {
 impl Finding {
     /// The command that measures it again.
     fn command(&self) -> String {
-        format!("palpate reproduce --only {} -o DIR", self.section)
+        format!("palpate reproduce --only {}", self.section)
     }
 }
 
@@ -31,7 +31,10 @@ pub fn findings_table(findings: &[Finding]) -> String {
         .map(|finding| {
             [
                 finding.what.clone(),
-                format!("{} ({})", finding.paper, finding.place),
+                match finding.paper.as_str() {
+                    "" => "—".into(),
+                    paper => format!("{paper} ({})", finding.place),
+                },
                 finding.ours.clone(),
                 finding.command(),
             ]
@@ -64,7 +67,7 @@ mod tests {
             "<a href=\"#recording\">the whole table</a>",
             "67 h (section 3.1)",
             "2 s &lt; 67 h",
-            "<code>palpate reproduce --only recording -o DIR</code>",
+            "<code>palpate reproduce --only recording</code>",
         ] {
             assert!(html.contains(text), "{text} is not in {html}");
         }

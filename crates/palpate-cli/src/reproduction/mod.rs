@@ -21,7 +21,7 @@ use crate::report::Section;
 use crate::verbs::demo::paper_cube;
 use crate::verbs::write_whole;
 use clap::ValueEnum;
-use palpate::{ColumnsInMemory, ImpulseResponse, Sampling};
+use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
@@ -118,7 +118,7 @@ pub fn chapters(desk: &Desk, parts: &[Part], progress: &mut Bars) -> Result<Vec<
         (Part::Passivity, _) => Some(passivity::chapter(&body, progress)),
         (Part::Agreement, _) => Some(agreement::chapter(progress)),
         (Part::Cost, _) => Some(cost::chapter(effort, progress)),
-        (Part::Fall, Some(artist)) => Some(fall::chapter(&body, desk, artist, progress)),
+        (Part::Fall, Some(artist)) => Some(fall::chapter(desk, artist, progress)),
         (Part::Shake, Some(artist)) => Some(shake::chapter(desk, artist, progress)),
         (Part::Fall | Part::Shake, None) => None,
     };
@@ -127,7 +127,17 @@ pub fn chapters(desk: &Desk, parts: &[Part], progress: &mut Bars) -> Result<Vec<
 
 /// The paper's cube with so many cells along a side, without certificate.
 fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<Recorded, Failure> {
-    let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, modes) };
+    damped_cube(cells, modes, paper_cube(cells, modes).damping, progress)
+}
+
+/// The same with a damping of its own.
+fn damped_cube(
+    cells: u32,
+    modes: usize,
+    damping: Damping,
+    progress: &mut dyn Progress,
+) -> Result<Recorded, Failure> {
+    let parameters = RecordParameters { damping, extent: Extent::Uncertified, ..paper_cube(cells, modes) };
     Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
 }
 

@@ -13,9 +13,6 @@ use std::sync::atomic::AtomicBool;
 const WIDTH: u32 = 480;
 const HEIGHT: u32 = 360;
 
-/// More frames per second than any log has steps: every step is one.
-const EVERY_STEP_HZ: f64 = 1e9;
-
 /// What draws.
 pub struct Artist {
     browser: Result<PathBuf, Failure>,
@@ -69,15 +66,18 @@ impl Artist {
 fn pictures(series: &Series, browser: &Path) -> Result<Vec<Vec<u8>>, Failure> {
     let folder = series.folder;
     std::fs::create_dir_all(folder).map_err(|e| Failure::file("make the folder", folder, &e))?;
+    let mut steps: Vec<u64> = series.instants.iter().map(|(step, _)| *step).collect();
+    steps.dedup();
+    let frame = |(step, _): &(u64, String)| steps.iter().position(|known| known == step).map(|at| at as u64);
     let wish = RenderWish {
-        frames: series.instants.iter().map(|(step, _)| *step).collect(),
+        frames: series.instants.iter().filter_map(frame).collect(),
         width: WIDTH,
         height: HEIGHT,
         camera: Some(series.camera),
         colour: "displacement".into(),
         dark: false,
     };
-    let log = ShownLog::read(series.log, 0, EVERY_STEP_HZ)?;
+    let log = ShownLog::read_at(series.log, steps)?;
     let mut pictures = Vec::new();
     // An interrupt ends the whole, as it does beside this.
     draw(log, wish, browser, &AtomicBool::new(false), &mut |number, png| {

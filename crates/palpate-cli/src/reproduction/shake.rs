@@ -94,11 +94,8 @@ fn found(step_s: f64, ran: &Ran) -> Result<Vec<Finding>, Failure> {
     let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
     let hertz = 1.0 / step_s;
     let is_papers = step_s == STEPS_S[0];
-    let (cost, cycle) = if is_papers {
-        ("at most approximately 0.5 ms", "within every cycle of 2 ms")
-    } else {
-        ("not told", "not told")
-    };
+    let (cost, cycle) =
+        if is_papers { ("at most approximately 0.5 ms", "within every cycle of 2 ms") } else { ("", "") };
     Ok(vec![
         finding(
             &format!("computing the forces on two hands, {hertz:.0} Hz"),

@@ -19,7 +19,7 @@ const PICTURES: usize = 8;
 /// The devices leave before the run ends; what is shown ends so long before [s].
 const LEAVING_S: f64 = 1.5;
 
-const CAMERA: CameraView = CameraView { from: [0.12, 0.16, 0.36], to: [0.0, 0.0, 0.0] };
+const CAMERA: CameraView = CameraView { from: [0.09, 0.11, 0.33], to: [0.0, -0.008, 0.0] };
 
 /// What the chapter takes from here.
 pub struct Figure {
@@ -54,15 +54,13 @@ fn instants(moments: &[Moment], begin: usize) -> Vec<(u64, String)> {
         let from = &moments[begin..];
         let at = from.partition_point(|moment| moment.time_s < moments[begin].time_s + after_s - 1e-9);
         let moment = &from[at.min(from.len() - 1)];
-        let hands = match k {
-            0 => "through the middle, to the right",
-            k if 4 * k == PICTURES => "far right",
-            k if 2 * k == PICTURES => "back through the middle",
-            k if 4 * k == 3 * PICTURES => "far left",
-            _ => "",
+        let ms = 1e3 * (moment.time_s - moments[begin].time_s);
+        let place = match (1e3 * sway(moment)).round() {
+            0.0 => "in the middle".into(),
+            mm if mm < 0.0 => format!("{:.0} mm to the left", -mm),
+            mm => format!("{mm:.0} mm to the right"),
         };
-        let ms = (1e3 * (moment.time_s - moments[begin].time_s)).round();
-        (moment.step, format!("{ms} ms{}{hands}", if hands.is_empty() { "" } else { ": " }))
+        (moment.step, format!("{ms:.0} ms: {place}"))
     };
     (0..PICTURES).map(of).collect()
 }
@@ -80,7 +78,7 @@ pub fn figure(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Figur
         folder: &desk.output.join("figure5b"),
         camera: CAMERA,
         instants: &instants(&moments, begin),
-        caption: "Figure 5(b), one period of the shaking from the log of the run at 1 kHz, the camera at rest: colours tell how far the surface is from its \
+        caption: "Figure 5(b), one period of the shaking from the log of the run at 1 kHz, the camera at rest; below each where the hands are. Colours tell how far the surface is from its \
                   place in the undeformed cube, arrows are the forces of the hands.",
     });
     progress.finish();
@@ -119,7 +117,7 @@ pub fn figure(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Figur
         rows,
     );
     let found =
-        format!("force on a hand {most:.2} N at most while it is shaken; energy missing {missing:.0e}");
+        format!("force on a hand {most:.2} N at most while it is shaken; no energy missing to {missing:.0e}");
     Ok(Figure { html, found, data })
 }
 
@@ -197,6 +195,6 @@ mod tests {
         let instants = instants(&moments, begin);
         assert_eq!(instants.len(), PICTURES);
         assert!(instants.windows(2).all(|pair| matches!(pair[1].0 - pair[0].0, 62 | 63)), "{instants:?}");
-        assert_eq!(instants[2].1, "125 ms: far right");
+        assert_eq!(instants[2].1, "125 ms: 20 mm to the right");
     }
 }
