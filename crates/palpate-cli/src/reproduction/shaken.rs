@@ -79,7 +79,7 @@ pub fn figure(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Figur
         camera: CAMERA,
         instants: &instants(&moments, begin),
         caption: "Figure 5(b), one period of the shaking from the log of the run at 1 kHz, the camera at rest; below each where the hands are. Colours tell how far the surface is from its \
-                  place in the undeformed cube, arrows are the forces of the hands.",
+                  place in the undeformed cube, arrows are the forces on the hands.",
     });
     progress.finish();
     let last = moments[begin].time_s + 1.0 / SHAKES_HZ;
