@@ -4,6 +4,7 @@
 //! input is bad or a check failed; 2: the command line is wrong.
 
 mod dense;
+mod drawing;
 mod failure;
 mod log_shows;
 mod logged_run;

@@ -16,10 +16,34 @@ const MOST_FRAMES: u64 = 36_000;
 /// A log whose pictures are to be made.
 pub struct ShownLog {
     run: LoggedRun,
-    every: u64,
+    wanted: Wanted,
     maker: LogMaker,
     /// What the viewer is given.
     pub show: Arc<LogShow>,
+}
+
+/// The steps, counted from the start at 0, that become pictures.
+enum Wanted {
+    /// Every so many.
+    Every(u64),
+    /// These, in rising order.
+    At(Vec<u64>),
+}
+
+impl Wanted {
+    fn has(&self, step: u64) -> bool {
+        match self {
+            Self::Every(every) => step.is_multiple_of(*every),
+            Self::At(steps) => steps.binary_search(&step).is_ok(),
+        }
+    }
+
+    fn frames(&self, steps: u64, step_s: f64) -> Frames {
+        match self {
+            Self::Every(every) => Frames { count: steps / every + 1, apart_s: *every as f64 * step_s },
+            Self::At(chosen) => Frames { count: chosen.len() as u64, apart_s: step_s },
+        }
+    }
 }
 
 /// How pictures lie in time.
@@ -34,36 +58,50 @@ pub struct Frames {
 impl ShownLog {
     /// A log, as one of those that are shown together, with so many pictures per second of it: fewer where it is long.
     pub fn read(path: &Path, number: usize, per_s: f64) -> Result<Self, Failure> {
+        Self::of(path, number, |run| {
+            let step_s = run.scene.model.parameters().step_s;
+            let wanted = (1.0 / (per_s * step_s)).round().max(1.0) as u64;
+            Wanted::Every(wanted.max(run.steps.div_ceil(MOST_FRAMES)))
+        })
+    }
+
+    /// A log of which these steps become pictures, in rising order; 0 is the start.
+    pub fn read_at(path: &Path, steps: Vec<u64>) -> Result<Self, Failure> {
+        Self::of(path, 0, |_| Wanted::At(steps))
+    }
+
+    fn of(path: &Path, number: usize, wanted: impl FnOnce(&LoggedRun) -> Wanted) -> Result<Self, Failure> {
         let run = LoggedRun::read(path)?;
         let step_s = run.scene.model.parameters().step_s;
-        let wanted = (1.0 / (per_s * step_s)).round().max(1.0) as u64;
-        let every = wanted.max(run.steps.div_ceil(MOST_FRAMES));
+        let wanted = wanted(&run);
+        let frames = wanted.frames(run.steps, step_s);
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let about = format!("{:.1} s at {:.0} Hz", run.steps as f64 * step_s, 1.0 / step_s);
         let description = describe(&run.scene, (None, name.clone(), about), |_, _| false);
-        let (model, frames) = (run.scene.model.clone(), run.steps / every + 1);
-        let (show, maker) = LogShow::new(number, name, model, description, frames, every as f64 * step_s);
-        Ok(Self { run, every, maker, show })
+        let model = run.scene.model.clone();
+        let (show, maker) = LogShow::new(number, name, model, description, frames.count, frames.apart_s);
+        Ok(Self { run, wanted, maker, show })
     }
 
     /// Of what it will show.
     pub fn frames(&self) -> Frames {
-        let step_s = self.run.scene.model.parameters().step_s;
-        Frames { count: self.run.steps / self.every + 1, apart_s: self.every as f64 * step_s }
+        self.wanted.frames(self.run.steps, self.run.scene.model.parameters().step_s)
     }
 
     /// Compute it, until it is done or `stop` is set.
     pub fn make(self, stop: &AtomicBool) -> Result<(), Failure> {
-        let Self { run, every, mut maker, .. } = self;
+        let Self { run, wanted, mut maker, .. } = self;
         let model = &run.scene.model;
         let made = run.input_at_start().and_then(|start| {
             let mut state = State::new(model);
             let mut moment = Moment::new(model, &state, &start);
-            maker.take(&moment);
+            if wanted.has(0) {
+                maker.take(&moment);
+            }
             let mut number = 0;
             run.repeat(&mut state, run.steps, |input, state, _| {
                 number += 1;
-                if number % every == 0 {
+                if wanted.has(number) {
                     moment.take(number, input, state);
                     maker.take(&moment);
                 }

@@ -12,6 +12,9 @@ mod ticks;
 pub use marks::Mark;
 pub use ticks::Scale;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
 /// The whole page.
 #[derive(Clone, Debug)]
 pub struct Page {
@@ -67,6 +70,10 @@ tbody tr+tr{border-top:1px solid var(--grid)}
 tbody{border-bottom:2px solid var(--ink)}
 code,pre{font:.88rem/1.5 ui-monospace,'Cascadia Mono',Menlo,Consolas,'DejaVu Sans Mono',monospace}
 pre{background:var(--shade);padding:.8rem 1rem;border-radius:6px;overflow-x:auto;max-width:44rem}
+.listing th,.listing td,.listing thead tr>*{text-align:left;padding:.45rem 1.1rem .45rem .2rem}
+.listing table{font-size:.9rem}.listing td code{font-size:.78rem;white-space:nowrap}
+.image{margin:0;color:var(--soft);font-size:.82rem;line-height:1.35}
+.image img{display:block;width:100%;height:auto;border-radius:4px;margin-bottom:.35rem}
 .gallery{display:grid;gap:.6rem 1rem;max-width:calc(15rem*var(--columns) + 1rem*(var(--columns) - 1));
 grid-template-columns:repeat(auto-fill,minmax(max(9.5rem,100%/var(--columns) - 1rem),1fr))}
 @media print{html{font-size:10pt}body{max-width:none;padding:0}nav{display:none}a{color:inherit}
@@ -142,6 +149,33 @@ pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
+/// A table of texts to be read: the first column links to an anchor for each row, the last is to be typed.
+pub fn listing(caption: &str, head: [&str; 4], rows: &[[String; 4]], anchors: &[&str]) -> String {
+    let head = head.map(|cell| format!("<th scope=\"col\">{}</th>", escape(cell))).concat();
+    let mut body = String::new();
+    for (cells, anchor) in rows.iter().zip(anchors) {
+        let [what, paper, ours, command] = cells.each_ref().map(|cell| escape(cell));
+        body += &format!(
+            "<tr><th scope=\"row\"><a href=\"#{}\">{what}</a></th><td>{paper}</td><td>{ours}</td><td><code>{command}</code></td></tr>\n",
+            escape(anchor)
+        );
+    }
+    let caption = escape(caption);
+    format!(
+        "<div class=\"table listing\"><table>\n<caption>{caption}</caption>\n<thead><tr>{head}</tr></thead>\n\
+         <tbody>\n{body}</tbody>\n</table></div>\n"
+    )
+}
+
+/// A PNG within the page, over its caption; for a gallery.
+pub fn image(png: &[u8], caption: &str) -> String {
+    let caption = escape(caption);
+    format!(
+        "<div class=\"image\"><img alt=\"{caption}\" src=\"data:image/png;base64,{}\"/>{caption}</div>\n",
+        STANDARD.encode(png)
+    )
+}
+
 /// Html, such as a chart, over its caption.
 pub fn figure(html: &str, caption: &str) -> String {
     format!("<figure>\n{html}<figcaption>{}</figcaption>\n</figure>\n", escape(caption))
@@ -194,7 +228,13 @@ mod tests {
         let body = [
             paragraph("1 < 2"),
             table("Table 1. a & b", &["property", "<paper>"], &[vec!["\"x\"".into(), "<1".into()]]),
-            gallery(&["<svg></svg>\n".into()], "", "Figure 1."),
+            gallery(&["<svg></svg>\n".into(), image(b"\x89PNG", "0 s: \"let\" go")], "", "Figure 1."),
+            listing(
+                "a < b",
+                ["", "a", "b", "c"],
+                &[["what", "1", "<2", "palpate"].map(String::from)],
+                &["one"],
+            ),
             code("palpate reproduce -o <dir>"),
         ];
         let section = Section { id: "one".into(), heading: "One & two".into(), body: body.concat() };
@@ -213,7 +253,8 @@ mod tests {
 
     #[test]
     fn page_loads_nothing_and_runs_nothing() {
-        let html = page().html();
+        // Pictures are in the page itself.
+        let html = page().html().replace("src=\"data:image/png;base64,", "");
         assert!(
             ["http", "url(", "@import", "<script", "src=", "<link"].iter().all(|word| !html.contains(word))
         );

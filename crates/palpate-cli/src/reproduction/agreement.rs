@@ -84,7 +84,7 @@ pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
     );
     let section = Section { id: "agreement".into(), heading: "Two forms, two recordings".into(), body: html };
     let data = csv("convergence.csv", "step_ms,error", points.into_iter().map(|(h, e)| vec![h, e]));
-    Ok(Chapter { section, data: vec![data] })
+    Ok(Chapter { section, data: vec![data], findings: Vec::new() })
 }
 
 /// Largest difference of forces between both forms, as a share of the largest force.

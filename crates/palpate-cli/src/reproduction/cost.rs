@@ -1,6 +1,6 @@
 //! The cost of direct convolution against what section 2.5 of the paper says of it.
 
-use super::{Chapter, Effort, csv, cube, table_in_memory};
+use super::{Chapter, Effort, Finding, csv, cube, table_in_memory};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
@@ -241,7 +241,34 @@ pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> 
         "observed_dofs,contact_dofs,samples,force_p50_us,force_p99_us,deformation_p50_us,table_bytes",
         rows,
     );
+    let finding = |what: &str, paper: &str, ours: String| Finding {
+        what: what.into(),
+        place: "section 2.5",
+        paper: paper.into(),
+        ours,
+        section: "cost",
+    };
+    // Times and no powers: what else the machine does bends a curve, and the table has no room to tell.
+    let ends = |costs: &[Cost], name: &str, x: fn(&Cost) -> usize, y: fn(&Cost) -> f64| {
+        let at = |cost: &Cost| format!("{:.1} µs at {name} = {}", y(cost), x(cost));
+        let (first, last) = (costs.first().map(at), costs.last().map(at));
+        format!("{}, {}", first.unwrap_or_default(), last.unwrap_or_default())
+    };
+    let findings = vec![
+        finding(
+            "a force, as the observed degrees of freedom n grow",
+            "does not depend on n",
+            ends(&by_nodes, "n", observed, force),
+        ),
+        finding("a force, as the window T grows", "O(n_c²·T)", ends(&by_samples, "T", samples, force)),
+        finding("the deformation, as n grows", "O(n·n_c·T)", ends(&by_nodes, "n", observed, deformation)),
+        finding(
+            "the deformation, as the window T grows",
+            "O(n·n_c·T)",
+            ends(&by_samples, "T", samples, deformation),
+        ),
+    ];
     let section =
         Section { id: "cost".into(), heading: "Cost (section 2.5 of the paper)".into(), body: html };
-    Ok(Chapter { section, data: vec![data] })
+    Ok(Chapter { section, data: vec![data], findings })
 }

@@ -1,6 +1,6 @@
 //! Figures 2 and 3: an impulse by a point and by a plane on the top face, and how the wave arrives.
 
-use super::{Chapter, DataFile, csv};
+use super::{Chapter, DataFile, Finding, csv};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
@@ -186,7 +186,19 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
     data.push(csv("arrival.csv", "threshold_percent_of_peak,point_ms,plane_ms", rows));
     let section =
         Section { id: "impulses".into(), heading: "Impulse responses (Figures 2 and 3)".into(), body: html };
-    Ok(Chapter { section, data })
+    let findings = vec![Finding {
+        what: "a wave from the middle of the top has moved every node".into(),
+        place: "section 3.1, figures 2 and 3",
+        paper: "after approximately 16 ms".into(),
+        ours: format!(
+            "after {:.1} ms by 1 % of the peak, {:.1} ms by 0.1 %, {:.1} ms by 0.01 %",
+            at(&point, 1.0),
+            at(&point, 0.1),
+            at(&point, 0.01)
+        ),
+        section: "impulses",
+    }];
+    Ok(Chapter { section, data, findings })
 }
 
 /// The deformed surface at some moments, exaggerated, coloured by displacement.

@@ -2,22 +2,33 @@
 
 mod agreement;
 mod cost;
+mod fall;
+mod findings;
 mod impulses;
-mod live;
+mod logged;
 mod passivity;
+mod processes;
 mod recording;
+mod series;
+mod shake;
+mod shaken;
+
+pub use findings::{Finding, findings_table};
 
 use crate::Failure;
 use crate::progress::{Bars, WithoutRemarks};
 use crate::report::Section;
 use crate::verbs::demo::paper_cube;
-use palpate::{ColumnsInMemory, ImpulseResponse, Sampling};
+use crate::verbs::write_whole;
+use clap::ValueEnum;
+use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
 use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use series::Artist;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file of numbers beside the report.
 pub struct DataFile {
@@ -33,6 +44,27 @@ pub struct Chapter {
     pub section: Section,
     /// The numbers behind it.
     pub data: Vec<DataFile>,
+    /// Rows of the table at the top of the page.
+    pub findings: Vec<Finding>,
+}
+
+/// What can be made by itself; in the order of the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// Table 1.
+    Recording,
+    /// Figures 2 and 3, and the arrival of the wave.
+    Impulses,
+    /// Passivity of the samples.
+    Passivity,
+    /// Both forms of the response, both ways of recording.
+    Agreement,
+    /// Section 2.5.
+    Cost,
+    /// Figure 5(a).
+    Fall,
+    /// Figure 5(b).
+    Shake,
 }
 
 /// How thorough the measurements are.
@@ -46,22 +78,66 @@ pub struct Effort {
     pub steps: usize,
 }
 
-/// All chapters, in the order of the paper; `folder` is for what a live run needs.
-pub fn chapters(effort: Effort, folder: &Path, progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
+/// Where it is done.
+pub struct Desk<'a> {
+    /// Where everything is written.
+    pub output: &'a Path,
+    /// The browser that draws; by default the first known one.
+    pub browser: Option<&'a Path>,
+    /// How thoroughly.
+    pub effort: Effort,
+}
+
+impl Desk<'_> {
+    /// Scenes of the runs, with all that they need.
+    fn scenes(&self) -> PathBuf {
+        self.output.join("scenes")
+    }
+
+    /// Put the recording where the scenes are.
+    fn lay_out(&self, body: &Recorded) -> Result<(), Failure> {
+        let folder = self.scenes();
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::file("make the folder", &folder, &e))?;
+        write_whole(&folder.join("cube.palp"), &body.recording.to_bytes()?)
+    }
+}
+
+/// The chapters that are asked for, in the order of the paper.
+pub fn chapters(desk: &Desk, parts: &[Part], progress: &mut Bars) -> Result<Vec<Chapter>, Failure> {
+    let effort = desk.effort;
     let body = cube(effort.cells, 200, &mut WithoutRemarks(progress))?;
-    Ok(vec![
-        recording::chapter(&body, effort, progress)?,
-        impulses::chapter(&body, progress)?,
-        passivity::chapter(&body, progress)?,
-        agreement::chapter(progress)?,
-        cost::chapter(effort, progress)?,
-        live::chapter(&body, &folder.join("live"), progress)?,
-    ])
+    let artist = if parts.contains(&Part::Fall) || parts.contains(&Part::Shake) {
+        desk.lay_out(&body)?;
+        Some(Artist::new(desk.browser)?)
+    } else {
+        None
+    };
+    let chapter = |part: &Part| match (part, &artist) {
+        (Part::Recording, _) => Some(recording::chapter(&body, effort, progress)),
+        (Part::Impulses, _) => Some(impulses::chapter(&body, progress)),
+        (Part::Passivity, _) => Some(passivity::chapter(&body, progress)),
+        (Part::Agreement, _) => Some(agreement::chapter(progress)),
+        (Part::Cost, _) => Some(cost::chapter(effort, progress)),
+        (Part::Fall, Some(artist)) => Some(fall::chapter(desk, artist, progress)),
+        (Part::Shake, Some(artist)) => Some(shake::chapter(desk, artist, progress)),
+        (Part::Fall | Part::Shake, None) => None,
+    };
+    Part::value_variants().iter().filter(|part| parts.contains(part)).filter_map(chapter).collect()
 }
 
 /// The paper's cube with so many cells along a side, without certificate.
 fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<Recorded, Failure> {
-    let parameters = RecordParameters { extent: Extent::Uncertified, ..paper_cube(cells, modes) };
+    damped_cube(cells, modes, paper_cube(cells, modes).damping, progress)
+}
+
+/// The same with a damping of its own.
+fn damped_cube(
+    cells: u32,
+    modes: usize,
+    damping: Damping,
+    progress: &mut dyn Progress,
+) -> Result<Recorded, Failure> {
+    let parameters = RecordParameters { damping, extent: Extent::Uncertified, ..paper_cube(cells, modes) };
     Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
 }
 

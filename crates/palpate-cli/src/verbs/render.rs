@@ -1,21 +1,15 @@
 //! `palpate render`: pictures of a log, drawn by the viewer without a person.
 
 use crate::Failure;
+use crate::drawing::{draw, find_browser, runs};
 use crate::log_shows::{Frames, ShownLog};
 use crate::verbs::{print, print_json, write_whole};
 use crate::whole_file::stop_on_interrupt;
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_viewer::{CameraView, Exhibit, RenderJob, RenderWish, Server, Settings};
+use palpate_viewer::{CameraView, RenderWish};
 use serde_json::json;
-use std::io::IsTerminal;
-use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
-use tempfile::TempDir;
+use std::process::Command;
 
 /// Draw pictures of a log: PNG files, and an animation
 ///
@@ -82,12 +76,6 @@ enum Colour {
 /// Most pictures of one call.
 const MOST_PICTURES: u64 = 20_000;
 
-/// A browser that has drawn nothing for so long does not work.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-/// Between two looks at the browser.
-const LOOK: Duration = Duration::from_millis(100);
-
 /// Run the verb.
 pub fn render(arguments: &Arguments) -> Result<(), Failure> {
     let camera = arguments.camera.as_deref().map(read_camera).transpose()?;
@@ -102,29 +90,21 @@ pub fn render(arguments: &Arguments) -> Result<(), Failure> {
     std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
     let log = ShownLog::read(&arguments.log, 0, arguments.fps)?;
     let numbers = chosen(log.frames(), arguments.from, arguments.to)?;
-    let (show, frames, stop) = (log.show.clone(), log.frames(), stop_on_interrupt());
-    log.make(stop)?;
-    let (pictures, arrived) = channel();
+    let frames = log.frames();
     let wish = RenderWish {
-        frames: numbers.clone(),
+        frames: numbers,
         width: arguments.width,
         height: arguments.height,
         camera,
         colour: format!("{:?}", arguments.colour).to_lowercase(),
         dark: arguments.dark,
     };
-    let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
-    let server = Server::bind(&settings).map_err(Failure)?;
-    let address = format!("http://{}/", server.address().map_err(Failure)?);
-    let done = AtomicBool::new(false);
-    let size = (arguments.width, arguments.height);
-    let drawn = std::thread::scope(|scope| {
-        let serving = scope.spawn(|| server.run(Exhibit::Render(show, RenderJob { wish, pictures }), &done));
-        let browser = Browser::open(&browser, &address, size);
-        let drawn = browser.and_then(|mut browser| collect(&mut browser, &arrived, &numbers, output, stop));
-        done.store(true, Ordering::Release);
-        let served = serving.join().map_err(|_| Failure("the server has ended by a bug".into()));
-        drawn.and_then(|files| served?.map(|()| files).map_err(Failure))
+    let mut drawn = Vec::with_capacity(wish.frames.len());
+    draw(log, wish, &browser, stop_on_interrupt(), &mut |number, png| {
+        let path = output.join(format!("frame_{number:05}.png"));
+        write_whole(&path, &png)?;
+        drawn.push(path);
+        Ok(())
     })?;
     if let Some(gif) = &arguments.gif {
         super::animation::write_gif(&drawn, frames.apart_s, gif)?;
@@ -168,122 +148,6 @@ fn chosen(frames: Frames, from: f64, to: Option<f64>) -> Result<Vec<u64>, Failur
         )));
     }
     Ok(numbers)
-}
-
-fn runs(program: impl AsRef<Path>) -> bool {
-    let quiet = |option: &str| {
-        let mut command = Command::new(program.as_ref());
-        command.arg(option).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    };
-    quiet("--version") || quiet("-version")
-}
-
-fn find_browser(given: Option<&Path>) -> Result<PathBuf, Failure> {
-    let known = ["chromium", "chromium-browser", "google-chrome", "chrome"].map(PathBuf::from);
-    match given {
-        Some(given) if runs(given) => Ok(given.to_path_buf()),
-        Some(given) => Err(Failure(format!("the browser {} can't be started", given.display()))),
-        None => known.into_iter().find(|program| runs(program)).ok_or_else(|| {
-            Failure(
-                "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one with --browser"
-                    .into(),
-            )
-        }),
-    }
-}
-
-/// A browser without a window; it ends with this.
-struct Browser {
-    child: Child,
-    _profile: TempDir,
-}
-
-impl Browser {
-    fn open(program: &Path, address: &str, (width, height): (u32, u32)) -> Result<Self, Failure> {
-        let profile =
-            TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the browser: {e}")))?;
-        let mut command = Command::new(program);
-        // Drawn by software, the same bytes on every machine with the same browser.
-        command
-            .args(["--headless", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
-            .args(["--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run", "--disable-sync"])
-            .args(["--disable-background-networking", "--disable-component-update", "--disable-quic"])
-            .args(["--disable-background-timer-throttling", "--disable-renderer-backgrounding"])
-            // As root it has no sandbox; it shows nothing but our own page.
-            .arg("--no-sandbox")
-            .arg(format!("--user-data-dir={}", profile.path().display()))
-            .arg(format!("--window-size={width},{height}"))
-            .arg("--remote-debugging-port=0")
-            .arg(address)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        let child = command
-            .spawn()
-            .map_err(|e| Failure(format!("the browser {} can't be started: {e}", program.display())))?;
-        Ok(Self { child, _profile: profile })
-    }
-}
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// Write the pictures as they arrive; gives their files, in their order.
-fn collect(
-    browser: &mut Browser,
-    arrived: &Receiver<(u64, Vec<u8>)>,
-    numbers: &[u64],
-    folder: &Path,
-    stop: &AtomicBool,
-) -> Result<Vec<PathBuf>, Failure> {
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(numbers.len() as u64)
-    } else {
-        ProgressBar::hidden()
-    };
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} pictures, {eta} left") {
-        bar.set_style(style);
-    }
-    let mut files = Vec::with_capacity(numbers.len());
-    let mut last = Instant::now();
-    while files.len() < numbers.len() {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Failure(format!("interrupted: {} pictures are drawn", files.len())));
-        }
-        match arrived.recv_timeout(LOOK) {
-            Ok((number, png)) => {
-                if number != files.len() as u64 || !png.starts_with(b"\x89PNG") {
-                    return Err(Failure(format!("the browser sent no picture {}", files.len())));
-                }
-                let path = folder.join(format!("frame_{number:05}.png"));
-                write_whole(&path, &png)?;
-                files.push(path);
-                last = Instant::now();
-                bar.inc(1);
-            }
-            Err(RecvTimeoutError::Disconnected) => break,
-            Err(RecvTimeoutError::Timeout) => {
-                if let Ok(Some(status)) = browser.child.try_wait() {
-                    return Err(Failure(format!(
-                        "the browser has ended ({status}) before all pictures were drawn"
-                    )));
-                }
-                if last.elapsed() > PATIENCE {
-                    return Err(Failure(format!(
-                        "the browser has drawn nothing for {} s: it may lack WebGL 2; try another with --browser",
-                        PATIENCE.as_secs()
-                    )));
-                }
-            }
-        }
-    }
-    bar.finish_and_clear();
-    Ok(files)
 }
 
 fn write_mp4(folder: &Path, fps: f64, path: &Path) -> Result<(), Failure> {

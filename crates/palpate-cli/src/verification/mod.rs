@@ -24,6 +24,8 @@ mod spheres;
 mod stack;
 mod waves;
 
+pub use bounce::{FULL_REBOUND_M, full_fall};
+
 use crate::Failure;
 use palpate::{Damping, Material};
 use palpate_fem::assembly::Assembly;

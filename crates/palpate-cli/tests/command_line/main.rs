@@ -8,6 +8,7 @@ mod devices;
 mod exports;
 mod glb;
 mod realtime;
+mod reproduction;
 mod results;
 mod stores;
 mod viewer;
