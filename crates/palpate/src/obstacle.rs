@@ -283,7 +283,7 @@ impl Shape {
     }
 
     /// Radius [m] of a sphere about the origin that holds it.
-    pub(crate) fn radius(&self) -> f64 {
+    pub fn radius(&self) -> f64 {
         match self {
             Self::Plane { .. } => f64::INFINITY,
             Self::Sphere { radius } => *radius,

@@ -65,7 +65,7 @@ impl GlbScene {
         let mut obstacles = Vec::new();
         for (at, obstacle) in scene.model.parameters().obstacles.iter().enumerate() {
             let start = obstacle_pose(scene, input, at);
-            let surface = solid(&scene.obstacles[at], &obstacle.shape, start, extent);
+            let surface = solid(&obstacle.shape, start, extent);
             let two_sided = matches!(obstacle.shape, Shape::Plane { .. });
             obstacles.push(rigid(&mut glb, &scene.obstacles[at].name, &surface, (OBSTACLE, two_sided))?);
         }

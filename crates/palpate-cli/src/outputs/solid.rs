@@ -1,6 +1,6 @@
 //! Surfaces of what does not deform: planes, obstacles, tips of devices.
 
-use crate::scene_file::{Scene, SceneObstacle};
+use crate::scene_file::Scene;
 use glam::{DQuat, DVec3};
 use palpate::{Pose, Shape, State};
 use std::f64::consts::{PI, TAU};
@@ -37,20 +37,9 @@ impl Extent {
     pub fn of(scene: &Scene, state: &State) -> Self {
         let objects = scene.model.recordings().zip(&state.output().objects);
         let objects = objects.map(|(recording, o)| (o.pose.position, recording.surface.radius()));
-        let obstacles = scene.obstacles.iter().zip(&scene.model.parameters().obstacles);
-        let obstacles = obstacles.filter_map(|(placed, obstacle)| {
-            let radius = match &obstacle.shape {
-                Shape::Plane { .. } => return None,
-                Shape::Sphere { radius } => *radius,
-                Shape::Box { half_extents } => half_extents.length(),
-                Shape::Capsule { radius, half_length } => radius + half_length,
-                Shape::Mesh(_) => {
-                    let positions = placed.mesh.iter().flat_map(|mesh| &mesh.positions);
-                    positions.map(|p| p.length()).fold(0.0, f64::max)
-                }
-            };
-            Some((obstacle.pose.position, radius))
-        });
+        let obstacles = scene.model.parameters().obstacles.iter();
+        let obstacles = obstacles.map(|obstacle| (obstacle.pose.position, obstacle.shape.radius()));
+        let obstacles = obstacles.filter(|(_, radius)| radius.is_finite());
         let balls: Vec<(DVec3, f64)> = objects.chain(obstacles).collect();
         let (low, high) =
             balls.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (centre, radius)| {
@@ -63,7 +52,7 @@ impl Extent {
 }
 
 /// The surface of an obstacle, in its own frame; of a plane the part near the scene.
-pub fn solid(obstacle: &SceneObstacle, shape: &Shape, start: Pose, extent: Extent) -> Solid {
+pub fn solid(shape: &Shape, start: Pose, extent: Extent) -> Solid {
     match shape {
         Shape::Plane { normal } => {
             let centre = start.orientation.conjugate() * (extent.centre - start.position);
@@ -72,11 +61,14 @@ pub fn solid(obstacle: &SceneObstacle, shape: &Shape, start: Pose, extent: Exten
         Shape::Sphere { radius } => capsule(*radius, 0.0),
         Shape::Box { half_extents } => cuboid(*half_extents),
         Shape::Capsule { radius, half_length } => capsule(*radius, *half_length),
-        Shape::Mesh(_) => obstacle.mesh.as_deref().map_or(Solid::default(), |mesh| Solid {
-            positions: mesh.positions.clone(),
-            triangles: mesh.triangles.clone(),
-            normals: None,
-        }),
+        Shape::Mesh(mesh) => {
+            let surface = mesh.surface();
+            Solid {
+                positions: surface.positions.clone(),
+                triangles: surface.triangles.clone(),
+                normals: None,
+            }
+        }
     }
 }
 

@@ -32,7 +32,7 @@ impl VtuScene {
         let extent = Extent::of(scene, state);
         let shapes = scene.model.parameters().obstacles.iter().enumerate();
         let obstacles = shapes.map(|(at, obstacle)| Obstacle {
-            surface: solid(&scene.obstacles[at], &obstacle.shape, obstacle_pose(scene, input, at), extent),
+            surface: solid(&obstacle.shape, obstacle_pose(scene, input, at), extent),
             drawn: None,
         });
         let obstacles = obstacles.collect();

@@ -17,7 +17,6 @@ use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters, MotionRule, Pose,
     RigidCompliance,
 };
-use palpate_fem::mesh::SurfaceMesh;
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{Hand, Traits};
 use palpate_haptics::log::Names;
@@ -75,8 +74,6 @@ pub struct SceneObstacle {
     pub path: Option<MotionPath>,
     /// Where it is without a path, and how it is turned when the path does not say.
     pub start: Pose,
-    /// Its surface, if it is a mesh.
-    pub mesh: Option<Arc<SurfaceMesh>>,
 }
 
 /// Lengths [m], velocities and accelerations beyond this are no scene's.

@@ -6,7 +6,6 @@ use super::place::{Quantity, Source};
 use crate::{Failure, source as mesh_source};
 use glam::{DQuat, DVec3};
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
-use palpate_fem::mesh::SurfaceMesh;
 use palpate_haptics::{Columns, orientation};
 use std::sync::Arc;
 use toml::Spanned;
@@ -27,7 +26,7 @@ pub(super) fn read_plane(
     let name = name_or(plane.name.as_ref(), "plane", number);
     Ok((
         Obstacle { shape: Shape::Plane { normal }, pose, friction },
-        SceneObstacle { name, path: None, start: pose, mesh: None },
+        SceneObstacle { name, path: None, start: pose },
     ))
 }
 
@@ -40,7 +39,7 @@ pub(super) fn read_obstacle(
 ) -> Result<(Obstacle, SceneObstacle), Failure> {
     let obstacle = entry.get_ref();
     let name = name_or(obstacle.name.as_ref(), "obstacle", number);
-    let (shape, mesh) = read_shape(source, entry, &name, remarks)?;
+    let shape = read_shape(source, entry, &name, remarks)?;
     let friction = source.friction(obstacle.friction.as_ref())?;
     if let (Some(position), Some(_)) = (&obstacle.position, &obstacle.path) {
         return source.fail(position.span(), "the position is in the path: leave one of the two out");
@@ -62,7 +61,7 @@ pub(super) fn read_obstacle(
         }
         path = Some(read);
     }
-    let placed = SceneObstacle { name, path, start, mesh };
+    let placed = SceneObstacle { name, path, start };
     Ok((Obstacle { shape, pose: placed.at(0.0), friction }, placed))
 }
 
@@ -80,13 +79,11 @@ fn read_shape(
     entry: &Spanned<ObstacleEntry>,
     name: &str,
     remarks: &mut Vec<String>,
-) -> Result<(Shape, Option<Arc<SurfaceMesh>>), Failure> {
+) -> Result<Shape, Failure> {
     let obstacle = entry.get_ref();
     let length = |key, number| source.positive(number, Quantity::length(key));
     match (&obstacle.sphere, &obstacle.cuboid, &obstacle.capsule, &obstacle.mesh) {
-        (Some(sphere), None, None, None) => {
-            Ok((Shape::Sphere { radius: length("radius", &sphere.radius)? }, None))
-        }
+        (Some(sphere), None, None, None) => Ok(Shape::Sphere { radius: length("radius", &sphere.radius)? }),
         (None, Some(cuboid), None, None) => {
             let Numbers(given) = *cuboid.half_extents.get_ref();
             if given.iter().any(|half| *half <= 0.0) {
@@ -95,15 +92,14 @@ fn read_shape(
                     format!("half_extents are {given:?} m, expected three numbers above 0"),
                 );
             }
-            Ok((Shape::Box { half_extents: DVec3::from_array(given) }, None))
+            Ok(Shape::Box { half_extents: DVec3::from_array(given) })
         }
         (None, None, Some(capsule), None) => {
             let radius = length("radius", &capsule.radius)?;
-            Ok((Shape::Capsule { radius, half_length: length("half_length", &capsule.half_length)? }, None))
+            Ok(Shape::Capsule { radius, half_length: length("half_length", &capsule.half_length)? })
         }
         (None, None, None, Some(mesh)) => {
-            let (shape, surface) = read_mesh(source, mesh, name, remarks)?;
-            Ok((Shape::Mesh(Arc::new(shape)), Some(Arc::new(surface))))
+            read_mesh(source, mesh, name, remarks).map(|mesh| Shape::Mesh(Arc::new(mesh)))
         }
         _ => source.fail(
             entry.span(),
@@ -117,7 +113,7 @@ fn read_mesh(
     entry: &MeshEntry,
     name: &str,
     remarks: &mut Vec<String>,
-) -> Result<(ObstacleMesh, SurfaceMesh), Failure> {
+) -> Result<ObstacleMesh, Failure> {
     let place = entry.file.span();
     let path = source.relative(entry.file.get_ref());
     let scale = Quantity { key: "scale", unit: "", below: super::LARGEST };
@@ -131,7 +127,6 @@ fn read_mesh(
         ));
         mesh.turn_over();
     }
-    ObstacleMesh::new(mesh.positions.clone(), mesh.triangles.clone())
-        .map(|shape| (shape, mesh))
+    ObstacleMesh::new(mesh.positions, mesh.triangles)
         .or_else(|error| source.fail(place, format!("{}: {error}", path.display())))
 }

@@ -1,14 +1,16 @@
 //! What goes between the viewer and its server (docs/viewer-protocol.md).
 
 mod bytes;
+mod description;
 mod messages;
 mod picture;
 mod surface;
 
-pub(crate) use messages::{Answer, Asked, Doing, Hello, LogTitle, ProcessTiming, Status, StreamForm};
-pub use messages::{
-    CameraView, CouplingDescription, DeviceDescription, FrameTimes, MaterialDescription, ObjectDescription,
-    ObstacleDescription, RenderWish, Rules, SceneDescription, SceneTitle, ShapeDescription, View,
+pub use description::{
+    CouplingDescription, DeviceDescription, FrameTimes, MaterialDescription, ObjectDescription,
+    ObstacleDescription, SceneDescription, ShapeDescription, View,
 };
+pub(crate) use messages::{Answer, Asked, Doing, Hello, LogTitle, ProcessTiming, Status, StreamForm};
+pub use messages::{CameraView, RenderWish, Rules, SceneTitle};
 pub use picture::{Form, PictureMaker};
 pub use surface::{mode_scales, shapes_bytes, surface_bytes};

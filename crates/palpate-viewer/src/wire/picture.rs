@@ -91,7 +91,7 @@ impl PictureMaker {
             }
         }
         obstacles.iter().zip(&self.model.parameters().obstacles).for_each(|(pose, obstacle)| {
-            out.pose(&super::messages::shown_pose(&obstacle.shape, pose));
+            out.pose(&super::description::shown_pose(&obstacle.shape, pose));
         });
         for (input, output) in devices.iter().zip(&moment.devices) {
             out.u32(match input.mode {
