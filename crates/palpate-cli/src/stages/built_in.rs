@@ -44,6 +44,7 @@ position = [0.0, 0.1, 0.0]
 name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
+friction = 1.0
 "#,
         paths: &[],
         beat_s: 0.0,
@@ -84,6 +85,7 @@ position = [0.0, 0.05, 0.0]
 name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
+friction = 1.0
 [[device]]
 name = "left"
 mode = "touch"
@@ -122,6 +124,7 @@ position = [0.0, 0.14, 0.0]
 name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
+friction = 1.0
 "#,
         paths: &[],
         beat_s: 0.0,

@@ -261,13 +261,15 @@ impl Stages {
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
         };
-        let path = recipe.recorded_in(&folder, &mut Telling::new(tell))?;
+        // Whoever sent it knows its name, and not the folder that it lies in.
+        let named = |failure: Failure| Failure(failure.0.replace(&format!("{}/", folder.display()), ""));
+        let path = recipe.recorded_in(&folder, &mut Telling::new(tell)).map_err(named)?;
         let recording = read_recording(&path)?;
         let lowest = recording.surface.positions.iter().map(|place| place.y).fold(f64::INFINITY, f64::min);
         let height = recording.surface.diagonal() * 0.1 - lowest;
         let text = format!(
             "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"object\"\nrecording = {:?}\nposition = [0.0, {height:?}, 0.0]\n\
-             [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n",
+             [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nfriction = 1.0\n",
             path.display().to_string(),
         );
         let uploads = self.lock().uploads;
