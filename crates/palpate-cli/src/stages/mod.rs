@@ -31,9 +31,6 @@ const POINTERS: usize = 4;
 /// Updates of a device on this machine per second.
 const DEVICE_HZ: f64 = 1000.0;
 
-/// A dropped mesh has fewer surface nodes than this, or its residual compliance takes minutes.
-const MOST_UPLOAD: usize = 64 << 20;
-
 /// Makes scenes for the viewer.
 pub struct Stages {
     /// Where built-in recordings are kept.
@@ -230,13 +227,6 @@ impl Stages {
         let Upload { name, bytes, scale, material, modes } = upload;
         let file = Path::new(&name).file_name().filter(|name| !name.is_empty());
         let Some(file) = file else { return Err(Failure("the mesh file has no name".into())) };
-        if bytes.len() > MOST_UPLOAD {
-            return Err(Failure(format!(
-                "{name} has {} MB, at most {} MB are recorded in the viewer: use palpate record",
-                bytes.len() >> 20,
-                MOST_UPLOAD >> 20
-            )));
-        }
         let kind = Path::new(file).extension().map(|kind| kind.to_string_lossy().to_lowercase());
         if matches!(kind.as_deref(), Some("obj" | "stl")) {
             return Err(Failure(format!(

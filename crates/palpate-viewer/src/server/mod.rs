@@ -8,7 +8,7 @@ use crate::live;
 use crate::log_show::LogShow;
 use crate::stage::{Stage, Upload, Workshop};
 use crate::wire::{MaterialDescription, RenderWish, SceneTitle, shapes_bytes, surface_bytes};
-use axum::body::Bytes;
+use axum::body::{Bytes, to_bytes};
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
@@ -19,14 +19,16 @@ use guard::Guard;
 use palpate::Shape;
 use palpate_haptics::Scheduling;
 use serde::Deserialize;
+use std::collections::HashMap;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
+use tokio::sync::Semaphore;
 
 /// Largest mesh file that a page may send, and largest picture.
-const LARGEST_BODY: usize = 256 << 20;
+const LARGEST_BODY: usize = 64 << 20;
 
 /// Pictures of a log go out in pieces of so many bytes.
 const LARGEST_PIECE: usize = 8 << 20;
@@ -89,6 +91,9 @@ pub(crate) struct Hall {
     logs: Vec<Arc<LogShow>>,
     render: Option<RenderJob>,
     guard: Guard,
+    kept: Kept,
+    /// Whether a mesh is on its way: one at a time.
+    uploads: Semaphore,
     /// Viewers are known by numbers.
     next_viewer: AtomicU64,
 }
@@ -137,6 +142,8 @@ impl Server {
             logs: Vec::new(),
             render: None,
             guard: self.guard,
+            kept: Kept::default(),
+            uploads: Semaphore::new(1),
             next_viewer: AtomicU64::new(1),
         };
         match exhibit {
@@ -196,15 +203,6 @@ async fn guarded(State(hall): State<Arc<Hall>>, request: Request, next: Next) ->
     }
 }
 
-/// Bytes that never change under their address.
-fn for_good(bytes: Vec<u8>) -> Response {
-    let headers = [
-        (header::CONTENT_TYPE, "application/octet-stream"),
-        (header::CACHE_CONTROL, "private, max-age=3600, immutable"),
-    ];
-    (headers, bytes).into_response()
-}
-
 fn missing() -> Response {
     (StatusCode::NOT_FOUND, "there is nothing here").into_response()
 }
@@ -213,6 +211,33 @@ fn missing() -> Response {
 async fn aside(work: impl FnOnce() -> Response + Send + 'static) -> Response {
     let failed = |_| StatusCode::INTERNAL_SERVER_ERROR.into_response();
     tokio::task::spawn_blocking(work).await.unwrap_or_else(failed)
+}
+
+/// What never changes under its address: made once, however many ask for it.
+#[derive(Default)]
+struct Kept(Mutex<HashMap<Address, Bytes>>);
+
+/// A generation, what of it, and of which of its parts.
+type Address = (u32, &'static str, usize);
+
+impl Kept {
+    fn get(&self, address: Address, make: impl FnOnce() -> Option<Vec<u8>>) -> Response {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Of a scene that is shown no more nobody asks; two logs have two generations.
+        kept.retain(|(generation, ..), _| *generation + 1 >= address.0);
+        let bytes = match kept.get(&address) {
+            Some(bytes) => bytes.clone(),
+            None => {
+                let Some(made) = make() else { return missing() };
+                kept.entry(address).or_insert(made.into()).clone()
+            }
+        };
+        let headers = [
+            (header::CONTENT_TYPE, "application/octet-stream"),
+            (header::CACHE_CONTROL, "private, max-age=3600, immutable"),
+        ];
+        (headers, bytes).into_response()
+    }
 }
 
 impl Hall {
@@ -233,12 +258,11 @@ async fn object_surface(
     Path((generation, at)): Path<(u32, usize)>,
 ) -> Response {
     let Some(model) = hall.model(generation) else { return missing() };
-    aside(move || {
-        let surface = model.recordings().nth(at).map(|recording| &recording.surface);
-        surface
-            .map_or_else(missing, |surface| for_good(surface_bytes(&surface.positions, &surface.triangles)))
-    })
-    .await
+    let make = move || {
+        let surface = &model.recordings().nth(at)?.surface;
+        Some(surface_bytes(&surface.positions, &surface.triangles))
+    };
+    aside(move || hall.kept.get((generation, "surface", at), make)).await
 }
 
 async fn object_shapes(
@@ -246,12 +270,11 @@ async fn object_shapes(
     Path((generation, at)): Path<(u32, usize)>,
 ) -> Response {
     let Some(model) = hall.model(generation) else { return missing() };
-    aside(move || {
-        model.recordings().nth(at).map_or_else(missing, |recording| {
-            for_good(shapes_bytes(&recording.modes, recording.surface.positions.len()))
-        })
-    })
-    .await
+    let make = move || {
+        let recording = model.recordings().nth(at)?;
+        Some(shapes_bytes(&recording.modes, recording.surface.positions.len()))
+    };
+    aside(move || hall.kept.get((generation, "shapes", at), make)).await
 }
 
 async fn obstacle_surface(
@@ -259,14 +282,11 @@ async fn obstacle_surface(
     Path((generation, at)): Path<(u32, usize)>,
 ) -> Response {
     let Some(model) = hall.model(generation) else { return missing() };
-    aside(move || match model.parameters().obstacles.get(at).map(|obstacle| &obstacle.shape) {
-        Some(Shape::Mesh(mesh)) => {
-            let surface = mesh.surface();
-            for_good(surface_bytes(&surface.positions, &surface.triangles))
-        }
-        _ => missing(),
-    })
-    .await
+    let make = move || match &model.parameters().obstacles.get(at)?.shape {
+        Shape::Mesh(mesh) => Some(surface_bytes(&mesh.surface().positions, &mesh.surface().triangles)),
+        _ => None,
+    };
+    aside(move || hall.kept.get((generation, "obstacle", at), make)).await
 }
 
 #[derive(Deserialize)]
@@ -303,8 +323,15 @@ struct RecordWish {
     modes: Option<usize>,
 }
 
-async fn record(State(hall): State<Arc<Hall>>, Query(wish): Query<RecordWish>, body: Bytes) -> Response {
+async fn record(State(hall): State<Arc<Hall>>, Query(wish): Query<RecordWish>, request: Request) -> Response {
     let Some(live) = &hall.live else { return missing() };
+    let Ok(_alone) = hall.uploads.try_acquire() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "another mesh is on its way").into_response();
+    };
+    let Ok(body) = to_bytes(request.into_body(), LARGEST_BODY).await else {
+        let text = format!("a mesh file has {} MB at most: use palpate record", LARGEST_BODY >> 20);
+        return (StatusCode::PAYLOAD_TOO_LARGE, text).into_response();
+    };
     let scale = wish.scale.unwrap_or(1.0);
     let numbers = [wish.young, wish.poisson, wish.density, scale];
     if !numbers.iter().all(|number| number.is_finite()) || scale <= 0.0 {

@@ -35,6 +35,8 @@ fn other_hosts_other_origins_and_paths_out_of_the_page_get_nothing() {
     assert_eq!(served.request("POST /record?name=a", b"x").0, 400);
     assert_eq!(served.request("POST /record?name=a&young=NaN&poisson=0&density=1", b"x").0, 400);
     assert_eq!(served.request("POST /picture/0", b"x").0, 404);
+    let large = vec![0; (64 << 20) + 1];
+    assert_eq!(served.request("POST /record?name=a.msh&young=1&poisson=0&density=1", &large).0, 413);
 }
 
 #[test]
