@@ -22,5 +22,5 @@ pub use stage::{Opener, Stage, StageDevice, StageMover, Tell, Upload, Workshop};
 pub use wire::{
     CameraView, CouplingDescription, DeviceDescription, Form, FrameTimes, MaterialDescription,
     ObjectDescription, ObstacleDescription, PictureMaker, RenderWish, Rules, SceneDescription, SceneTitle,
-    ShapeDescription, View, mode_scales, shapes_bytes, surface_bytes,
+    ShapeDescription, View,
 };

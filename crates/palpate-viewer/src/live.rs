@@ -42,8 +42,8 @@ pub(crate) enum Command {
     Rules(Rules),
     Material(usize, MaterialDescription),
     Record(Upload),
-    /// What a job has made; whether the objects go on from where they are.
-    Made(Result<Box<Stage>, String>, bool),
+    /// What a job has made.
+    Made(Result<Box<Stage>, String>),
     /// There is a new viewer: tell how things are.
     Tell,
     End,
@@ -134,10 +134,9 @@ impl Live {
             running: None,
             busy: false,
         };
-        let manager = Builder::new().name("palpate stage".into()).spawn(move || {
-            manager.show(first, None);
-            manager.run(&asked);
-        })?;
+        // Before anybody can ask: the first page is told of what is shown.
+        manager.show(first, None);
+        let manager = Builder::new().name("palpate stage".into()).spawn(move || manager.run(&asked))?;
         let manager = Some(manager);
         Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, manager })
     }
@@ -228,12 +227,12 @@ impl Manager {
                 let stage = self.shown.borrow().stage.clone();
                 self.show(stage, None);
             }
-            Command::Made(made, goes_on) => {
+            Command::Made(made) => {
                 self.busy = false;
                 match made {
                     Ok(stage) => {
-                        let state = self.stop().filter(|_| goes_on);
-                        self.show(*stage, state);
+                        self.stop();
+                        self.show(*stage, None);
                     }
                     Err(text) => self.say(&Answer::Error { text: &text }),
                 }
@@ -261,7 +260,7 @@ impl Manager {
             };
             let made = make(&*workshop, &mut |what, share| progress(what, share, false));
             progress("", Some(1.0), true);
-            let _ = commands.send(Command::Made(made.map(Box::new), false));
+            let _ = commands.send(Command::Made(made.map(Box::new)));
         };
         match Builder::new().name(format!("palpate {job}")).spawn(work) {
             Ok(_) => self.busy = true,

@@ -93,11 +93,6 @@ impl LogShow {
         })
     }
 
-    /// How many pictures there are so far.
-    pub fn ready(&self) -> usize {
-        self.read(|made| made.pictures.len())
-    }
-
     /// Pictures from a number on, each after its length, within so many bytes.
     pub(crate) fn frames(&self, from: usize, count: usize, most_bytes: usize) -> Vec<u8> {
         let mut out = Vec::new();

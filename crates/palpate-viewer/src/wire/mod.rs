@@ -13,4 +13,4 @@ pub use description::{
 pub(crate) use messages::{Answer, Asked, Doing, Hello, LogTitle, ProcessTiming, Status, StreamForm};
 pub use messages::{CameraView, RenderWish, Rules, SceneTitle};
 pub use picture::{Form, PictureMaker};
-pub use surface::{mode_scales, shapes_bytes, surface_bytes};
+pub(crate) use surface::{shapes_bytes, surface_bytes};
