@@ -148,11 +148,13 @@ impl Serving {
         if let Some(token) = &self.token {
             address += &format!("?token={token}");
         }
+        // Before it is said: whoever is told may interrupt at once.
+        let stop = stop_on_interrupt();
         crate::tell(&format!("open {address} in a browser (Ctrl-C ends it)"));
         if !self.no_browser {
             open_browser(&address);
         }
-        server.run(exhibit, stop_on_interrupt()).map_err(Failure)
+        server.run(exhibit, stop).map_err(Failure)
     }
 }
 
