@@ -5,7 +5,7 @@
 //! normalised, and for every vector a it satisfies, exactly,
 //! cay(v)·a − a = v × (cay(v)·a + a)/2. The energy balance of a turning body rests on this.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// Placement of a body frame in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,12 @@ impl Pose {
     /// A world point [m, world] in the body frame [m, body].
     pub fn body_from_world(&self, point_in_world: DVec3) -> DVec3 {
         self.orientation.inverse() * (point_in_world - self.position)
+    }
+
+    /// What takes points of this frame to another: quicker for many points than by way of the world.
+    pub(crate) fn seen_from(&self, other: &Self) -> DAffine3 {
+        let rotation = DMat3::from_quat(other.orientation.inverse() * self.orientation);
+        DAffine3::from_mat3_translation(rotation, other.body_from_world(self.position))
     }
 
     /// How far a point at the end of an arm [m] can go on the way to another pose, at most [m].

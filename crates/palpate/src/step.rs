@@ -20,7 +20,7 @@
 
 use crate::contact::{
     Against, Contact, DeviceState, Finding, HELD, Key, Law, Other, Parts, Wanted, WantedOther, against,
-    renew, touch,
+    look_ahead, renew, touch,
 };
 use crate::energy::EnergyLedger;
 use crate::response::{Place, Reading, Responding};
@@ -103,7 +103,6 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
     let Workspace { search, caches, vicinities, near, wanted, spare, modes, next_obstacles, .. } = workspace;
     wanted.clear();
-    search.begin();
     let step = *steps;
     let mut scene =
         Finding { model, objects, contacts, caches, search, vicinities, levels, near, modes, wanted, step };
@@ -143,6 +142,10 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         }
     }
     scene.pairs();
+    // After all that looks at the surface as it is now.
+    for (number, at) in (0..devices.len()).flat_map(|number| searched().map(move |at| (number, at))) {
+        look_ahead(&mut scene, number, at);
+    }
     renew(model, objects, contacts, spare, wanted, &mut output.status);
 }
 

@@ -13,7 +13,7 @@ use crate::response::{Body, Place, Reading};
 use crate::spatial::Pose;
 use crate::state::ObjectState;
 use crate::surface::{Centre, SurfacePoint, at_weights};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// What a force moves on a node that is not pushed itself, as a share of what it moves where it acts: below it, from
 /// one node to the next.
@@ -40,6 +40,9 @@ struct Encounter<'a> {
     /// The obstacle at the start and at the end.
     before: Pose,
     after: Pose,
+    /// What takes points of the body to the obstacle's frame at the start, and at the end without contact force.
+    seen: DAffine3,
+    seen_after: DAffine3,
     /// How far the body and the obstacle move relative to each other at most, deformation apart [m].
     way: f64,
     /// Distance [m] within which nodes are taken in, and more of it where the way could lead through the obstacle.
@@ -66,6 +69,8 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         level: 0,
         before,
         after,
+        seen: start.seen_from(&before),
+        seen_after: free.seen_from(&after),
         way,
         // Forces on the nodes around move a node too, though less than those.
         margin: MARGIN * body.edge + PUSHED * own.pushed,
@@ -104,14 +109,22 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
 impl Encounter<'_> {
     /// Distance [m] of a body point from the obstacle at the start; infinite where it is more than `most`.
     fn distance(&self, p: DVec3, most: f64) -> f64 {
-        let local = self.before.body_from_world(self.own.rigid.pose.world_from_body(p));
+        let local = self.seen.transform_point3(p);
         self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
     }
 
     /// The same at the end of the step without contact force.
     fn distance_after(&self, p: DVec3, most: f64) -> f64 {
-        let local = self.after.body_from_world(self.own.free.end.pose.world_from_body(p));
+        let local = self.seen_after.transform_point3(p);
         self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// Whether a place comes within a reach [m] at the start or at the end of the step. Where it is then is asked for only
+    /// if it can be near.
+    fn comes_near(&self, start: DVec3, end: impl FnOnce() -> DVec3, reach: f64) -> bool {
+        let most = reach + self.way + self.own.surface_motion;
+        let distance = self.distance(start, most);
+        distance < reach || distance < most && self.distance_after(end(), reach) < reach
     }
 
     /// The nodes, and for round obstacles the middles of triangles.
@@ -127,13 +140,11 @@ impl Encounter<'_> {
                     return false;
                 }
                 let reach = radius + self.margin + self.beside;
-                let start = |within: f64| self.distance(centre, within) < within;
-                let end = |place: DVec3| self.distance_after(place, reach) < reach;
                 match of {
                     // At rest: nothing is known but how far the deformation can go.
-                    Centre::Rest => start(reach + self.way),
-                    Centre::Low(node) => start(reach) || end(sight.free_low(node)),
-                    Centre::Moved(node) => start(reach) || end(sight.free_node(node)),
+                    Centre::Rest => self.distance(centre, reach + self.way) < reach + self.way,
+                    Centre::Low(node) => self.comes_near(centre, || sight.free_low(node), reach),
+                    Centre::Moved(node) => self.comes_near(centre, || sight.free_node(node), reach),
                 }
             },
             |sight, triangle, high| {
@@ -148,14 +159,13 @@ impl Encounter<'_> {
                         }
                         Err(_) => {
                             let reach = self.margin + dent + self.beside;
-                            let comes_near = |start: DVec3, end: DVec3, within: f64| {
-                                self.distance(start, within) < within
-                                    || self.distance_after(end, within) < within
-                            };
                             // The low modes alone can tell that it does not.
-                            if !comes_near(sight.low(node), sight.free_low(node), reach + high)
-                                || !comes_near(sight.smooth(node), sight.free_node(node), reach)
-                            {
+                            let (low, end) = (sight.low(node), || sight.free_low(node));
+                            if !self.comes_near(low, end, reach + high) {
+                                continue;
+                            }
+                            let smooth = sight.smooth(node);
+                            if !self.comes_near(smooth, || sight.free_node(node), reach) {
                                 continue;
                             }
                             sight.node(node)
@@ -180,8 +190,8 @@ impl Encounter<'_> {
         }
         let corners = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
         let places = corners.map(|node| sight.smooth(node));
-        let local = |p: DVec3| self.before.body_from_world(self.own.rigid.pose.world_from_body(p));
-        let Some(weights) = self.obstacle.shape.deepest(places.map(local)) else { return };
+        let local = places.map(|p| self.seen.transform_point3(p));
+        let Some(weights) = self.obstacle.shape.deepest(local) else { return };
         // Inside the triangle, or on an edge, which counts for one of its two triangles.
         let thin = |k: &usize| weights[*k] < ON_EDGE;
         let edge = (0..3).find(thin).map(|k| (corners[(k + 1) % 3], corners[(k + 2) % 3]));
@@ -203,8 +213,7 @@ impl Encounter<'_> {
     /// Want a contact if a place that goes from one body point to another comes near the obstacle.
     fn meet(&self, wanted: &mut WantedList, from: DVec3, to: DVec3, of: Place, feature: u64) {
         let shape = &self.obstacle.shape;
-        let start = self.before.body_from_world(self.own.rigid.pose.world_from_body(from));
-        let end = self.after.body_from_world(self.own.free.end.pose.world_from_body(to));
+        let (start, end) = (self.seen.transform_point3(from), self.seen_after.transform_point3(to));
         let distance = |p: DVec3| shape.signed_distance(p, f64::INFINITY);
         let (Some((first, _)), Some((last, _))) = (distance(start), distance(end)) else { return };
         let way = (end - start).length();

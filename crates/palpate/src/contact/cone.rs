@@ -18,6 +18,9 @@ const REPETITIONS: usize = 30;
 /// Newton's method is followed as far as this [rad] at once.
 const NEAR: f64 = 0.3;
 
+/// A turn [rad] whose square is round-off.
+const SMALL: f64 = 3e-8;
+
 /// The force that obeys the law; `before` is a guess, `stiffness` the inverse of W.
 ///
 /// # Real time
@@ -41,13 +44,17 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
     let mut direction = if guess.length() > 0.1 * friction * before.x { guess } else { across };
     direction = direction.normalize_or(DVec2::X);
     let step = 1.0 / (W.y_axis.y + W.z_axis.z);
-    let mut force = DVec3::ZERO;
-    for _ in 0..REPETITIONS {
+    // The force that slips in a direction, and how the normal force follows from that.
+    let slipping = |direction: DVec2| {
         let denominator = W.x_axis.x + friction * coupling.dot(direction);
         // Beyond this the contact jams; what it can't hold shows as residual.
         let lambda = b.x / denominator.max(0.05 * W.x_axis.x);
         let tangent = direction * (friction * lambda);
-        force = DVec3::new(lambda, tangent.x, tangent.y);
+        (DVec3::new(lambda, tangent.x, tangent.y), denominator)
+    };
+    for _ in 0..REPETITIONS {
+        let (force, denominator) = slipping(direction);
+        let (lambda, tangent) = (force.x, DVec2::new(force.y, force.z));
         let moved = b - *W * force;
         let slip = DVec2::new(moved.y, moved.z);
         // How slip and its part across the direction change as the direction turns.
@@ -57,18 +64,20 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         let turns = *W * DVec3::new(lambda_turns, tangent_turns.x, tangent_turns.y);
         let slip_turns = -DVec2::new(turns.y, turns.z);
         let turn = -direction.perp_dot(slip) / (aside.perp_dot(slip) + direction.perp_dot(slip_turns));
-        let next = if direction.dot(slip) > 0.0 && turn.abs() < NEAR {
+        let newton = direction.dot(slip) > 0.0 && turn.abs() < NEAR;
+        let next = if newton {
             (direction + aside * turn).normalize()
         } else {
             (tangent + slip * step).normalize_or(direction)
         };
         let turned = (next - direction).length();
         direction = next;
-        if turned < 1e-13 {
+        // What Newton's method leaves is the square of that.
+        if turned < if newton { SMALL } else { SMALL * SMALL } {
             break;
         }
     }
-    force
+    slipping(direction).0
 }
 
 /// Two unit vectors across a unit normal, right-handed with it.

@@ -13,6 +13,7 @@ mod search;
 mod sight;
 mod solver;
 mod touch;
+mod vicinity;
 mod wanted;
 
 pub(crate) use against::against;
@@ -20,10 +21,11 @@ pub(crate) use held::HeldSystem;
 pub(crate) use level::Level;
 pub(crate) use parts::{Lift, Parts};
 pub(crate) use points::{ContactPoint, ContactPoints};
-pub(crate) use search::{Search, Vicinity};
+pub(crate) use search::Search;
 pub(crate) use sight::{MOST_FACES, NodeCache};
 pub(crate) use solver::Solver;
-pub(crate) use touch::{DeviceState, touch};
+pub(crate) use touch::{DeviceState, look_ahead, touch};
+pub(crate) use vicinity::Vicinity;
 pub(crate) use wanted::{Finding, HELD, Key, Wanted, WantedList, WantedOther, renew};
 
 use crate::surface::SurfacePoint;

@@ -300,18 +300,19 @@ impl Parts<'_> {
     }
 
     /// Solve one contact's law, unless that moves its sides by no more than `enough` [m]. Gives how far [m].
-    pub(super) fn solve_touch(&mut self, at: usize, contact: &Contact, friction: f64, enough: f64) -> f64 {
+    pub(super) fn solve_touch(&mut self, at: usize, friction: f64, enough: f64) -> f64 {
+        let contact = &self.contacts[at];
         let apart = self.apart(contact);
-        let Contact { axes, compliance: w, .. } = *contact;
+        let Contact { axes, compliance: w, .. } = contact;
         let into = axes.transpose();
         let moved = into * (apart - contact.start);
         let r = DVec3::new(contact.least_gap - contact.gap(apart), moved.y, moved.z);
         let before = into * contact.force;
-        let after = solve_contact(&w, &contact.stiffness, r + w * before, friction, before);
+        let after = solve_contact(w, &contact.stiffness, r + *w * before, friction, before);
         let change = after - before;
-        let moved = (w * change).length();
+        let moved = (*w * change).length();
         if moved > enough {
-            self.add_force(at, axes * change);
+            self.add_force(at, *axes * change);
         }
         moved
     }

@@ -2,25 +2,11 @@
 
 use super::sight::{Found, Sight};
 use crate::response::Body;
-use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
 /// Surface points that a search keeps at most; where a mesh is finer the nearest count.
-const MOST_FOUND: usize = 1024;
-
-/// What a vicinity is found with to spare, as a share of the mean edge and of what is asked for.
-const SPARE_EDGE: f64 = 0.15;
-const SPARE_REACH: f64 = 0.25;
-
-/// A vicinity of whose spare this share is used up will be needed anew soon.
-const EARLY: f64 = 0.6;
-
-/// Of more triangles than these it is remembered where the surface is nearest, on so many faces at most; from there so many
-/// steps lead to where it is nearest now.
-const MANY: usize = 48;
-const MOST_SEEDS: usize = 8;
-const DESCENT: usize = 64;
+pub(super) const MOST_FOUND: usize = 1024;
 
 /// Places that are less than this [m] apart are one.
 const SAME: f64 = 1e-9;
@@ -31,59 +17,15 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 /// Places whose normals differ by less than this cosine are one: a facetted surface is one face.
 pub(super) const ONE_FACE: f64 = 0.85;
 
-/// The triangles around a point, as they were found a while ago: they are all that can be near while the point and the
-/// surface have not gone farther than what they were found with to spare.
-#[derive(Debug, Clone)]
-pub(crate) struct Vicinity {
-    /// The nearest first, with their distances then [m].
-    triangles: Vec<(u32, f64)>,
-    /// Of many, those where the surface was nearest, one of each face: the nearest are a few triangles from them.
-    seeds: Vec<u32>,
-    many: usize,
-    /// Where the point was [m, body], the modal coordinates, the largest dent [m].
-    point: DVec3,
-    q: Vec<f64>,
-    dent: f64,
-    /// Within which they are all there [m]; 0 when nothing is known.
-    reach: f64,
-}
-
-impl Vicinity {
-    pub(crate) fn new(modes: usize) -> Self {
-        Self {
-            triangles: Vec::with_capacity(MOST_FOUND),
-            seeds: Vec::with_capacity(MOST_SEEDS),
-            many: MANY,
-            point: DVec3::ZERO,
-            q: vec![0.0; modes],
-            dent: 0.0,
-            reach: 0.0,
-        }
-    }
-
-    /// How far the point and the surface have gone relative to each other since then, at most [m].
-    fn gone(&self, sight: &Sight, p: DVec3) -> f64 {
-        let deformed = sight.body.way(&self.q[..sight.q.len()], sight.q);
-        deformed + 2.0 * libm::fabs(sight.most_dent() - self.dent) + (p - self.point).length()
-    }
-}
-
 /// Buffers of a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Search {
     pub(crate) found: Vec<Found>,
-    /// Whether a vicinity was found anew in this step.
-    renewed: bool,
 }
 
 impl Search {
     pub(crate) fn new() -> Self {
-        Self { found: Vec::with_capacity(MOST_FOUND), renewed: false }
-    }
-
-    /// Begin a step.
-    pub(crate) fn begin(&mut self) {
-        self.renewed = false;
+        Self { found: Vec::with_capacity(MOST_FOUND) }
     }
 
     /// Find the triangles within a reach [m] of a body point.
@@ -97,20 +39,12 @@ impl Search {
             |_, _, centre, radius| (p - centre).length() - radius < reach,
             |sight, triangle, _| {
                 let one = sight.nearest_on(triangle, p);
-                if one.distance >= reach {
-                    return;
-                }
-                if found.len() < MOST_FOUND {
-                    found.push(one);
-                    return;
-                }
-                let farthest = found.iter_mut().max_by(|a, b| a.distance.total_cmp(&b.distance));
-                if let Some(farthest) = farthest.filter(|farthest| one.distance < farthest.distance) {
-                    *farthest = one;
+                if one.distance < reach {
+                    take_in(found, one);
                 }
             },
         );
-        self.sort();
+        sort(&mut self.found);
     }
 
     /// Find the triangles that hold the nearest point of the surface, if it is within a reach [m] of a body point. One that
@@ -151,49 +85,7 @@ impl Search {
                 }
             },
         );
-        self.sort();
-    }
-
-    /// As [`Self::near`], by the vicinity where that is enough; of many triangles only the nearest of each face.
-    ///
-    /// # Real time
-    pub(crate) fn around(&mut self, sight: &mut Sight, vicinity: &mut Vicinity, p: DVec3, reach: f64) {
-        let gone = if vicinity.reach > 0.0 { vicinity.gone(sight, p) } else { f64::INFINITY };
-        // One that will be needed soon is found early, so that those of several fingers don't fall into one step.
-        let spare = vicinity.reach - reach;
-        let soon = gone > EARLY * spare && !self.renewed;
-        if gone < spare && !soon {
-            self.found.clear();
-            if vicinity.seeds.is_empty() {
-                let can = vicinity.triangles.iter().take_while(|(_, distance)| *distance < reach + gone);
-                self.found.extend(can.map(|&(triangle, _)| sight.nearest_on(triangle, p)));
-            } else {
-                self.found.extend(vicinity.seeds.iter().map(|&seed| descend(sight, seed, p)));
-            }
-            self.sort();
-            return;
-        }
-        self.renewed = true;
-        let wide = reach + SPARE_EDGE * sight.body.edge + SPARE_REACH * reach;
-        self.near(sight, p, wide);
-        vicinity.triangles.clear();
-        vicinity.triangles.extend(self.found.iter().map(|found| (found.triangle, found.distance)));
-        vicinity.q[..sight.q.len()].copy_from_slice(sight.q);
-        // Where there was no room for all, nothing is known beyond the farthest.
-        let full = self.found.len() == MOST_FOUND;
-        let farthest = self.found.last().map_or(wide, |found| found.distance);
-        (vicinity.point, vicinity.dent) = (p, sight.most_dent());
-        vicinity.reach = if full { farthest } else { wide };
-        vicinity.seeds.clear();
-        if vicinity.triangles.len() > vicinity.many {
-            self.keep_minima(sight.body, wide, MOST_SEEDS);
-            vicinity.seeds.extend(self.found.iter().map(|found| found.triangle));
-        }
-    }
-
-    fn sort(&mut self) {
-        self.found
-            .sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle)));
+        sort(&mut self.found);
     }
 
     /// The triangle that is nearest to a body point, if it is within a reach [m].
@@ -224,61 +116,49 @@ impl Search {
     /// Keep what was found within a reach [m] where the surface is nearest to the point in its surroundings, once per
     /// face: at most `most`, the nearest first.
     pub(crate) fn keep_minima(&mut self, body: &Body, reach: f64, most: usize) {
-        self.found.retain(|found| found.distance < reach);
-        let triangles = &body.recording.surface.triangles;
-        let mut kept = 0;
-        for at in 0..self.found.len() {
-            let one = self.found[at];
-            // The corner, edge or face that holds the point.
-            let corners = triangles[one.triangle as usize];
-            let feature = || corners.iter().zip(one.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| node);
-            let holds =
-                |other: &Found| feature().all(|node| triangles[other.triangle as usize].contains(node));
-            // Sorted: a triangle at the feature that is nearer stands before, and so does one that shares the point.
-            if kept == most || self.found[..at].iter().any(holds) {
-                continue;
-            }
-            let known = self.found[..kept].iter().any(|other| one.normal.dot(other.normal) > ONE_FACE);
-            if !known {
-                self.found.swap(kept, at);
-                kept += 1;
-            }
-        }
-        self.found.truncate(kept);
+        keep_minima(&mut self.found, body, reach, most);
     }
 }
 
-/// Where the surface is nearest to a body point in the surroundings of a triangle: over its edges and corners while that
-/// leads nearer.
-fn descend(sight: &mut Sight, triangle: u32, p: DVec3) -> Found {
-    let mut best = sight.nearest_on(triangle, p);
-    let body = sight.body;
-    for _ in 0..DESCENT {
-        let corners = body.recording.surface.triangles[best.triangle as usize];
-        let mut on = corners.iter().zip(best.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| *node);
-        let before = best;
-        let mut look = |sight: &mut Sight, triangle: u32| {
-            let one = sight.nearest_on(triangle, p);
-            if one.distance < best.distance {
-                best = one;
-            }
-        };
-        match (on.next(), on.next(), on.next()) {
-            (Some(a), Some(b), None) => {
-                if let Some(over) = body.across(before.triangle, a, b) {
-                    look(sight, over);
-                }
-            }
-            (Some(corner), None, None) => {
-                body.around(corner as usize).iter().for_each(|&other| look(sight, other));
-            }
-            _ => {}
+/// Take in what was found; where there is no room the nearest stay.
+pub(super) fn take_in(found: &mut Vec<Found>, one: Found) {
+    if found.len() < MOST_FOUND {
+        found.push(one);
+        return;
+    }
+    let farthest = found.iter_mut().max_by(|a, b| a.distance.total_cmp(&b.distance));
+    if let Some(farthest) = farthest.filter(|farthest| one.distance < farthest.distance) {
+        *farthest = one;
+    }
+}
+
+/// The nearest first.
+pub(super) fn sort(found: &mut [Found]) {
+    found.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance).then(a.triangle.cmp(&b.triangle)));
+}
+
+/// See [`Search::keep_minima`].
+pub(super) fn keep_minima(found: &mut Vec<Found>, body: &Body, reach: f64, most: usize) {
+    found.retain(|found| found.distance < reach);
+    let triangles = &body.recording.surface.triangles;
+    let mut kept = 0;
+    for at in 0..found.len() {
+        let one = found[at];
+        // The corner, edge or face that holds the point.
+        let corners = triangles[one.triangle as usize];
+        let feature = || corners.iter().zip(one.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| node);
+        let holds = |other: &Found| feature().all(|node| triangles[other.triangle as usize].contains(node));
+        // Sorted: a triangle at the feature that is nearer stands before, and so does one that shares the point.
+        if kept == most || found[..at].iter().any(holds) {
+            continue;
         }
-        if best.triangle == before.triangle {
-            break;
+        let known = found[..kept].iter().any(|other| one.normal.dot(other.normal) > ONE_FACE);
+        if !known {
+            found.swap(kept, at);
+            kept += 1;
         }
     }
-    best
+    found.truncate(kept);
 }
 
 #[cfg(test)]
@@ -299,10 +179,8 @@ mod tests {
         let (state, points) = (response.at_rest(recording.surface.positions.len(), 1), ContactPoints::new(1));
         let mut cache = NodeCache::new(&body);
         let mut search = Search::new();
-        let (mut vicinity, omegas) =
-            (Vicinity::new(recording.modes.len()), &recording.modes.angular_frequencies);
+        let omegas = &recording.modes.angular_frequencies;
         let (mut found, mut full) = (0, 0);
-        let (mut sown, mut exact) = (0, 0);
         for case in 0..4000 {
             let angle = |k: f64| libm::sin(12.9 * f64::from(case) + 7.3 * k + 1.0);
             let reading = if case % 2 == 0 { Reading::Point } else { Reading::Patch(0) };
@@ -342,31 +220,7 @@ mod tests {
                 search.closest(&mut sight, (p, DVec3::ZERO), least, known);
                 assert!(search.found.is_empty(), "case {case}");
             }
-
-            // By the vicinity, a little later.
-            let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&q));
-            (vicinity.reach, vicinity.many) = (0.0, if case % 4 < 2 { MANY } else { 4 });
-            search.around(&mut sight, &mut vicinity, p, reach);
-            let later: Vec<f64> = q.iter().map(|q| q * 1.001).collect();
-            let mut sight = Sight::new(&body, reading, &state, &points, &mut cache, Err(&later));
-            let p = p * 1.0005;
-            search.around(&mut sight, &mut vicinity, p, reach);
-            let distances: Vec<f64> = (0..recording.surface.triangles.len() as u32)
-                .map(|t| sight.nearest_on(t, p).distance)
-                .filter(|distance| *distance < reach)
-                .collect();
-            if vicinity.seeds.is_empty() {
-                let near = search.found.iter().filter(|one| one.distance < reach).count();
-                assert!(near == distances.len(), "case {case}: {near} of {}", distances.len());
-            } else {
-                // Of many the nearest, or one that was as near as that when they were found.
-                let least = distances.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-                let off = search.found[0].distance - least;
-                assert!(off <= 2.0 * vicinity.gone(&sight, p) + 1e-12, "case {case}: {off}");
-                (sown, exact) = (sown + 1, exact + usize::from(off < 1e-9));
-            }
         }
-        assert!(sown > 300 && 100 * exact > 99 * sown, "{exact} of {sown}");
         assert!(found > 5000 && full < 200, "{found} {full}");
     }
 }

@@ -4,7 +4,7 @@
 use crate::contact::ContactPoints;
 use crate::response::{Acting, Body, NodalForces, Place, Reading, ResponseState};
 use crate::surface::{
-    Centre, Moving, Surface, Visit, area_normal, at_weights, low_modes, nearest_on_triangle,
+    Centre, Moving, Surface, Visit, Walk, area_normal, at_weights, low_modes, nearest_on_triangle,
 };
 use alloc::vec;
 use alloc::vec::Vec;
@@ -364,10 +364,20 @@ impl<'a> Sight<'a> {
         near: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
         found: impl FnMut(&mut Self, u32, f64),
     ) {
+        self.walk_on((&mut Walk::BEGUN.clone(), usize::MAX), near, found);
+    }
+
+    /// The same from where a walk stands, past so many spheres and triangles. Gives how many they were.
+    pub(crate) fn walk_on(
+        &mut self,
+        walk: (&mut Walk, usize),
+        near: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
+        found: impl FnMut(&mut Self, u32, f64),
+    ) -> usize {
         let body = self.body;
         let visit = self.visit;
         let tree = body.tree(self.reading);
-        tree.walk((body.bounds(self.reading), &visit), self, near, found);
+        tree.walk_on(walk, (body.bounds(self.reading), &visit), self, near, found)
     }
 }
 

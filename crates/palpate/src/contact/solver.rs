@@ -320,9 +320,8 @@ impl Solver {
             }
         }
         for at in members.iter().map(|&at| at as usize) {
-            let contact = parts.contacts[at];
-            let Law::Touch { friction } = contact.law else { continue };
-            let moved = parts.solve_touch(at, &contact, friction, enough);
+            let Law::Touch { friction } = parts.contacts[at].law else { continue };
+            let moved = parts.solve_touch(at, friction, enough);
             largest = larger(largest, moved);
         }
         largest

@@ -18,7 +18,7 @@ use super::search::{ONE_FACE, Search};
 use super::sight::{Found, MOST_FACES, Sight};
 use super::wanted::{Finding, Key, Wanted, WantedOther};
 use super::{Against, Contact, Law, known_contacts};
-use crate::response::{Place, Reading};
+use crate::response::{Body, Place, Reading};
 use crate::scene::DeviceParameters;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
@@ -115,17 +115,14 @@ pub(crate) fn touch(
     let travel = (free - start).length();
     let motion = travel + own.surface_motion;
 
-    let mut dents = [None; MOST_FACES];
-    for (dent, contact) in dents.iter_mut().zip(known_contacts(scene.contacts, Against::Device(number), at)) {
-        *dent = Some(own.points.of(contact.slot).place);
-    }
+    let dents = own_dents(scene, number, at);
     let cache = &mut scene.caches[at];
     let mut sight = Sight::new(body, reading, &own.response, &own.points, cache, Ok(scene.step));
     if start.length() - motion - tip > object.radius + sight.reach() {
         *inside = false;
         return;
     }
-    sight.without_dents(dents, 1.5 * (parameters.patch_radius + body.edge));
+    sight.without_dents(dents, flat(parameters, body));
     let vicinity = &mut scene.vicinities[number * scene.model.objects.len() + at];
     // The side is asked for only when it is not known.
     if fresh || *inside {
@@ -137,7 +134,7 @@ pub(crate) fn touch(
         }
     }
     let reach = tip + 1.2 * travel + 0.02 * body.edge;
-    scene.search.around(&mut sight, vicinity, start, reach);
+    vicinity.find(scene.search, &mut sight, start, reach);
     // The surface here moves about as its nearest nodes do.
     let mut motion = motion;
     if let Some(nearest) = scene.search.found.first().copied() {
@@ -148,7 +145,7 @@ pub(crate) fn touch(
     let fast = motion > 0.5 * tip.max(0.5 * body.edge);
     let needed = if fast { 1.05 * tip } else { tip + 1.2 * motion };
     if needed > reach {
-        scene.search.around(&mut sight, vicinity, start, needed);
+        vicinity.find(scene.search, &mut sight, start, needed);
     }
     scene.search.keep_minima(body, needed, 2 * MOST_FACES);
     let mut faces = Faces { meet: [None; MOST_FACES], count: 0, tip };
@@ -159,6 +156,37 @@ pub(crate) fn touch(
         on_the_way(scene, &mut faces, reading, at, start, free, motion);
     }
     want(scene, &faces, number, at, reading, start, motion);
+}
+
+/// Go on finding what a device will be near to, where that has begun: a part in each step.
+///
+/// # Real time
+pub(crate) fn look_ahead(scene: &mut Finding, number: usize, at: usize) {
+    let dents = own_dents(scene, number, at);
+    let vicinity = &mut scene.vicinities[number * scene.model.objects.len() + at];
+    let Some(moment) = vicinity.lend_moment() else { return };
+    let (body, own) = (&scene.model.objects[at].body, &scene.objects[at]);
+    let parameters = &scene.model.parameters.devices[number];
+    let (reading, cache) = (body.reading(parameters.patch_radius), &mut scene.caches[at]);
+    let moment_then = Err(&moment[..own.response.coordinates().len()]);
+    let mut sight = Sight::new(body, reading, &own.response, &own.points, cache, moment_then);
+    sight.without_dents(dents, flat(parameters, body));
+    vicinity.grow(&mut sight);
+    vicinity.take_back(moment, body);
+}
+
+/// The places that a device touches already: their dents are its own.
+fn own_dents(scene: &Finding, number: usize, at: usize) -> [Option<Place>; MOST_FACES] {
+    let mut dents = [None; MOST_FACES];
+    for (dent, contact) in dents.iter_mut().zip(known_contacts(scene.contacts, Against::Device(number), at)) {
+        *dent = Some(scene.objects[at].points.of(contact.slot).place);
+    }
+    dents
+}
+
+/// Around a place that a tip presses the surface goes as the place does, up to this distance [m].
+fn flat(parameters: &DeviceParameters, body: &Body) -> f64 {
+    1.5 * (parameters.patch_radius + body.edge)
 }
 
 /// A face that a tip meets.

@@ -1,8 +1,8 @@
 //! Which contacts a step has: those that were found, matched with those of the last step.
 
-use super::search::{Search, Vicinity};
+use super::search::Search;
 use super::sight::NodeCache;
-use super::{Contact, Law, Level, Other};
+use super::{Contact, Law, Level, Other, Vicinity};
 use crate::response::{Place, Responding};
 use crate::scene::Model;
 use crate::state::{ObjectState, StepStatus};

@@ -14,7 +14,7 @@ mod triangle;
 pub(crate) use coarser::coarser;
 pub(crate) use patch::{PatchWeights, triangles_around};
 pub(crate) use thin::{facing, thinned};
-pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, band, low_modes};
+pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, Walk, band, low_modes};
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 
 use alloc::vec::Vec;

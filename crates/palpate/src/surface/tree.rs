@@ -32,6 +32,25 @@ const DONE: u32 = 1 << 31;
 /// A sphere is much smaller than another that is so many times as large.
 const MUCH: f64 = 1.3;
 
+/// Where a walk through a tree stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Walk {
+    stack: [u32; DEEPEST],
+    depth: usize,
+}
+
+impl Walk {
+    /// Nothing is left of it.
+    pub(crate) const OVER: Self = Self { stack: [0; DEEPEST], depth: 0 };
+
+    /// All is before it.
+    pub(crate) const BEGUN: Self = Self { depth: 1, ..Self::OVER };
+
+    pub(crate) fn is_over(&self) -> bool {
+        self.depth == 0
+    }
+}
+
 /// A number for every band.
 pub(crate) type Bands = [f64; BANDS];
 
@@ -305,16 +324,35 @@ impl SurfaceTree {
     /// # Real time
     pub(crate) fn walk<S: Moving>(
         &self,
+        visit: (&Bounds, &Visit),
+        surface: &mut S,
+        near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+        found: impl FnMut(&mut S, u32, f64),
+    ) {
+        self.walk_on((&mut Walk::BEGUN.clone(), usize::MAX), visit, surface, near, found);
+    }
+
+    /// Go on with a walk, past so many spheres and triangles, or as many triangles more as a leaf has. Gives how many they
+    /// were.
+    ///
+    /// # Real time
+    pub(crate) fn walk_on<S: Moving>(
+        &self,
+        (walk, most): (&mut Walk, usize),
         (bounds, visit): (&Bounds, &Visit),
         surface: &mut S,
         near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
         mut found: impl FnMut(&mut S, u32, f64),
-    ) {
-        let mut stack = [0_u32; DEEPEST];
-        let mut depth = usize::from(!self.nodes.is_empty());
-        while depth > 0 {
-            depth -= 1;
-            let (at, done) = ((stack[depth] & !DONE) as usize, stack[depth] & DONE != 0);
+    ) -> usize {
+        let Walk { stack, depth } = walk;
+        if self.nodes.is_empty() {
+            *depth = 0;
+        }
+        let mut passed = 0;
+        while *depth > 0 && passed < most {
+            passed += 1;
+            *depth -= 1;
+            let (at, done) = ((stack[*depth] & !DONE) as usize, stack[*depth] & DONE != 0);
             let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
             if done {
                 self.tighten(at, surface);
@@ -327,17 +365,19 @@ impl SurfaceTree {
             if node.second == 0 {
                 let high = visit.sum(&spread.modal, LOW..BANDS) + visit.dent(spread);
                 self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
+                passed += node.count as usize;
             }
             if tight.is_none() && surface.keeps() {
-                stack[depth] = at as u32 | DONE;
-                depth += 1;
+                stack[*depth] = at as u32 | DONE;
+                *depth += 1;
             }
             if node.second != 0 {
-                stack[depth] = node.second;
-                stack[depth + 1] = at as u32 + 1;
-                depth += 2;
+                stack[*depth] = node.second;
+                stack[*depth + 1] = at as u32 + 1;
+                *depth += 2;
             }
         }
+        passed
     }
 
     /// Whether a sphere is entered.

@@ -79,7 +79,7 @@ fn at_height(y: f64) -> ObjectStart {
     ObjectStart { pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY }, twist: Twist::ZERO }
 }
 
-/// Sorted times [ns] of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it.
+/// Times [ns] of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it.
 fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters {
         devices: vec![
@@ -112,11 +112,10 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
             times.push(time);
         }
     }
-    times.sort_unstable();
     Ok(times)
 }
 
-/// Sorted times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
+/// Times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
 fn floor_steps(
     recording: &Arc<Recording>,
     (height, cubes, most_places): (f64, usize, usize),
@@ -138,7 +137,6 @@ fn floor_steps(
             times.push(time);
         }
     }
-    times.sort_unstable();
     Ok(times)
 }
 
@@ -149,7 +147,7 @@ fn on_a_floor(most_places: usize) -> ModelParameters {
     ModelParameters { gravity, obstacles: vec![floor], most_places, ..ModelParameters::default() }
 }
 
-/// Sorted times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
+/// Times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
 fn moving_steps(recording: &Arc<Recording>, most_places: usize, steps: usize) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(most_places) };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
@@ -173,7 +171,6 @@ fn moving_steps(recording: &Arc<Recording>, most_places: usize, steps: usize) ->
             times.push(time);
         }
     }
-    times.sort_unstable();
     Ok(times)
 }
 
