@@ -103,6 +103,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
     let Workspace { search, caches, vicinities, near, wanted, spare, modes, next_obstacles, .. } = workspace;
     wanted.clear();
+    search.begin();
     let step = *steps;
     let mut scene =
         Finding { model, objects, contacts, caches, search, vicinities, levels, near, modes, wanted, step };

@@ -21,11 +21,18 @@ pub(super) const ONE_FACE: f64 = 0.85;
 #[derive(Debug, Clone)]
 pub(crate) struct Search {
     pub(crate) found: Vec<Found>,
+    /// Whether a vicinity was found anew in this step.
+    pub(super) renewed: bool,
 }
 
 impl Search {
     pub(crate) fn new() -> Self {
-        Self { found: Vec::with_capacity(MOST_FOUND) }
+        Self { found: Vec::with_capacity(MOST_FOUND), renewed: false }
+    }
+
+    /// Begin a step.
+    pub(crate) fn begin(&mut self) {
+        self.renewed = false;
     }
 
     /// Find the triangles within a reach [m] of a body point.
@@ -143,17 +150,19 @@ pub(super) fn keep_minima(found: &mut Vec<Found>, body: &Body, reach: f64, most:
     let triangles = &body.recording.surface.triangles;
     let mut kept = 0;
     for at in 0..found.len() {
+        if kept == most {
+            break;
+        }
         let one = found[at];
+        if found[..kept].iter().any(|other| one.normal.dot(other.normal) > ONE_FACE) {
+            continue;
+        }
         // The corner, edge or face that holds the point.
         let corners = triangles[one.triangle as usize];
         let feature = || corners.iter().zip(one.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| node);
         let holds = |other: &Found| feature().all(|node| triangles[other.triangle as usize].contains(node));
         // Sorted: a triangle at the feature that is nearer stands before, and so does one that shares the point.
-        if kept == most || found[..at].iter().any(holds) {
-            continue;
-        }
-        let known = found[..kept].iter().any(|other| one.normal.dot(other.normal) > ONE_FACE);
-        if !known {
+        if !found[..at].iter().any(holds) {
             found.swap(kept, at);
             kept += 1;
         }

@@ -15,13 +15,16 @@ const SPARE_EDGE: f64 = 0.8;
 const SPARE_OF_MANY: f64 = 0.15;
 const SPARE_REACH: f64 = 0.25;
 
-/// Finding it takes so many steps at most, by what the last one took, and this share of those in which it will be used up; it
-/// begins when so many times as many are left, and some more. Spheres and triangles that are passed in a step at least.
+/// Of the steps in which it is used up finding it takes this share, and as many are left over: so many at least, or it is not
+/// worth while, and at most. Spheres and triangles that are passed in a step at least.
+const PARTS: f64 = 0.2;
+const LEAST_PARTS: f64 = 3.0;
 const MOST_PARTS: f64 = 8.0;
-const PARTS: f64 = 0.33;
-const SOON: f64 = 2.0;
-const EARLY: f64 = 6.0;
 const LEAST_PART: usize = 24;
+
+/// What is found within one step is so early, with this share of the spare left, if it is the only one, so that those of
+/// several fingers don't fall into one step.
+const EARLY: f64 = 0.4;
 
 /// How much the speed of a step counts among those before.
 const SHARE: f64 = 0.1;
@@ -105,25 +108,27 @@ impl Vicinity {
     /// # Real time
     /// Costs few triangles; where the point or the surface is fast, or comes anew, those within reach.
     pub(crate) fn find(&mut self, search: &mut Search, sight: &mut Sight, p: DVec3, reach: f64) {
-        let found = &mut search.found;
         let gone = self.now.gone(sight, p);
-        let left = self.now.reach - reach - gone;
-        if left <= 0.0 || self.now.reach == 0.0 {
+        let spare = self.now.reach - reach;
+        let left = spare - gone;
+        self.speed += SHARE * ((gone - self.gone).max(0.0) - self.speed);
+        self.gone = gone;
+        let parts = PARTS * spare / self.speed;
+        let soon = self.walk.is_over() && parts < LEAST_PARTS && left < EARLY * spare && !search.renewed;
+        if left <= 0.0 || self.now.reach == 0.0 || soon {
+            search.renewed = true;
             self.begin(sight, p, reach);
             self.walk_on(sight, usize::MAX);
             self.finish(sight.body);
-            found.clone_from(&self.found);
+            search.found.clone_from(&self.found);
             return;
         }
-        self.speed += SHARE * ((gone - self.gone).max(0.0) - self.speed);
-        self.gone = gone;
-        if self.walk.is_over() {
-            let parts = (PARTS * (self.now.reach - reach) / self.speed).clamp(1.0, MOST_PARTS);
-            if left < self.speed * (SOON * parts + EARLY) {
-                self.part = LEAST_PART.max((self.passed as f64 / parts) as usize + 1);
-                self.begin(sight, p, reach);
-            }
+        let parts = parts.min(MOST_PARTS);
+        if self.walk.is_over() && parts >= LEAST_PARTS && left < self.speed * 2.0 * parts {
+            self.part = LEAST_PART.max((self.passed as f64 / parts) as usize + 1);
+            self.begin(sight, p, reach);
         }
+        let found = &mut search.found;
         found.clear();
         if self.now.seeds.is_empty() {
             let can = self.now.triangles.iter().take_while(|(_, distance)| *distance < reach + gone);

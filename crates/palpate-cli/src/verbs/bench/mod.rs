@@ -99,7 +99,10 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     {
         let mut times = measure(arguments.steps)?;
         for _ in 1..arguments.runs {
-            times.iter_mut().zip(measure(arguments.steps)?).for_each(|(least, time)| *least = time.min(*least));
+            times
+                .iter_mut()
+                .zip(measure(arguments.steps)?)
+                .for_each(|(least, time)| *least = time.min(*least));
         }
         times.sort_unstable();
         let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));

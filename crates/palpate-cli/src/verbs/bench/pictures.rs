@@ -73,7 +73,6 @@ fn picture_times(
             bytes += picture.len();
         }
     }
-    times.sort_unstable();
     let seconds: f64 = times.iter().map(|time| f64::from(*time) * 1e-9).sum();
     let pictures = times.len() as f64;
     crate::tell(&format!(
