@@ -1,15 +1,14 @@
 //! A scene that runs while it is looked at: one thread manages it, one makes paths of pointers, others do long jobs.
 
 use crate::pointers::Pointers;
-use crate::stage::{Stage, StageDevice, Upload, Workshop};
+use crate::stage::{PageTeller, Stage, StageDevice, Upload, Workshop};
 use crate::wire::{Answer, Form, MaterialDescription, PictureMaker, ProcessTiming, Rules, Status};
 use axum::body::Bytes;
-use palpate::{Input, Model, State};
+use palpate::{Input, Model, ObjectMotion, State};
 use palpate_haptics::{
     Clock, CycleListener, Moment, Mover, Playback, Report, Scheduling, Session, SessionDevice, Timing,
     cycles, port,
 };
-use std::io::Cursor;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -67,7 +66,7 @@ pub(crate) struct Live {
     pub pointers: Arc<Mutex<Pointers>>,
     pub playback: Arc<Playback>,
     pub viewers: Arc<Viewers>,
-    manager: Option<JoinHandle<()>>,
+    manager: Mutex<Option<JoinHandle<()>>>,
 }
 
 /// Who looks on.
@@ -137,17 +136,23 @@ impl Live {
         // Before anybody can ask: the first page is told of what is shown.
         manager.show(first, None);
         let manager = Builder::new().name("palpate stage".into()).spawn(move || manager.run(&asked))?;
-        let manager = Some(manager);
+        let manager = Mutex::new(Some(manager));
         Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, manager })
+    }
+
+    /// End what runs. When this is back its log is whole.
+    pub fn end(&self) {
+        let _ = self.commands.send(Command::End);
+        let manager = self.manager.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(manager) = manager {
+            let _ = manager.join();
+        }
     }
 }
 
 impl Drop for Live {
     fn drop(&mut self) {
-        let _ = self.commands.send(Command::End);
-        if let Some(manager) = self.manager.take() {
-            let _ = manager.join();
-        }
+        self.end();
     }
 }
 
@@ -162,7 +167,7 @@ impl Shown {
 struct Running {
     stop: Arc<AtomicBool>,
     steps: Arc<AtomicU64>,
-    thread: JoinHandle<Option<State>>,
+    thread: JoinHandle<Option<Vec<ObjectMotion>>>,
     pointing: JoinHandle<()>,
     timing: Timing,
     listener: CycleListener,
@@ -216,8 +221,8 @@ impl Manager {
                 }
                 match self.workshop.change(&rules) {
                     Ok(stage) => {
-                        let state = self.stop().filter(|_| stage.goes_on());
-                        self.show(stage, state);
+                        let from = self.stop().filter(|_| stage.goes_on());
+                        self.show(stage, from);
                     }
                     Err(text) => self.say(&Answer::Error { text: &text }),
                 }
@@ -272,18 +277,23 @@ impl Manager {
         let _ = self.events.send(answer.text().into());
     }
 
-    /// End what runs; gives the state that it ended with.
-    fn stop(&mut self) -> Option<State> {
+    fn page_teller(&self) -> PageTeller {
+        let events = self.events.clone();
+        Arc::new(move |text| drop(events.send(Answer::Error { text }.text().into())))
+    }
+
+    /// End what runs; gives how its objects moved.
+    fn stop(&mut self) -> Option<Vec<ObjectMotion>> {
         let Running { stop, thread, pointing, .. } = self.running.take()?;
         stop.store(true, Ordering::Release);
-        let state = thread.join().ok().flatten();
+        let motions = thread.join().ok().flatten();
         let _ = pointing.join();
         *lock(&self.pointers) = Pointers::default();
-        state
+        motions
     }
 
     /// Run a scene, from its start or from where another has ended.
-    fn show(&mut self, stage: Stage, from: Option<State>) {
+    fn show(&mut self, stage: Stage, from: Option<Vec<ObjectMotion>>) {
         let generation = self.shown.borrow().generation + 1;
         let state =
             from.map_or_else(|| State::new(&stage.model), |from| State::going_on(&stage.model, &from));
@@ -325,6 +335,10 @@ impl Manager {
             let mover = mover.clone();
             Box::new(move |t: f64| mover(t)) as Mover
         });
+        let log = stage.log.as_ref().map(|open| open(&state, self.page_teller()));
+        let log = log.and_then(|log| {
+            log.map_err(|text| self.say(&Answer::Error { text: &format!("there is no log: {text}") })).ok()
+        });
         let (teller, listener) = cycles(CYCLES);
         let start = Instant::now();
         let session = Session {
@@ -354,8 +368,14 @@ impl Manager {
         let mut maker = PictureMaker::new(model, generation);
         let force = move || {
             let show = |moment: &Moment| screens.show(&mut maker, moment);
-            match session.run::<Cursor<Vec<u8>>>(None, &stopped, &counted, show) {
-                Ok((Report { state, .. }, _)) => Some(state),
+            match session.run(log, &stopped, &counted, show) {
+                Ok((Report { state, log, .. }, out)) => {
+                    // What could not be written has been told by who opened it.
+                    if let (Some(Ok(file)), Some(summary)) = (out, log) {
+                        file.finish(summary);
+                    }
+                    Some(state.motions())
+                }
                 Err(error) => {
                     let _ = events.send(Answer::Error { text: &error.to_string() }.text().into());
                     None

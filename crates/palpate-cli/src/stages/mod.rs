@@ -6,6 +6,7 @@ mod built_in;
 mod recipe;
 
 use crate::Failure;
+use crate::logs::{LogSeries, LoggedScene};
 use crate::scene_file::{self, Carried, Pace, RealDevice, Scene};
 use crate::verbs::inspect::certificate_lines;
 use crate::verbs::read_recording;
@@ -37,6 +38,8 @@ pub struct Stages {
     cache: PathBuf,
     /// Paths and meshes while the viewer is served; and the cache where there is no other.
     folder: TempDir,
+    /// Where what happens is logged, if it is.
+    logs: Option<Arc<LogSeries>>,
     current: Mutex<Current>,
 }
 
@@ -55,12 +58,12 @@ struct Current {
 }
 
 impl Stages {
-    /// With recordings kept in a folder, or the user's cache.
-    pub fn new(cache: Option<&Path>) -> Result<Self, Failure> {
+    /// With recordings kept in a folder, or the user's cache; and with logs, if there are to be some.
+    pub fn new(cache: Option<&Path>, logs: Option<Arc<LogSeries>>) -> Result<Self, Failure> {
         let folder =
             TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the viewer: {e}")))?;
         let cache = cache_folder(cache).unwrap_or_else(|| folder.path().to_path_buf());
-        Ok(Self { cache, folder, current: Mutex::default() })
+        Ok(Self { cache, folder, logs, current: Mutex::default() })
     }
 
     /// A scene file.
@@ -95,12 +98,12 @@ impl Stages {
             let text = current.text.to_string();
             scene = scene_file::read_text(&current.path, &text, &Carried::new(), Pace::RealTime)?;
         }
-        let stage = self.stage(&mut current, scene);
+        let stage = self.stage(&mut current, scene)?;
         *self.lock() = current;
         Ok(stage)
     }
 
-    fn stage(&self, current: &mut Current, scene: Scene) -> Stage {
+    fn stage(&self, current: &mut Current, scene: Scene) -> Result<Stage, Failure> {
         let objects = current.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
         let files = objects.iter().map(|object| {
             let file = object.get("recording").and_then(Value::as_str).unwrap_or_default();
@@ -115,7 +118,9 @@ impl Stages {
             }
             current.recipes.contains_key(file)
         });
-        Stage {
+        let logged = || LoggedScene::new(&scene, Some(current.text.to_string()));
+        let log = self.logs.as_ref().map(|logs| logs.opener(logged())).transpose()?;
+        Ok(Stage {
             description,
             model: scene.model.clone(),
             devices: scene.devices.iter().map(stage_device).collect(),
@@ -127,7 +132,8 @@ impl Stages {
                     Arc::new(move |t: f64| obstacle.at(t)) as palpate_viewer::StageMover
                 })
                 .collect(),
-        }
+            log,
+        })
     }
 
     fn open_built_in(&self, id: &str, tell: Tell) -> Result<Stage, Failure> {

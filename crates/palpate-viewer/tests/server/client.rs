@@ -59,6 +59,7 @@ pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
         model,
         devices: vec![StageDevice::Pointer; 2],
         movers: vec![Arc::new(move |_: f64| floor)],
+        log: None,
     }
 }
 
