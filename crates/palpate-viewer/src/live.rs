@@ -40,6 +40,7 @@ pub(crate) enum Command {
     Reset,
     Rules(Rules),
     Material(usize, MaterialDescription),
+    /// From whoever has claimed the job.
     Record(Upload),
     /// What a job has made.
     Made(Result<Box<Stage>, String>),
@@ -66,6 +67,8 @@ pub(crate) struct Live {
     pub pointers: Arc<Mutex<Pointers>>,
     pub playback: Arc<Playback>,
     pub viewers: Arc<Viewers>,
+    /// Whether a job is under way.
+    busy: Arc<AtomicBool>,
     manager: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -75,6 +78,13 @@ pub(crate) struct Viewers {
     pub all: AtomicUsize,
     /// Those who want whole surfaces.
     pub vertices: AtomicUsize,
+}
+
+/// What is said when another job is under way.
+pub(crate) const BUSY: &str = "a recording is under way: ask again when it is done";
+
+fn claim(busy: &AtomicBool) -> bool {
+    !busy.swap(true, Ordering::AcqRel)
 }
 
 /// Whatever a thread did while it held the lock, pointers are still pointers.
@@ -120,6 +130,7 @@ impl Live {
         let viewers = Arc::new(Viewers::default());
         let pointers: Arc<Mutex<Pointers>> = Arc::default();
         let playback: Arc<Playback> = Arc::default();
+        let busy: Arc<AtomicBool> = Arc::default();
         let (shown_in, shown) = watch::channel(Arc::new(Shown::new(0, first.clone())));
         let mut manager = Manager {
             workshop,
@@ -131,13 +142,18 @@ impl Live {
             pointers: pointers.clone(),
             playback: playback.clone(),
             running: None,
-            busy: false,
+            busy: busy.clone(),
         };
         // Before anybody can ask: the first page is told of what is shown.
         manager.show(first, None);
         let manager = Builder::new().name("palpate stage".into()).spawn(move || manager.run(&asked))?;
         let manager = Mutex::new(Some(manager));
-        Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, manager })
+        Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, busy, manager })
+    }
+
+    /// Claim the one long job that there can be at a time; says whether it was free.
+    pub fn claim(&self) -> bool {
+        claim(&self.busy)
     }
 
     /// End what runs. When this is back its log is whole.
@@ -183,8 +199,7 @@ struct Manager {
     pointers: Arc<Mutex<Pointers>>,
     playback: Arc<Playback>,
     running: Option<Running>,
-    /// Whether a job is under way.
-    busy: bool,
+    busy: Arc<AtomicBool>,
 }
 
 impl Manager {
@@ -205,6 +220,9 @@ impl Manager {
 
     fn obey(&mut self, command: Command) {
         match command {
+            Command::Open(_) | Command::Material(..) if !claim(&self.busy) => {
+                self.say(&Answer::Error { text: BUSY });
+            }
             Command::Open(id) => self.begin_job("scene", move |workshop, tell| workshop.open(&id, tell)),
             Command::Material(object, material) => self.begin_job("material", move |workshop, tell| {
                 workshop.change_material(object, material, tell)
@@ -213,7 +231,7 @@ impl Manager {
                 self.begin_job("mesh", move |workshop, tell| workshop.record(upload, tell));
             }
             Command::Rules(rules) => {
-                if self.busy {
+                if self.busy.load(Ordering::Acquire) {
                     self.say(&Answer::Error {
                         text: "a recording is under way: change this when it is done",
                     });
@@ -233,7 +251,7 @@ impl Manager {
                 self.show(stage, None);
             }
             Command::Made(made) => {
-                self.busy = false;
+                self.busy.store(false, Ordering::Release);
                 match made {
                     Ok(stage) => {
                         self.stop();
@@ -247,16 +265,12 @@ impl Manager {
         }
     }
 
-    /// Do what may take long on a thread of its own, one at a time; the scene goes on meanwhile.
+    /// Do what may take long, and was claimed, on a thread of its own; the scene goes on meanwhile.
     fn begin_job(
         &mut self,
         job: &'static str,
         make: impl FnOnce(&dyn Workshop, crate::stage::Tell) -> Result<Stage, String> + Send + 'static,
     ) {
-        if self.busy {
-            self.say(&Answer::Error { text: "a recording is under way: ask again when it is done" });
-            return;
-        }
         let (workshop, events, commands) =
             (self.workshop.clone(), self.events.clone(), self.commands.clone());
         let work = move || {
@@ -267,9 +281,9 @@ impl Manager {
             progress("", Some(1.0), true);
             let _ = commands.send(Command::Made(made.map(Box::new)));
         };
-        match Builder::new().name(format!("palpate {job}")).spawn(work) {
-            Ok(_) => self.busy = true,
-            Err(error) => self.say(&Answer::Error { text: &format!("cannot start a thread: {error}") }),
+        if let Err(error) = Builder::new().name(format!("palpate {job}")).spawn(work) {
+            self.busy.store(false, Ordering::Release);
+            self.say(&Answer::Error { text: &format!("cannot start a thread: {error}") });
         }
     }
 

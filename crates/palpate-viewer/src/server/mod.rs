@@ -350,6 +350,9 @@ async fn record(State(hall): State<Arc<Hall>>, Query(wish): Query<RecordWish>, r
         material: MaterialDescription { young: wish.young, poisson: wish.poisson, density: wish.density },
         modes: wish.modes.unwrap_or(MODES).clamp(1, MOST_MODES),
     };
+    if !live.claim() {
+        return (StatusCode::CONFLICT, live::BUSY).into_response();
+    }
     match live.commands.send(live::Command::Record(upload)) {
         Ok(()) => StatusCode::ACCEPTED.into_response(),
         Err(_) => StatusCode::SERVICE_UNAVAILABLE.into_response(),

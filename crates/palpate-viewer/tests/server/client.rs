@@ -85,6 +85,9 @@ impl Workshop for OneScene {
     }
 
     fn record(&self, upload: Upload, _: Tell) -> Result<Stage, String> {
+        if upload.name == "slow.msh" {
+            std::thread::sleep(Duration::from_secs(2));
+        }
         Err(format!("{} bytes of {}", upload.bytes.len(), upload.name))
     }
 }
