@@ -9,6 +9,7 @@ use palpate_viewer::{LogFile, LogOpener, PageTeller};
 use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What logs of a scene tell of it.
@@ -117,12 +118,22 @@ impl LogSeries {
         let series = self.clone();
         Ok(Arc::new(move |state, pages| {
             let path = series.next();
-            let begun = WholeFile::create(&path, &scene.inputs()).and_then(|file| {
-                let step_s = scene.model.parameters().step_s;
-                let file = SeriesFile { file, path, step_s, series: series.clone(), pages, failed: false };
-                scene.begin_in(Box::new(file) as Box<dyn LogFile>, state)
+            let begun = Arc::new(AtomicBool::new(false));
+            let file = WholeFile::create(&path, &scene.inputs()).map(|file| SeriesFile {
+                file,
+                path: path.clone(),
+                step_s: scene.model.parameters().step_s,
+                series: series.clone(),
+                pages,
+                begun: begun.clone(),
+                failed: false,
             });
-            begun.map_err(|failure| {
+            let log = file.and_then(|file| {
+                let log = scene.begin_in(Box::new(file) as Box<dyn LogFile>, state);
+                log.map_err(|failure| Failure(format!("{}: {failure}", path.display())))
+            });
+            begun.store(true, Ordering::Relaxed);
+            log.map_err(|failure| {
                 series.note_failure(&failure.0);
                 failure.0
             })
@@ -158,13 +169,16 @@ struct SeriesFile {
     step_s: f64,
     series: Arc<LogSeries>,
     pages: PageTeller,
+    /// Until then whoever begins it tells what fails.
+    begun: Arc<AtomicBool>,
     failed: bool,
 }
 
 impl SeriesFile {
     /// Tell of the first failure at once: the scene goes on, and nobody would know.
     fn watch<T>(&mut self, done: std::io::Result<T>) -> std::io::Result<T> {
-        if let (Err(error), false) = (&done, self.failed) {
+        let silent = self.failed || !self.begun.load(Ordering::Relaxed);
+        if let (Err(error), false) = (&done, silent) {
             self.failed = true;
             let text = format!("cannot write the log {}: {error}", self.path.display());
             self.series.note_failure(&text);
