@@ -8,6 +8,7 @@ mod drawing;
 mod failure;
 mod log_shows;
 mod logged_run;
+mod logs;
 mod outputs;
 mod plot;
 mod progress;

@@ -3,7 +3,6 @@
 use crate::Failure;
 use crate::logged_run::LoggedRun;
 use crate::stages::describe;
-use palpate::State;
 use palpate_haptics::Moment;
 use palpate_viewer::{LogMaker, LogShow};
 use std::path::Path;
@@ -92,8 +91,8 @@ impl ShownLog {
     pub fn make(self, stop: &AtomicBool) -> Result<(), Failure> {
         let Self { run, wanted, mut maker, .. } = self;
         let model = &run.scene.model;
-        let made = run.input_at_start().and_then(|start| {
-            let mut state = State::new(model);
+        let starts = run.state_at_start().and_then(|state| Ok((state, run.input_at_start()?)));
+        let made = starts.and_then(|(mut state, start)| {
             let mut moment = Moment::new(model, &state, &start);
             if wanted.has(0) {
                 maker.take(&moment);

@@ -42,6 +42,13 @@ impl LoggedRun {
         Ok(Self { path: path.to_path_buf(), bytes, facts, scene, steps, names, modes, _folder: folder })
     }
 
+    /// The scene before the first step: as its file says, or where the one before it went on.
+    pub fn state_at_start(&self) -> Result<State, Failure> {
+        let model = &self.scene.model;
+        let motions = self.reader()?.start(&self.names).map_err(|error| named(&self.path, &error))?;
+        Ok(motions.map_or_else(|| State::new(model), |motions| State::going_on(model, &motions)))
+    }
+
     /// Where devices and obstacles are at the start; of a device without a path that is known from the first step on.
     pub fn input_at_start(&self) -> Result<Input, Failure> {
         let mut input = self.scene.input_at(0.0);

@@ -209,6 +209,11 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     real(a).is_some_and(|a| real(b) == Some(a))
 }
 
+/// Check that an output may be written there, and touch nothing.
+pub fn check_target(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    target(path, inputs).map(drop)
+}
+
 /// Check before long work that an output can be written.
 pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
     WholeFile::create(path, inputs).map(drop)

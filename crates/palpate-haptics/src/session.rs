@@ -95,7 +95,7 @@ pub struct Report {
     pub steps: u64,
     /// Steps in which the contacts of some object could not be solved, or were left out.
     pub unsolved: u64,
-    /// What was logged.
+    /// What was logged, if it could be.
     pub log: Option<LogSummary>,
     /// Wall-clock time [s] that the steps took.
     pub wall_s: f64,
@@ -139,17 +139,17 @@ struct Forces {
 
 impl Session {
     /// Run until the steps are done or `stop` is set. `show` gets what every picture takes, on the deformation process's
-    /// thread; `steps` counts along. Gives back what the log was written to.
+    /// thread; `steps` counts along. Gives back what the log was written to, or why it can't be: the scene goes on without it.
     ///
     /// # Errors
-    /// When the setting is not one, a thread can't be started, or the log can't be written.
+    /// When the setting is not one, or a thread can't be started.
     pub fn run<W: Write + Seek + Send>(
         self,
         log: Option<(LogHand, LogWriter<W>)>,
         stop: &AtomicBool,
         steps: &AtomicU64,
         mut show: impl FnMut(&Moment) + Send,
-    ) -> Result<(Report, Option<W>), Error> {
+    ) -> Result<(Report, Option<Result<W, Error>>), Error> {
         self.check()?;
         let Self { model, start, devices, movers, steps: most, pictures_hz, scheduling, patience_s, .. } =
             self;
@@ -211,9 +211,12 @@ impl Session {
                 .map(|here| if here { updated.next().transpose() } else { Ok(None) })
                 .collect();
             let pictures = join(seeing, "deformation process")?;
-            let written =
-                writing.map(|thread| join(thread, "log").and_then(|written| written)).transpose()?;
-            let (steps, out) = written.unzip();
+            let written = writing.map(|thread| join(thread, "log").and_then(|written| written));
+            let (steps, out) = match written {
+                Some(Ok((steps, out))) => (Some(steps), Some(Ok(out))),
+                Some(Err(error)) => (None, Some(Err(error))),
+                None => (None, None),
+            };
             let report = Report {
                 granted: forces.granted,
                 force: forces.timing,

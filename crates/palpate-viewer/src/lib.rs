@@ -18,7 +18,9 @@ mod wire;
 
 pub use log_show::{LogMaker, LogShow};
 pub use server::{Exhibit, Live, RenderJob, Server, Settings};
-pub use stage::{Opener, Stage, StageDevice, StageMover, Tell, Upload, Workshop};
+pub use stage::{
+    BegunLog, LogFile, LogOpener, Opener, PageTeller, Stage, StageDevice, StageMover, Tell, Upload, Workshop,
+};
 pub use wire::{
     CameraView, CouplingDescription, DeviceDescription, Form, FrameTimes, MaterialDescription,
     ObjectDescription, ObstacleDescription, PictureMaker, RenderWish, Rules, SceneDescription, SceneTitle,

@@ -1,15 +1,14 @@
 //! A scene that runs while it is looked at: one thread manages it, one makes paths of pointers, others do long jobs.
 
 use crate::pointers::Pointers;
-use crate::stage::{Stage, StageDevice, Upload, Workshop};
+use crate::stage::{PageTeller, Stage, StageDevice, Upload, Workshop};
 use crate::wire::{Answer, Form, MaterialDescription, PictureMaker, ProcessTiming, Rules, Status};
 use axum::body::Bytes;
-use palpate::{Input, Model, State};
+use palpate::{Input, Model, ObjectMotion, State};
 use palpate_haptics::{
     Clock, CycleListener, Moment, Mover, Playback, Report, Scheduling, Session, SessionDevice, Timing,
     cycles, port,
 };
-use std::io::Cursor;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -41,6 +40,7 @@ pub(crate) enum Command {
     Reset,
     Rules(Rules),
     Material(usize, MaterialDescription),
+    /// From whoever has claimed the job.
     Record(Upload),
     /// What a job has made.
     Made(Result<Box<Stage>, String>),
@@ -67,7 +67,9 @@ pub(crate) struct Live {
     pub pointers: Arc<Mutex<Pointers>>,
     pub playback: Arc<Playback>,
     pub viewers: Arc<Viewers>,
-    manager: Option<JoinHandle<()>>,
+    /// Whether a job is under way.
+    busy: Arc<AtomicBool>,
+    manager: Mutex<Option<JoinHandle<()>>>,
 }
 
 /// Who looks on.
@@ -76,6 +78,13 @@ pub(crate) struct Viewers {
     pub all: AtomicUsize,
     /// Those who want whole surfaces.
     pub vertices: AtomicUsize,
+}
+
+/// What is said when another job is under way.
+pub(crate) const BUSY: &str = "a recording is under way: ask again when it is done";
+
+fn claim(busy: &AtomicBool) -> bool {
+    !busy.swap(true, Ordering::AcqRel)
 }
 
 /// Whatever a thread did while it held the lock, pointers are still pointers.
@@ -121,6 +130,7 @@ impl Live {
         let viewers = Arc::new(Viewers::default());
         let pointers: Arc<Mutex<Pointers>> = Arc::default();
         let playback: Arc<Playback> = Arc::default();
+        let busy: Arc<AtomicBool> = Arc::default();
         let (shown_in, shown) = watch::channel(Arc::new(Shown::new(0, first.clone())));
         let mut manager = Manager {
             workshop,
@@ -132,22 +142,33 @@ impl Live {
             pointers: pointers.clone(),
             playback: playback.clone(),
             running: None,
-            busy: false,
+            busy: busy.clone(),
         };
         // Before anybody can ask: the first page is told of what is shown.
         manager.show(first, None);
         let manager = Builder::new().name("palpate stage".into()).spawn(move || manager.run(&asked))?;
-        let manager = Some(manager);
-        Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, manager })
+        let manager = Mutex::new(Some(manager));
+        Ok(Self { shown, modal, vertices, events, commands, pointers, playback, viewers, busy, manager })
+    }
+
+    /// Claim the one long job that there can be at a time; says whether it was free.
+    pub fn claim(&self) -> bool {
+        claim(&self.busy)
+    }
+
+    /// End what runs. When this is back its log is whole.
+    pub fn end(&self) {
+        let _ = self.commands.send(Command::End);
+        let manager = self.manager.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(manager) = manager {
+            let _ = manager.join();
+        }
     }
 }
 
 impl Drop for Live {
     fn drop(&mut self) {
-        let _ = self.commands.send(Command::End);
-        if let Some(manager) = self.manager.take() {
-            let _ = manager.join();
-        }
+        self.end();
     }
 }
 
@@ -162,7 +183,7 @@ impl Shown {
 struct Running {
     stop: Arc<AtomicBool>,
     steps: Arc<AtomicU64>,
-    thread: JoinHandle<Option<State>>,
+    thread: JoinHandle<Option<Vec<ObjectMotion>>>,
     pointing: JoinHandle<()>,
     timing: Timing,
     listener: CycleListener,
@@ -178,8 +199,7 @@ struct Manager {
     pointers: Arc<Mutex<Pointers>>,
     playback: Arc<Playback>,
     running: Option<Running>,
-    /// Whether a job is under way.
-    busy: bool,
+    busy: Arc<AtomicBool>,
 }
 
 impl Manager {
@@ -200,6 +220,9 @@ impl Manager {
 
     fn obey(&mut self, command: Command) {
         match command {
+            Command::Open(_) | Command::Material(..) if !claim(&self.busy) => {
+                self.say(&Answer::Error { text: BUSY });
+            }
             Command::Open(id) => self.begin_job("scene", move |workshop, tell| workshop.open(&id, tell)),
             Command::Material(object, material) => self.begin_job("material", move |workshop, tell| {
                 workshop.change_material(object, material, tell)
@@ -208,7 +231,7 @@ impl Manager {
                 self.begin_job("mesh", move |workshop, tell| workshop.record(upload, tell));
             }
             Command::Rules(rules) => {
-                if self.busy {
+                if self.busy.load(Ordering::Acquire) {
                     self.say(&Answer::Error {
                         text: "a recording is under way: change this when it is done",
                     });
@@ -216,8 +239,8 @@ impl Manager {
                 }
                 match self.workshop.change(&rules) {
                     Ok(stage) => {
-                        let state = self.stop().filter(|_| stage.goes_on());
-                        self.show(stage, state);
+                        let from = self.stop().filter(|_| stage.goes_on());
+                        self.show(stage, from);
                     }
                     Err(text) => self.say(&Answer::Error { text: &text }),
                 }
@@ -228,7 +251,7 @@ impl Manager {
                 self.show(stage, None);
             }
             Command::Made(made) => {
-                self.busy = false;
+                self.busy.store(false, Ordering::Release);
                 match made {
                     Ok(stage) => {
                         self.stop();
@@ -242,16 +265,12 @@ impl Manager {
         }
     }
 
-    /// Do what may take long on a thread of its own, one at a time; the scene goes on meanwhile.
+    /// Do what may take long, and was claimed, on a thread of its own; the scene goes on meanwhile.
     fn begin_job(
         &mut self,
         job: &'static str,
         make: impl FnOnce(&dyn Workshop, crate::stage::Tell) -> Result<Stage, String> + Send + 'static,
     ) {
-        if self.busy {
-            self.say(&Answer::Error { text: "a recording is under way: ask again when it is done" });
-            return;
-        }
         let (workshop, events, commands) =
             (self.workshop.clone(), self.events.clone(), self.commands.clone());
         let work = move || {
@@ -262,9 +281,9 @@ impl Manager {
             progress("", Some(1.0), true);
             let _ = commands.send(Command::Made(made.map(Box::new)));
         };
-        match Builder::new().name(format!("palpate {job}")).spawn(work) {
-            Ok(_) => self.busy = true,
-            Err(error) => self.say(&Answer::Error { text: &format!("cannot start a thread: {error}") }),
+        if let Err(error) = Builder::new().name(format!("palpate {job}")).spawn(work) {
+            self.busy.store(false, Ordering::Release);
+            self.say(&Answer::Error { text: &format!("cannot start a thread: {error}") });
         }
     }
 
@@ -272,18 +291,23 @@ impl Manager {
         let _ = self.events.send(answer.text().into());
     }
 
-    /// End what runs; gives the state that it ended with.
-    fn stop(&mut self) -> Option<State> {
+    fn page_teller(&self) -> PageTeller {
+        let events = self.events.clone();
+        Arc::new(move |text| drop(events.send(Answer::Error { text }.text().into())))
+    }
+
+    /// End what runs; gives how its objects moved.
+    fn stop(&mut self) -> Option<Vec<ObjectMotion>> {
         let Running { stop, thread, pointing, .. } = self.running.take()?;
         stop.store(true, Ordering::Release);
-        let state = thread.join().ok().flatten();
+        let motions = thread.join().ok().flatten();
         let _ = pointing.join();
         *lock(&self.pointers) = Pointers::default();
-        state
+        motions
     }
 
     /// Run a scene, from its start or from where another has ended.
-    fn show(&mut self, stage: Stage, from: Option<State>) {
+    fn show(&mut self, stage: Stage, from: Option<Vec<ObjectMotion>>) {
         let generation = self.shown.borrow().generation + 1;
         let state =
             from.map_or_else(|| State::new(&stage.model), |from| State::going_on(&stage.model, &from));
@@ -325,6 +349,10 @@ impl Manager {
             let mover = mover.clone();
             Box::new(move |t: f64| mover(t)) as Mover
         });
+        let log = stage.log.as_ref().map(|open| open(&state, self.page_teller()));
+        let log = log.and_then(|log| {
+            log.map_err(|text| self.say(&Answer::Error { text: &format!("there is no log: {text}") })).ok()
+        });
         let (teller, listener) = cycles(CYCLES);
         let start = Instant::now();
         let session = Session {
@@ -354,8 +382,14 @@ impl Manager {
         let mut maker = PictureMaker::new(model, generation);
         let force = move || {
             let show = |moment: &Moment| screens.show(&mut maker, moment);
-            match session.run::<Cursor<Vec<u8>>>(None, &stopped, &counted, show) {
-                Ok((Report { state, .. }, _)) => Some(state),
+            match session.run(log, &stopped, &counted, show) {
+                Ok((Report { state, log, .. }, out)) => {
+                    // What could not be written has been told by who opened it.
+                    if let (Some(Ok(file)), Some(summary)) = (out, log) {
+                        file.finish(summary);
+                    }
+                    Some(state.motions())
+                }
                 Err(error) => {
                     let _ = events.send(Answer::Error { text: &error.to_string() }.text().into());
                     None

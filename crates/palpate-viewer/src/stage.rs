@@ -1,8 +1,10 @@
 //! A scene that can be run, and whoever makes such scenes.
 
 use crate::wire::{MaterialDescription, Rules, SceneDescription, SceneTitle};
-use palpate::{DeviceMode, Model, Pose};
+use palpate::{DeviceMode, Model, Pose, State};
+use palpate_haptics::log::{LogHand, LogSummary, LogWriter};
 use palpate_haptics::{Attached, MotionPath};
+use std::io::{Seek, Write};
 use std::sync::Arc;
 
 /// Where an obstacle is at a time of the simulation [s]. It must not allocate.
@@ -10,6 +12,21 @@ pub type StageMover = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
 
 /// Opens a device; it is asked again when the scene begins anew.
 pub type Opener = Arc<dyn Fn() -> Result<Attached, String> + Send + Sync>;
+
+/// Where a log goes. If it is dropped before it is finished, there is none.
+pub trait LogFile: Write + Seek + Send {
+    /// All is written: keep it.
+    fn finish(self: Box<Self>, summary: LogSummary);
+}
+
+/// Tells all pages of an error.
+pub type PageTeller = Arc<dyn Fn(&str) + Send + Sync>;
+
+/// Both ends of a log that has begun.
+pub type BegunLog = (LogHand, LogWriter<Box<dyn LogFile>>);
+
+/// Begins a log of a scene from a state; it is asked again when the scene begins anew. Pages can be told what goes wrong later.
+pub type LogOpener = Arc<dyn Fn(&State, PageTeller) -> Result<BegunLog, String> + Send + Sync>;
 
 /// A scene that can be run as often as one likes.
 #[derive(Clone)]
@@ -22,6 +39,8 @@ pub struct Stage {
     pub devices: Vec<StageDevice>,
     /// One for each obstacle.
     pub movers: Vec<StageMover>,
+    /// Where what happens is logged, if it is.
+    pub log: Option<LogOpener>,
 }
 
 /// Who moves a device.

@@ -56,7 +56,8 @@ pub use scene::{
 };
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
 pub use state::{
-    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, State, StepStatus,
+    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectMotion, ObjectOutput, Output, State,
+    StepStatus,
 };
 pub use step::step;
 pub use surface::{Surface, SurfacePoint};

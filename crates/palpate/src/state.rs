@@ -144,6 +144,19 @@ pub struct Output {
     pub status: StepStatus,
 }
 
+/// How an object is placed, moves and is deformed: what a scene can begin with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectMotion {
+    /// Placement.
+    pub pose: Pose,
+    /// Velocity.
+    pub twist: Twist,
+    /// Angular momentum about the centre of mass [kg·m²/s, world]: the velocity follows from it but for rounding.
+    pub angular_momentum: DVec3,
+    /// Its modes; none where a table is used.
+    pub modes: Vec<Oscillation>,
+}
+
 /// One object in motion.
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectState {
@@ -251,29 +264,39 @@ impl State {
         }
     }
 
-    /// The scene where another state of the same objects is: placed, moving and deformed alike, with nothing in contact yet, at
-    /// time 0 with a ledger of its own. So a scene goes on under other rules: another step, gravity, friction. Objects
-    /// with other modes, or tables, begin where the model says.
-    pub fn going_on(model: &Model, from: &Self) -> Self {
+    /// The scene where its objects are as they were in another state: placed, moving and deformed alike, with nothing in contact
+    /// yet, at time 0 with a ledger of its own. So a scene goes on under other rules: another step, gravity, friction.
+    /// Objects with other modes, or tables, begin where the model says.
+    pub fn going_on(model: &Model, from: &[ObjectMotion]) -> Self {
         let mut state = Self::new(model);
         let gravity = model.parameters.gravity;
-        let pairs = state.objects.iter_mut().zip(&model.objects).zip(&from.objects);
+        let pairs = state.objects.iter_mut().zip(&model.objects).zip(from);
         for (at, ((own, object), before)) in pairs.enumerate() {
-            if !own.response.go_on_from(&before.response) {
+            if !own.response.go_on_from(&before.modes) {
                 continue;
             }
-            own.rigid = before.rigid;
+            let ObjectMotion { pose, twist, angular_momentum, .. } = *before;
+            own.rigid = RigidState { pose, velocity: twist.linear, angular_momentum };
             let still = RigidStep { end: own.rigid, turn: DVec3::ZERO, miss: 0.0 };
             (own.free, own.end) = (still, still);
             own.weigh(object, gravity);
             own.stored_at_start = own.ledger.stored();
-            let output = &mut state.output.objects[at];
-            (output.pose, output.twist) = (before.rigid.pose, from.output.objects[at].twist);
-            output.energy = own.ledger;
+            state.output.objects[at] = ObjectOutput { pose, twist, energy: own.ledger };
         }
         state.output.energy =
             state.objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));
         state
+    }
+
+    /// How its objects move at the end of the last step, in the model's order.
+    pub fn motions(&self) -> Vec<ObjectMotion> {
+        let motion = |(own, output): (&ObjectState, &ObjectOutput)| ObjectMotion {
+            pose: own.rigid.pose,
+            twist: Twist { linear: own.rigid.velocity, ..output.twist },
+            angular_momentum: own.rigid.angular_momentum,
+            modes: own.response.modes().to_vec(),
+        };
+        self.objects.iter().zip(&self.output.objects).map(motion).collect()
     }
 
     /// The output of the last step; before the first, the scene at its start.

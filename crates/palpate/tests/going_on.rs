@@ -45,7 +45,7 @@ fn away() -> Input {
 fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let mut state = pulled(&model);
-    let mut other = State::going_on(&model, &state);
+    let mut other = State::going_on(&model, &state.motions());
     assert_eq!(other.output().objects[0].pose, state.output().objects[0].pose);
     assert_eq!(other.modal_state(0), state.modal_state(0));
     for _ in 0..200 {
@@ -57,11 +57,23 @@ fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
 }
 
 #[test]
+fn a_scene_at_its_start_goes_on_as_itself() {
+    let model = model(1e-3, DVec3::Y * -9.81);
+    let start = State::new(&model);
+    let mut other = State::going_on(&model, &start.motions());
+    assert_eq!((other.output(), other.motions()), (start.output(), start.motions()));
+    let mut state = start;
+    for _ in 0..100 {
+        assert_eq!(step(&model, &mut state, &away()), step(&model, &mut other, &away()));
+    }
+}
+
+#[test]
 fn under_other_rules_it_keeps_its_motion_and_its_energy_but_for_gravity() {
     let before = model(1e-3, DVec3::ZERO);
     let state = pulled(&before);
     let after = model(5e-4, DVec3::X * 3.0);
-    let mut other = State::going_on(&after, &state);
+    let mut other = State::going_on(&after, &state.motions());
     let (old, new) = (state.output(), other.output().clone());
     assert_eq!((old.objects[0].pose, old.objects[0].twist), (new.objects[0].pose, new.objects[0].twist));
     assert_eq!(old.energy.kinetic, new.energy.kinetic);

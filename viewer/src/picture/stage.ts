@@ -11,6 +11,12 @@ import { CalmRange } from "./scale";
 import { World, type Loaded, type Look } from "./world";
 
 const MEASURE_EVERY_S = 0.15;
+// Views up to this width have no room beside what they show, and below it only from this height per width on [pixels].
+const NARROW = 480;
+const ROOM_BELOW = 1.3;
+// A caption, the arrows' scale, and the colour bar [pixels].
+const HEAD = 62;
+const HEAD_WITH_BAR = 116;
 
 export interface StageSize {
   width: number;
@@ -111,6 +117,13 @@ export class Stage {
       : { x: 0, y: Math.round((index * height) / count), width, height: Math.round(height / count) };
   }
 
+  /** The part of a view that scales are written at the foot of: all of it; its head where two narrow ones leave no room below. */
+  legendOf(index: number): Rectangle {
+    const view = this.viewOf(index);
+    if (this.worlds.length < 2 || view.width > NARROW || view.height > ROOM_BELOW * view.width) return view;
+    return { ...view, height: index === 0 ? HEAD_WITH_BAR : HEAD };
+  }
+
   redraw(): void {
     this.stale = true;
   }
@@ -139,12 +152,13 @@ export class Stage {
       const about = this.worlds.flatMap((world) => world.objects.map((object) => object.displacementAbout));
       this.ranges.displacement.take(Math.max(0, ...about), now);
     }
-    this.worlds.forEach((world, i) => this.drawWorld(world, this.viewOf(i), i === 0));
+    this.worlds.forEach((world, i) => this.drawWorld(world, i));
     this.measure(now);
   }
 
-  private drawWorld(world: World, view: Rectangle, first: boolean): void {
+  private drawWorld(world: World, index: number): void {
     const { pen, renderer, palette, size, look } = this;
+    const view = this.viewOf(index);
     const camera = this.orbit.camera;
     renderer.setScissorTest(false);
     world.dress(look, this.colourRange);
@@ -156,12 +170,13 @@ export class Stage {
     renderer.render(world.scene, camera);
 
     // All share one scale.
-    const bar = !first ? 0 : drawColourBar(pen, look.colour, this.colourRange, view, palette);
+    const legend = this.legendOf(index);
+    const bar = index > 0 ? 0 : drawColourBar(pen, look.colour, this.colourRange, legend, palette);
     if (look.arrows && world.labels.length > 0) {
       const pixels = (world.longestArrow / this.orbit.heightAt(camera.position.distanceTo(world.center))) * view.height;
-      drawArrowScale(pen, world.forceRange.value, pixels, view, bar, palette);
+      drawArrowScale(pen, world.forceRange.value, pixels, legend, bar, palette);
     }
-    const keepOut = [{ x: view.x, y: view.y + view.height - bar - 26, width: 260, height: bar + 26 }];
+    const keepOut = [{ x: view.x, y: legend.y + legend.height - bar - 26, width: 260, height: bar + 26 }];
     drawLabels(pen, world.labels, camera, view, palette, keepOut);
     if (this.writesTime) drawTime(pen, world.picture?.time ?? 0, world.info.title, view, palette);
     this.drawOver?.(pen, view);

@@ -61,6 +61,19 @@ export const logCases = [
         await page.waitForTimeout(500);
         const times = await page.evaluate(() => window.palpate.stage.worlds.map((w) => w.picture.time));
         assert(times[0] === times[1], `times ${times}`);
+        const lies = await page.evaluate(() => {
+          const { stage } = window.palpate;
+          const { x, y, height } = stage.legendOf(0);
+          const bar = { right: x + 190, top: y + height - 54, bottom: y + height };
+          const [object] = stage.worlds[0].objects;
+          const places = object.currentPlaces(stage.renderer);
+          for (let i = 0; i < places.length; i += 3) {
+            const at = stage.toStage(object.group.localToWorld(stage.orbit.camera.position.clone().fromArray(places, i)));
+            if (at.x < bar.right && at.y > bar.top && at.y < bar.bottom) return `the object lies under the colour bar at ${at.x}, ${at.y}`;
+          }
+          return "";
+        });
+        assert(lies === "", lies);
         await shot(page, `logs-${name}`);
         quiet(page);
       }

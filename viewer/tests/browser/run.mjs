@@ -15,9 +15,9 @@ const cases = [...liveCases, ...touchCases, ...shapeCases, ...logCases].filter((
 
 const browser = await Browser.open();
 let failed = 0;
-for (const { name, run, standinOnly } of cases) {
-  if (standinOnly && real) {
-    console.log(`skipped  ${name} (needs the stand-in)`);
+for (const { name, run, standinOnly, realOnly } of cases) {
+  if (real ? standinOnly : realOnly) {
+    console.log(`skipped  ${name} (needs the ${real ? "stand-in" : "real server"})`);
     continue;
   }
   const began = performance.now();

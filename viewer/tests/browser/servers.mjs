@@ -16,8 +16,9 @@ async function freePort() {
   });
 }
 
-async function serveReally(port) {
-  const child = spawn(process.env.PALPATE, ["serve", "--scene", "bounce", "--listen", `127.0.0.1:${port}`, "--no-browser"], {
+async function serveReally(port, log) {
+  const logged = log === undefined ? [] : ["--log", log];
+  const child = spawn(process.env.PALPATE, ["serve", "--scene", "bounce", "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
     stdio: ["ignore", "pipe", "pipe"],
   });
   let said = "";
@@ -28,7 +29,7 @@ async function serveReally(port) {
     const url = said.match(/https?:\/\/[^\s"']+/)?.[0];
     if (url !== undefined) {
       const answers = await fetch(url).then((response) => response.ok).catch(() => false);
-      const end = () => new Promise((done) => (child.once("exit", done), child.kill("SIGTERM")));
+      const end = () => new Promise((done) => (child.once("exit", done), child.kill("SIGINT")));
       if (answers) return { url, end };
     }
     if (child.exitCode !== null || Date.now() > deadline) throw new Error(`palpate serve did not begin:\n${said}`);
@@ -36,15 +37,15 @@ async function serveReally(port) {
   }
 }
 
-/** `port`: the one from before, for a server that comes back. */
+/** `port`: the one from before, for a server that comes back. `log`: where the real one logs what happens. */
 export async function start(options = {}) {
   const port = options.port ?? (await freePort());
   if (!process.env.PALPATE) return serve({ ...options, port });
-  const behind = await serveReally(port);
+  const behind = await serveReally(port, options.log);
   if (await hasPage(behind.url)) return { url: behind.url, port, close: behind.end };
   await behind.end();
   const inner = await freePort();
-  const { url, end } = await serveReally(inner);
+  const { url, end } = await serveReally(inner, options.log);
   const front = await stand(url, port);
   return { url: front.url, port, close: async () => (await front.close(), await end()) };
 }

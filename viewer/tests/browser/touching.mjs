@@ -1,5 +1,9 @@
 // Touching: mouse, fingers, keyboard.
 
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { assert, atRest, loaded, newest, quiet, shot, whereIs } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
@@ -89,6 +93,44 @@ export const touchCases = [
       assert(Math.hypot(...from.map((v, k) => v - to[k])) > 0.02, "the view does not turn");
       assert((await newest(page)).devices.every((d) => d.doing === "away"), "turning the view touched something");
       quiet(page);
+    },
+  },
+  {
+    name: "what the mouse does is logged, and comes out again bit for bit",
+    realOnly: true,
+    async run(browser) {
+      const folder = mkdtempSync(join(tmpdir(), "palpate-"));
+      const [log, csv] = [join(folder, "mouse.mcap"), join(folder, "steps.csv")];
+      const server = await start({ log });
+      let done = server.close;
+      try {
+        const page = await browser.page(server.url);
+        await loaded(page);
+        await atRest(page);
+        const { x, y } = await whereIs(page, 0, 0.2);
+        await page.mouse.move(x, y);
+        await page.mouse.down();
+        await pressed(page);
+        await page.mouse.move(x + 60, y, { steps: 8 });
+        await page.waitForTimeout(500);
+        await page.mouse.up();
+        await away(page);
+        quiet(page);
+        done = async () => undefined;
+        await server.close();
+        const summary = JSON.parse(execFileSync(process.env.PALPATE, ["replay", log, "--csv", csv, "--json"]).toString());
+        assert(summary.replayed.identical, JSON.stringify(summary));
+        const [header, ...rows] = readFileSync(csv, "utf8").trim().split("\n").map((line) => line.split(","));
+        const at = (row, part) => ["x", "y", "z"].map((axis) => Number(row[header.indexOf(`finger1.${part}${axis}`)]));
+        const presses = rows.filter((row) => Math.hypot(...at(row, "f")) > 0.02);
+        assert(presses.length > 100, `${presses.length} steps with force`);
+        const [first, last] = [at(presses[0], ""), at(presses[presses.length - 1], "")];
+        const way = Math.hypot(...first.map((x, k) => x - last[k]));
+        assert(way > 0.005, `the finger goes ${way} m`);
+      } finally {
+        await done();
+        rmSync(folder, { recursive: true });
+      }
     },
   },
   {

@@ -3,7 +3,7 @@
 use crate::Failure;
 use crate::scene_file::Scene;
 use glam::DVec3;
-use palpate::{Input, Output, Pose};
+use palpate::{DeviceMode, Input, Output, Pose};
 
 /// A stretch of time, and frames in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +86,12 @@ impl Frame<'_> {
     pub fn tip(&self, device: usize) -> DVec3 {
         let started = self.output.time_s > 0.0;
         if started { self.output.devices[device].proxy } else { self.input.devices[device].position }
+    }
+
+    /// Whether a device is there: a pointer that nobody holds is nowhere, others wait where they are.
+    pub fn shows(&self, device: usize) -> bool {
+        let is_away = self.input.devices[device].mode == DeviceMode::Away;
+        !(self.scene.devices[device].pointer && is_away)
     }
 
     /// Where an obstacle is.

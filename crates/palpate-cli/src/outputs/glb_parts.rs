@@ -27,6 +27,8 @@ pub struct Track {
     node: usize,
     /// Where it was, frame by frame.
     pub poses: Vec<Pose>,
+    /// Whether it was there, where it comes and goes.
+    pub there: Vec<bool>,
 }
 
 /// The world's node: y is up in glTF, and here the way against gravity; y as it is without gravity.
@@ -48,7 +50,7 @@ pub fn rigid(glb: &mut Glb, name: &str, surface: &Solid, look: ([f32; 3], bool))
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": material });
     let mesh = glb.content.mesh(json!({ "name": name, "primitives": [primitive] }));
     let node = glb.content.child(json!({ "name": name, "mesh": mesh }));
-    Ok(Track { node, poses: Vec::new() })
+    Ok(Track { node, ..Track::default() })
 }
 
 impl Deforming {
@@ -77,7 +79,7 @@ impl Deforming {
             primitive,
             targets: Vec::new(),
             names: Vec::new(),
-            track: Track { node, poses: Vec::new() },
+            track: Track { node, ..Track::default() },
         })
     }
 
@@ -138,19 +140,30 @@ impl Animation {
         node: usize,
         property: &str,
         values: impl Iterator<Item = f32>,
-        (kind, components): (&str, usize),
+        form: (&str, usize),
+    ) {
+        self.sampled(glb, node, property, values, (form, "LINEAR"));
+    }
+
+    fn sampled(
+        &mut self,
+        glb: &mut Glb,
+        node: usize,
+        property: &str,
+        values: impl Iterator<Item = f32>,
+        ((kind, components), between): ((&str, usize), &str),
     ) {
         let output = glb.values(values, kind, components);
         self.channels.push(json!({
             "sampler": self.samplers.len(), "target": { "node": node, "path": property },
         }));
-        self.samplers.push(json!({ "input": self.times, "output": output, "interpolation": "LINEAR" }));
+        self.samplers.push(json!({ "input": self.times, "output": output, "interpolation": between }));
     }
 
     /// Let a node be where it was; what does not move is put there.
     pub fn track(&mut self, glb: &mut Glb, track: &Track) {
         let Some(first) = track.poses.first() else { return };
-        let Track { node, poses } = track;
+        let Track { node, poses, there } = track;
         let node_json = &mut glb.content.nodes[*node];
         node_json["translation"] = json!(first.position.to_array());
         node_json["rotation"] = json!(first.orientation.to_array());
@@ -161,6 +174,12 @@ impl Animation {
         if poses.iter().any(|pose| pose.orientation != first.orientation) {
             let values = the_short_way(poses).flat_map(|q| q.to_array()).map(|v| v as f32);
             self.channel(glb, *node, "rotation", values, ("VEC4", 4));
+        }
+        // Without size it is not drawn.
+        let size = |there: &bool| [if *there { 1.0 } else { 0.0 }; 3];
+        if let Some(first) = there.first().filter(|_| there.contains(&false)) {
+            glb.content.nodes[*node]["scale"] = json!(size(first));
+            self.sampled(glb, *node, "scale", there.iter().flat_map(size), (("VEC3", 3), "STEP"));
         }
     }
 

@@ -90,6 +90,7 @@ impl GlbScene {
         }
         for (at, tip) in self.tips.iter_mut().enumerate() {
             tip.poses.push(Pose { position: frame.tip(at), orientation: DQuat::IDENTITY });
+            tip.there.push(frame.shows(at));
         }
         self.times.push(time);
         Ok(())

@@ -135,18 +135,20 @@ fn contacts(frame: &Frame) -> Grid<'static> {
     }
 }
 
-/// The tips of the devices, the force on each hand, and where the hand is from there.
+/// The tips of the devices that are there, the force on each hand, where the hand is from there, and which device it is.
 fn devices(frame: &Frame) -> Grid<'static> {
-    let tips: Vec<DVec3> = (0..frame.scene.devices.len()).map(|at| frame.tip(at)).collect();
-    let hands = frame.input.devices.iter().zip(&tips).map(|(device, tip)| device.position - *tip);
-    let radii = frame.scene.devices.iter().map(|device| device.parameters.tip_radius);
+    let shown: Vec<usize> = (0..frame.scene.devices.len()).filter(|&at| frame.shows(at)).collect();
+    let shown = shown.iter().copied();
+    let hand = |at: usize| frame.input.devices[at].position - frame.tip(at);
+    let radius = |at: usize| frame.scene.devices[at].parameters.tip_radius;
     Grid {
         fields: vec![
-            Field::vectors("force_on_hand", frame.output.devices.iter().map(|device| device.force_on_hand)),
-            Field::vectors("hand", hands),
-            Field::numbers("tip_radius", radii),
+            Field::vectors("force_on_hand", shown.clone().map(|at| frame.output.devices[at].force_on_hand)),
+            Field::vectors("hand", shown.clone().map(hand)),
+            Field::numbers("tip_radius", shown.clone().map(radius)),
+            Field::numbers("device", shown.clone().map(|at| at as f64)),
         ],
-        points: tips,
+        points: shown.map(|at| frame.tip(at)).collect(),
         cells: Cells::Points,
         facts: Vec::new(),
     }

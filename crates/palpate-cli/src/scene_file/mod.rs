@@ -148,43 +148,75 @@ pub fn read(path: &Path, pace: Pace) -> Result<Scene, Failure> {
 /// The same where files are carried along, and lie elsewhere than the scene says.
 pub fn read_carried(path: &Path, carried: &Carried, pace: Pace) -> Result<Scene, Failure> {
     let place = carried.get(path).map_or(path, PathBuf::as_path);
-    let bytes = std::fs::read(place).map_err(|e| Failure::file("read the scene", path, &e))?;
-    let Ok(text) = String::from_utf8(bytes) else {
-        return Err(Failure(format!(
-            "{}: it is not a text file; a scene is TOML (docs/scene.md)",
-            path.display()
-        )));
-    };
-    read_text(path, &text, carried, pace)
+    let text = read_file(path, place)?;
+    let source = Source { path, text: &text, carried };
+    let file = parse(&source)?;
+    let objects = read_objects(&source, &file)?;
+    put_together(&source, &file, objects, pace)
 }
 
-/// The same of a text that stands for the file.
-pub fn read_text(path: &Path, text: &str, carried: &Carried, pace: Pace) -> Result<Scene, Failure> {
-    let source = Source { path, text, carried };
-    let file: SceneFile = toml::from_str(text).map_err(|e| {
+/// The text of a scene file that lies at a place.
+pub fn read_file(path: &Path, place: &Path) -> Result<String, Failure> {
+    let bytes = std::fs::read(place).map_err(|e| Failure::file("read the scene", path, &e))?;
+    String::from_utf8(bytes).map_err(|_| {
+        Failure(format!("{}: it is not a text file; a scene is TOML (docs/scene.md)", path.display()))
+    })
+}
+
+/// Read a text that stands for a scene file, and may be changed when its objects are known, but for these; gives the text that
+/// the scene is of. Recordings take long to read, and are read once.
+pub fn read_changed(
+    path: &Path,
+    text: String,
+    pace: Pace,
+    change: impl FnOnce(&str, &[ModelObject]) -> Option<String>,
+) -> Result<(Scene, String), Failure> {
+    let carried = Carried::new();
+    let source = Source { path, text: &text, carried: &carried };
+    let file = parse(&source)?;
+    let objects = read_objects(&source, &file)?;
+    let Some(changed) = change(&text, &objects) else {
+        return Ok((put_together(&source, &file, objects, pace)?, text));
+    };
+    let source = Source { text: &changed, ..source };
+    Ok((put_together(&source, &parse(&source)?, objects, pace)?, changed))
+}
+
+fn parse(source: &Source) -> Result<SceneFile, Failure> {
+    let file: SceneFile = toml::from_str(source.text).map_err(|e| {
         // Types in the user's words.
         let what = e
             .to_string()
             .replace("expected f64", "expected a number")
             .replace("expected i64", "expected a whole number");
-        Failure(format!("{}: {}", path.display(), what.trim_end()))
+        Failure(format!("{}: {}", source.path.display(), what.trim_end()))
     })?;
     if file.object.is_empty() {
         return source.fail(0..0, "the scene has no [[object]]");
     }
-    check_names(&source, &file)?;
+    check_names(source, &file)?;
+    Ok(file)
+}
 
+fn read_objects(source: &Source, file: &SceneFile) -> Result<Vec<ModelObject>, Failure> {
+    file.object.iter().map(|entry| objects::read_object(source, entry)).collect()
+}
+
+/// The scene of a file whose objects are read.
+fn put_together(
+    source: &Source,
+    file: &SceneFile,
+    objects: Vec<ModelObject>,
+    pace: Pace,
+) -> Result<Scene, Failure> {
     let (mut remarks, mut choices) = (Vec::new(), Vec::new());
-    let objects: Result<Vec<_>, _> =
-        file.object.iter().map(|entry| objects::read_object(&source, entry)).collect();
-    let objects = objects?;
     let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
-    let mut parameters = read_rules(&source, &file, pace)?;
+    let mut parameters = read_rules(source, file, pace)?;
     for entry in &file.device {
-        let mut device = devices::read_parameters(&source, entry)?;
+        let mut device = devices::read_parameters(source, entry)?;
         let step_s = parameters.step_s;
         if let Some((coupling, line)) =
-            coupling::choose(&source, entry, &device, step_s, &objects, &object_names)?
+            coupling::choose(source, entry, &device, step_s, &objects, &object_names)?
         {
             device.coupling = Some(coupling);
             choices.push(line);
@@ -193,25 +225,25 @@ pub fn read_text(path: &Path, text: &str, carried: &Carried, pace: Pace) -> Resu
     }
     let mut obstacles = Vec::new();
     for (number, entry) in file.plane.iter().enumerate() {
-        let (obstacle, placed) = obstacles::read_plane(&source, entry.get_ref(), number)?;
+        let (obstacle, placed) = obstacles::read_plane(source, entry.get_ref(), number)?;
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
     for (number, entry) in file.obstacle.iter().enumerate() {
-        let (obstacle, placed) = obstacles::read_obstacle(&source, entry, number, &mut remarks)?;
+        let (obstacle, placed) = obstacles::read_obstacle(source, entry, number, &mut remarks)?;
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
-    let model = build(&source, &file, parameters, objects.clone())?;
+    let model = build(source, file, parameters, objects.clone())?;
     let mut devices = Vec::new();
     for (entry, parameters) in file.device.iter().zip(&model.parameters().devices) {
-        let read = devices::read_device(&source, entry, *parameters, &objects, &object_names, &mut remarks);
+        let read = devices::read_device(source, entry, *parameters, &objects, &object_names, &mut remarks);
         devices.push(read?);
     }
-    devices::check_grasps(&source, &file.device, &devices)?;
+    devices::check_grasps(source, &file.device, &devices)?;
     remarks.extend(objects::doubtful_recordings(&objects, &object_names));
     let nothing_meets: Vec<String> = objects::tables_that_meet_nothing(&objects, &object_names).collect();
-    let inputs = inputs(&source, &file);
+    let inputs = inputs(source, file);
     let mut scene =
         Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, choices, inputs };
     if scene.has_touch() {

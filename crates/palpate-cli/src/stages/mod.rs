@@ -3,10 +3,12 @@
 //! A scene is its text, whoever made it: what a page changes is changed in the text, and the text is read as any other.
 
 mod built_in;
+mod pointers;
 mod recipe;
 
 use crate::Failure;
-use crate::scene_file::{self, Carried, Pace, RealDevice, Scene};
+use crate::logs::{LogSeries, LoggedScene};
+use crate::scene_file::{self, Pace, RealDevice, Scene};
 use crate::verbs::inspect::certificate_lines;
 use crate::verbs::read_recording;
 use crate::verbs::run::{attach, attach_real};
@@ -25,9 +27,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tempfile::TempDir;
 use toml::{Table, Value};
 
-/// Pointers of a scene that names none.
-const POINTERS: usize = 4;
-
 /// Updates of a device on this machine per second.
 const DEVICE_HZ: f64 = 1000.0;
 
@@ -37,6 +36,8 @@ pub struct Stages {
     cache: PathBuf,
     /// Paths and meshes while the viewer is served; and the cache where there is no other.
     folder: TempDir,
+    /// Where what happens is logged, if it is.
+    logs: Option<Arc<LogSeries>>,
     current: Mutex<Current>,
 }
 
@@ -55,52 +56,58 @@ struct Current {
 }
 
 impl Stages {
-    /// With recordings kept in a folder, or the user's cache.
-    pub fn new(cache: Option<&Path>) -> Result<Self, Failure> {
+    /// With recordings kept in a folder, or the user's cache; and with logs, if there are to be some.
+    pub fn new(cache: Option<&Path>, logs: Option<Arc<LogSeries>>) -> Result<Self, Failure> {
         let folder =
             TempDir::new().map_err(|e| Failure(format!("cannot make a folder for the viewer: {e}")))?;
         let cache = cache_folder(cache).unwrap_or_else(|| folder.path().to_path_buf());
-        Ok(Self { cache, folder, current: Mutex::default() })
+        Ok(Self { cache, folder, logs, current: Mutex::default() })
     }
 
     /// A scene file.
     pub fn open_file(&self, path: &Path) -> Result<Stage, Failure> {
-        // Read as it stands first: then errors name its lines.
-        let scene = scene_file::read(path, Pace::RealTime)?;
-        scene.remarks.iter().for_each(|remark| crate::tell(&format!("warning: {remark}")));
-        scene.choices.iter().for_each(|choice| crate::tell(choice));
-        let text = std::fs::read_to_string(path).map_err(|e| Failure::file("read the scene", path, &e))?;
-        let text: Table = text.parse().map_err(|e| Failure(format!("{}: {e}", path.display())))?;
+        let text = scene_file::read_file(path, path)?;
         let title = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let current = Current {
             title,
             about: "Press and drag what you see.".into(),
             path: path.to_path_buf(),
-            text,
             ..Current::default()
         };
-        self.make(current)
+        let (stage, told) = self.made(current, text)?;
+        told.iter().for_each(|line| crate::tell(line));
+        Ok(stage)
     }
 
     fn lock(&self) -> MutexGuard<'_, Current> {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Read a scene's text, and keep it as the current one.
-    fn make(&self, mut current: Current) -> Result<Stage, Failure> {
-        let text = current.text.to_string();
-        let mut scene = scene_file::read_text(&current.path, &text, &Carried::new(), Pace::RealTime)?;
-        if !scene.devices.iter().any(|device| device.pointer) {
-            add_pointers(&mut current.text, &scene);
-            let text = current.text.to_string();
-            scene = scene_file::read_text(&current.path, &text, &Carried::new(), Pace::RealTime)?;
-        }
-        let stage = self.stage(&mut current, scene);
-        *self.lock() = current;
-        Ok(stage)
+    /// Read a scene's text, with pointers if it names none, and keep it as the current one.
+    fn make(&self, current: Current, text: String) -> Result<Stage, Failure> {
+        self.made(current, text).map(|(stage, _)| stage)
     }
 
-    fn stage(&self, current: &mut Current, scene: Scene) -> Stage {
+    /// The same, with what its author should know.
+    fn made(&self, mut current: Current, text: String) -> Result<(Stage, Vec<String>), Failure> {
+        let given = text.clone();
+        let (scene, text) =
+            scene_file::read_changed(&current.path, text, Pace::RealTime, pointers::with_pointers)?;
+        current.text = text.parse().map_err(|e| Failure(format!("{}: {e}", current.path.display())))?;
+        // Nobody has chosen the size of fingers that were added.
+        let added = |device: &&scene_file::SceneDevice| device.pointer && text != given;
+        let of_added: Vec<String> =
+            scene.devices.iter().filter(added).map(|device| format!("device {:?} ", device.name)).collect();
+        let remarks =
+            scene.remarks.iter().filter(|remark| !of_added.iter().any(|own| remark.starts_with(own)));
+        let mut told: Vec<String> = remarks.map(|remark| format!("warning: {remark}")).collect();
+        told.extend_from_slice(&scene.choices);
+        let stage = self.stage(&mut current, scene, text)?;
+        *self.lock() = current;
+        Ok((stage, told))
+    }
+
+    fn stage(&self, current: &mut Current, scene: Scene, text: String) -> Result<Stage, Failure> {
         let objects = current.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
         let files = objects.iter().map(|object| {
             let file = object.get("recording").and_then(Value::as_str).unwrap_or_default();
@@ -115,7 +122,9 @@ impl Stages {
             }
             current.recipes.contains_key(file)
         });
-        Stage {
+        let logged = LoggedScene::new(&scene, Some(text));
+        let log = self.logs.as_ref().map(|logs| logs.opener(logged)).transpose()?;
+        Ok(Stage {
             description,
             model: scene.model.clone(),
             devices: scene.devices.iter().map(stage_device).collect(),
@@ -127,7 +136,8 @@ impl Stages {
                     Arc::new(move |t: f64| obstacle.at(t)) as palpate_viewer::StageMover
                 })
                 .collect(),
-        }
+            log,
+        })
     }
 
     fn open_built_in(&self, id: &str, tell: Tell) -> Result<Stage, Failure> {
@@ -153,15 +163,15 @@ impl Stages {
             set(object, "recording", path.display().to_string());
             recipes.insert(path, recipe);
         }
-        self.make(Current {
+        let current = Current {
             id: Some(scene.id.into()),
             title: scene.title.into(),
             about: scene.about.into(),
             path: folder.join("scene.toml"),
-            text,
             recipes,
             ..Current::default()
-        })
+        };
+        self.make(current, text.to_string())
     }
 
     fn change_rules(&self, rules: &Rules) -> Result<Stage, Failure> {
@@ -194,7 +204,8 @@ impl Stages {
                 .filter(|device| pointer(device))
                 .for_each(|device| set(device, "coupling", gains.clone()));
         }
-        self.make(current)
+        let text = current.text.to_string();
+        self.make(current, text)
     }
 
     fn record_again(
@@ -220,7 +231,8 @@ impl Stages {
         let path = recipe.recorded_in(&folder, &mut Telling::new(tell))?;
         set(entry, "recording", path.display().to_string());
         current.recipes.insert(path, recipe);
-        self.make(current)
+        let text = current.text.to_string();
+        self.make(current, text)
     }
 
     fn record_upload(&self, upload: Upload, tell: Tell) -> Result<Stage, Failure> {
@@ -263,15 +275,16 @@ impl Stages {
             path.display().to_string(),
         );
         let uploads = self.lock().uploads;
-        self.make(Current {
+        let current = Current {
             id: None,
             title: file.to_string_lossy().into_owned(),
             about: "Your own mesh. Press and drag it.".into(),
             path: folder.join("scene.toml"),
-            text: text.parse().map_err(|e| Failure(format!("the scene of {name}: {e}")))?,
+            text: Table::new(),
             recipes: HashMap::from([(path, recipe)]),
             uploads,
-        })
+        };
+        self.make(current, text)
     }
 }
 
@@ -349,40 +362,6 @@ fn recipe_of(recording: &Recording) -> Option<Recipe> {
         modes: recording.modes.len(),
         damping: metadata.damping,
     })
-}
-
-/// Fingers for pointers: as large and as firm as suits the smallest object.
-fn add_pointers(text: &mut Table, scene: &Scene) {
-    let size = |recording: &Recording| recording.surface.radius();
-    let smallest = scene.model.recordings().min_by(|a, b| size(a).total_cmp(&size(b)));
-    let Some(recording) = smallest else { return };
-    let radius = size(recording);
-    // m·ω² of its lowest mode: about as stiff as the object is as a whole. Damped by a tenth.
-    let omega = recording.modes.angular_frequencies.first().copied().unwrap_or(50.0);
-    let stiffness = recording.mass() * omega * omega;
-    let damping = 0.2 * recording.mass() * omega;
-    let taken = scene.names();
-    let taken = |name: &String| {
-        [&taken.objects, &taken.devices, &taken.obstacles].into_iter().any(|names| names.contains(name))
-    };
-    let names = (1..).map(|number| format!("finger{number}")).filter(|name| !taken(name));
-    let devices = text.entry("device").or_insert_with(|| Value::Array(Vec::new()));
-    let Some(devices) = devices.as_array_mut() else { return };
-    for name in names.take(POINTERS) {
-        let coupling = Table::from_iter([
-            ("stiffness".to_string(), Value::Float(stiffness)),
-            ("damping".to_string(), Value::Float(damping)),
-        ]);
-        devices.push(Value::Table(Table::from_iter([
-            ("name".to_string(), Value::String(name)),
-            ("mode".to_string(), Value::String("touch".into())),
-            ("pointer".to_string(), Value::Boolean(true)),
-            ("tip_radius".to_string(), Value::Float(0.08 * radius)),
-            ("patch_radius".to_string(), Value::Float(0.15 * radius)),
-            ("friction".to_string(), Value::Float(0.8)),
-            ("coupling".to_string(), Value::Table(coupling)),
-        ])));
-    }
 }
 
 fn stage_device(device: &scene_file::SceneDevice) -> StageDevice {

@@ -57,6 +57,11 @@ pub fn paper_cube(cells: u32, modes: usize) -> RecordParameters {
 
 /// Run the verb.
 pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
+    let person = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+    let serves = !arguments.no_serve && (arguments.serve || person);
+    if arguments.serving.log.is_some() && !serves {
+        return Err(Failure("--log is of the viewer, which is not opened here: add --serve".into()));
+    }
     let output = &arguments.output;
     std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
     let recording_path = output.join("cube.palp");
@@ -106,8 +111,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
         scene_path.display(),
         scene_path.display()
     ))?;
-    let person = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
-    if !arguments.no_serve && (arguments.serve || person) {
+    if serves {
         print("\nNow touch one yourself: ")?;
         return serve_built_in(&arguments.serving, &arguments.name);
     }

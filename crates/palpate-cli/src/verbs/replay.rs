@@ -5,7 +5,6 @@ use crate::logged_run::LoggedRun;
 use crate::verbs::run::{OutputArguments, Outputs};
 use crate::verbs::{print, print_json};
 use clap::Args;
-use palpate::State;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -30,7 +29,7 @@ pub struct Arguments {
 pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
     let run = LoggedRun::read(&arguments.log)?;
     let scene = &run.scene;
-    let mut state = State::new(&scene.model);
+    let mut state = run.state_at_start()?;
     let start = run.input_at_start()?;
     let mut outputs = Outputs::new(&arguments.outputs, scene, &state, &start, run.steps as usize)?;
     let done =

@@ -2,6 +2,7 @@
 
 use crate::Failure;
 use crate::log_shows::ShownLog;
+use crate::logs::LogSeries;
 use crate::stages::{BUILT_IN, Stages};
 use crate::whole_file::stop_on_interrupt;
 use clap::Args;
@@ -18,11 +19,13 @@ use std::sync::Arc;
 ///
 /// The scene runs in real time, as `palpate run --realtime` does; the page shows it at display rate and its pointers are
 /// devices. Scenes without `pointer = true` get four pointers of a size that suits their objects. Without a scene file
-/// there are built-in scenes. Logs of `palpate run --realtime --log` are shown with a time line; two of them side by side.
+/// there are built-in scenes. Logs of `palpate run --realtime --log`, and of `--log` here, are shown with a time line; two of them
+/// side by side.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "For example:
   palpate serve                        # the built-in scenes
   palpate serve scene.toml
+  palpate serve scene.toml --log run.mcap   # with a log of what you do
   palpate serve run.mcap               # a log; two logs: side by side
   palpate serve --listen 0.0.0.0:7400 --token 4f0c9d2e71   # for other machines, tablets and phones too")]
 pub struct Arguments {
@@ -52,6 +55,10 @@ pub struct Serving {
     /// The core that the force process stays on, counted from 0; by default the last one
     #[arg(long, value_name = "CORE")]
     core: Option<usize>,
+    /// Log what happens in the scene (MCAP), for palpate replay, render and export, and for serve again. Each time that the scene
+    /// begins anew there is one more log: OUT.mcap, OUT-2.mcap, …
+    #[arg(long, value_name = "OUT.mcap")]
+    pub log: Option<PathBuf>,
     /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
@@ -71,7 +78,13 @@ pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { files, scene, serving } = arguments;
     match files.as_slice() {
         [] => serve_built_in(serving, scene.as_deref().unwrap_or(BUILT_IN[0].id)),
-        logs if logs.iter().all(|file| is_log(file)) => serve_logs(serving, logs),
+        logs if logs.iter().all(|file| is_log(file)) => match &serving.log {
+            None => serve_logs(serving, logs),
+            Some(_) => Err(Failure(format!(
+                "--log is of a scene that runs, and {} is a log already: leave it out",
+                logs[0].display()
+            ))),
+        },
         [file] => serve_live(serving, |stages| stages.open_file(file)),
         _ => Err(Failure("one scene is served at a time; of logs (.mcap) two can stand side by side".into())),
     }
@@ -117,15 +130,17 @@ fn serve_live(
     serving: &Serving,
     first: impl FnOnce(&Stages) -> Result<Stage, Failure>,
 ) -> Result<(), Failure> {
-    let stages = Stages::new(serving.cache.as_deref())?;
-    // Before what takes long: a port that is taken is told at once.
+    // Before what takes long: a file that can't be written, or a port that is taken, is told at once.
+    let logs = serving.log.as_deref().map(LogSeries::new).transpose()?;
+    let stages = Stages::new(serving.cache.as_deref(), logs.clone())?;
     let server = serving.bind()?;
     let first = first(&stages)?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let core = serving.core.or(cores.checked_sub(1));
     let scheduling = Scheduling { priority: Some(PRIORITY), core };
     let live = Live { workshop: Arc::new(stages), first, scheduling };
-    serving.serve(server, Exhibit::Live(Box::new(live)))
+    serving.serve(server, Exhibit::Live(Box::new(live)))?;
+    logs.map_or(Ok(()), |logs| logs.end())
 }
 
 impl Serving {

@@ -1,16 +1,22 @@
 //! Scenes and logs in the browser, and pictures that a browser draws.
 
 use crate::realtime;
-use crate::workplace::Workplace;
+use crate::workplace::{Table, Workplace};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use tungstenite::stream::MaybeTlsStream;
+use tungstenite::{Message, WebSocket};
 
 /// `palpate serve` in a workplace, until it is interrupted.
 struct Serving {
     child: Child,
     /// `127.0.0.1:PORT`.
     address: String,
+    /// What it says after that.
+    said: JoinHandle<Vec<String>>,
 }
 
 impl Serving {
@@ -29,8 +35,8 @@ impl Serving {
         let address = line.trim_start_matches("open http://").split('/').next().expect("an address");
         let address = address.to_string();
         // Whatever else it says must not fill the pipe.
-        std::thread::spawn(move || lines.for_each(drop));
-        Self { child, address }
+        let said = std::thread::spawn(move || lines.map_while(Result::ok).collect());
+        Self { child, address, said }
     }
 
     fn get(&self, path: &str) -> (String, Vec<u8>) {
@@ -45,10 +51,72 @@ impl Serving {
     }
 
     /// Its status after Ctrl-C.
-    fn interrupt(mut self) -> Option<i32> {
+    fn interrupt(self) -> Option<i32> {
+        self.interrupted().0
+    }
+
+    /// The same, with what it has said since it listens.
+    fn interrupted(mut self) -> (Option<i32>, Vec<String>) {
         let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
-        self.child.wait().expect("a child").code()
+        let code = self.child.wait().expect("a child").code();
+        (code, self.said.join().expect("no panic"))
+    }
+
+    fn page(&self) -> Page {
+        let (socket, _) = tungstenite::connect(format!("ws://{}/session", self.address)).expect("a session");
+        if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
+            stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+        }
+        Page(socket)
+    }
+}
+
+/// A page without a browser.
+struct Page(WebSocket<MaybeTlsStream<TcpStream>>);
+
+/// What a picture of a scene of one object and one obstacle tells.
+struct Picture {
+    generation: u32,
+    step: u32,
+    /// Force on the first device [N].
+    force: f32,
+}
+
+impl Page {
+    fn send(&mut self, text: &str) {
+        self.0.send(Message::text(text)).expect("it hears");
+    }
+
+    /// Wait for a picture that is so.
+    fn see(&mut self, is: impl Fn(&Picture) -> bool) {
+        loop {
+            if let Message::Binary(bytes) = self.0.read().expect("pictures come")
+                && is(&Picture::read(&bytes))
+            {
+                return;
+            }
+        }
+    }
+}
+
+impl Picture {
+    /// As docs/viewer-protocol.md has it.
+    fn read(bytes: &[u8]) -> Self {
+        let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        let f32_at = |at: usize| f32::from_bits(u32_at(at));
+        assert_eq!((u32_at(64), u32_at(68)), (1, 1), "objects and obstacles");
+        let modes = 88 + 28;
+        let dents = modes + 4 + 4 * u32_at(modes) as usize;
+        let k = u32_at(dents) as usize;
+        let obstacle = dents + 8 + (2 * k).next_multiple_of(4) + (3 * k).next_multiple_of(4);
+        let force = obstacle + 28 + 4 + 24;
+        let force = [0, 4, 8].map(|part| f32_at(force + part));
+        Self {
+            generation: u32_at(8),
+            step: u32_at(12),
+            force: force.iter().map(|part| part * part).sum::<f32>().sqrt(),
+        }
     }
 }
 
@@ -102,10 +170,80 @@ fn pointers_are_of_pages_and_nobody_else() {
         (&["serve", "nowhere.toml", "--no-browser"], "cannot read the scene nowhere.toml"),
         (&["serve", "nowhere.mcap", "--no-browser"], "cannot read the log nowhere.mcap"),
         (&["serve", "fingers.toml", "--listen", "0.0.0.0:0"], "give a token of 8 characters or more"),
+        (
+            &["serve", "nowhere.mcap", "--log", "a.mcap"],
+            "--log is of a scene that runs, and nowhere.mcap is a log already: leave it out",
+        ),
+        (&["serve", "fingers.toml", "--log", "no/a.mcap"], "cannot write no/a.mcap: there is no folder no"),
+        (
+            &["serve", "fingers.toml", "--no-browser", "--listen", "127.0.0.1:0", "--log", "cube.palp"],
+            "cannot write cube.palp: it is one of the inputs",
+        ),
+        (&["demo", "--no-serve", "--log", "a.mcap"], "--log is of the viewer, which is not opened here"),
     ] {
         let error = workplace.fail(arguments);
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn what_is_done_with_a_pointer_is_logged_and_every_scene_is_a_log_of_its_own() {
+    let workplace = realtime::workplace();
+    let text = workplace.text("fingers.toml");
+    let (text, _) = text.split_once("[[device]]").expect("devices");
+    workplace.write("cube.toml", text);
+    workplace.write("run-2.mcap", "of somebody else");
+    let serving = Serving::new(&workplace, &["cube.toml", "--log", "run.mcap"]);
+    let mut page = serving.page();
+    page.see(|picture| picture.step > 20);
+    page.send(r#"{"type":"press","pointer":1,"mode":"touch","position":[-0.09,0.001,0.05]}"#);
+    page.send(r#"{"type":"move","pointers":[{"pointer":1,"position":[-0.045,0.001,0.05]}]}"#);
+    page.see(|picture| picture.force > 0.02);
+    assert!(!workplace.path("run.mcap").exists(), "it is hidden until it is whole");
+    page.send(r#"{"type":"set","friction":0.1}"#);
+    page.see(|picture| picture.generation == 2 && picture.step > 20);
+    page.send(r#"{"type":"reset"}"#);
+    page.see(|picture| picture.generation == 3 && picture.step > 20);
+    let (code, said) = serving.interrupted();
+    assert_eq!(code, Some(0), "{said:?}");
+    let logs = ["run.mcap", "run-3.mcap", "run-4.mcap"];
+    assert!(said.iter().zip(logs).all(|(line, log)| line.starts_with(&format!("log {log}: "))), "{said:?}");
+    assert_eq!((said.len(), workplace.text("run-2.mcap").as_str()), (3, "of somebody else"));
+    assert!(!workplace.files().iter().any(|name| name.ends_with(".tmp")), "{:?}", workplace.files());
+
+    // They need nothing else.
+    let elsewhere = Workplace::new();
+    let mut ends = Vec::new();
+    for log in logs {
+        elsewhere.write(log, workplace.read(log));
+        let summary = elsewhere.json(&["replay", log, "--csv", "steps.csv", "--json"]);
+        assert_eq!(summary["replayed"]["identical"], true, "{summary:#}");
+        let steps = Table::parse(&elsewhere.text("steps.csv"));
+        assert!(steps.len() > 20 && summary["replayed"]["steps"] == steps.len(), "{summary:#}");
+        let least = |column: &str| steps.column(column).into_iter().fold(f64::INFINITY, f64::min);
+        let forces = steps.column("finger1.fx");
+        if log == "run.mcap" {
+            assert!(forces.iter().any(|force| *force < -0.02), "the finger feels the cube");
+            assert!(least("finger1.x") < -0.08, "and comes from the left");
+        } else {
+            assert!(forces.iter().all(|force| *force == 0.0), "it is away in {log}");
+        }
+        let places = steps.column("cube.px");
+        ends.push((places[0], places[places.len() - 1]));
+    }
+    // The second goes on where the first has ended, and the third begins anew.
+    assert!((ends[1].0 - ends[0].1).abs() < 1e-3 && ends[0].1 > 1e-4, "{ends:?}");
+    assert!(ends[2].0.abs() < 1e-6, "{ends:?}");
+    elsewhere.succeed(&["export", "run-3.mcap", "--gltf", "run.glb", "--vtu", "frames"]);
+    let glb = elsewhere.read("run.glb");
+    assert!(String::from_utf8_lossy(&glb).contains("\"scale\":[0.0,0.0,0.0]"), "fingers that are away");
+    let serving = Serving::new(&elsewhere, &["run.mcap", "run-3.mcap"]);
+    let mut frames = Vec::new();
+    while frames.is_empty() {
+        frames = serving.get("/log/1/frames?from=1&count=1").1;
+    }
+    assert_eq!(&frames[4..8], b"PLPF");
+    assert_eq!(serving.interrupt(), Some(0));
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 use super::record::{Picture, Record};
 use glam::{DQuat, DVec3};
-use palpate::{Against, DeviceMode, EnergyLedger, Grasp, Pose, SurfacePoint};
+use palpate::{
+    Against, DeviceMode, EnergyLedger, Grasp, ObjectMotion, Oscillation, Pose, SurfacePoint, Twist,
+};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::HashMap;
@@ -105,6 +107,39 @@ pub(super) struct ObjectMessage {
     pub pose: Placement,
     pub velocity: Xyz,
     pub angular_velocity: Xyz,
+}
+
+/// How an object begins.
+#[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
+pub(super) struct StartMessage {
+    #[serde(flatten)]
+    object: ObjectMessage,
+    angular_momentum: Xyz,
+    /// q [m·√kg] and its rate of every mode.
+    modes: Vec<[f64; 2]>,
+}
+
+impl From<&ObjectMotion> for StartMessage {
+    fn from(motion: &ObjectMotion) -> Self {
+        let object = ObjectMessage {
+            pose: motion.pose.into(),
+            velocity: motion.twist.linear.into(),
+            angular_velocity: motion.twist.angular.into(),
+        };
+        let modes = motion.modes.iter().map(|mode| [mode.q, mode.v]).collect();
+        Self { object, angular_momentum: motion.angular_momentum.into(), modes }
+    }
+}
+
+impl From<StartMessage> for ObjectMotion {
+    fn from(StartMessage { object, angular_momentum, modes }: StartMessage) -> Self {
+        Self {
+            pose: object.pose.into(),
+            twist: Twist { linear: object.velocity.into(), angular: object.angular_velocity.into() },
+            angular_momentum: angular_momentum.into(),
+            modes: modes.into_iter().map(|[q, v]| Oscillation { q, v }).collect(),
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]

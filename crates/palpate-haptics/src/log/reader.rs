@@ -1,13 +1,14 @@
 //! Reading a log.
 
-use super::messages::{EnergyMessage, Names, StepMessage};
+use super::messages::{EnergyMessage, Names, StartMessage, StepMessage};
+use super::writer::START;
 use crate::error::Error;
 use glam::DVec3;
 use mcap::Summary;
 use mcap::read::parse_record;
 use mcap::records::{Record, op::MESSAGE};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, Output, Pose};
+use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectMotion, Output, Pose};
 use std::collections::BTreeMap;
 
 /// A log in memory.
@@ -45,10 +46,29 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// When there are none: it is no log of palpate's.
     pub fn facts(&self) -> Result<BTreeMap<String, String>, Error> {
-        let index = self.summary.metadata_indexes.iter().find(|index| index.name == "palpate");
-        let index =
-            index.ok_or_else(|| Error::Log("it is an MCAP file, but no log of palpate's".to_string()))?;
-        mcap::read::metadata(self.bytes, index).map(|metadata| metadata.metadata).map_err(unreadable)
+        let facts = self.metadata("palpate")?;
+        facts.ok_or_else(|| Error::Log("it is an MCAP file, but no log of palpate's".to_string()))
+    }
+
+    /// How the objects begin; none in logs of the first version, which all begin as their scene says.
+    ///
+    /// # Errors
+    /// When the log does not tell of one of them.
+    pub fn start(&self, names: &Names) -> Result<Option<Vec<ObjectMotion>>, Error> {
+        let Some(starts) = self.metadata(START)? else { return Ok(None) };
+        let motion = |name: &String| {
+            let text = starts.get(name);
+            let text =
+                text.ok_or_else(|| Error::Log(format!("the log does not tell how {name:?} begins")))?;
+            serde_json::from_str::<StartMessage>(text).map(ObjectMotion::from).map_err(unreadable)
+        };
+        names.objects.iter().map(motion).collect::<Result<_, _>>().map(Some)
+    }
+
+    fn metadata(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, Error> {
+        let index = self.summary.metadata_indexes.iter().find(|index| index.name == name);
+        let read = |index| mcap::read::metadata(self.bytes, index).map_err(unreadable);
+        index.map(|index| read(index).map(|metadata| metadata.metadata)).transpose()
     }
 
     /// The files that the scene was read from, by their names.

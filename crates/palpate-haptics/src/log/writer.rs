@@ -1,6 +1,6 @@
 //! Writing a log beside the force process, by a thread that can't disturb it.
 
-use super::messages::{ModesOf, Names, StepOf, contacts, transforms};
+use super::messages::{ModesOf, Names, StartMessage, StepOf, contacts, transforms};
 use super::record::{Picture, Record};
 use crate::error::Error;
 use mcap::records::{MessageHeader, Metadata};
@@ -16,6 +16,9 @@ use std::time::{Duration, SystemTime};
 /// Steps and pictures that may wait for the writer.
 const STEPS_WAITING: usize = 8192;
 const PICTURES_WAITING: usize = 64;
+
+/// The record that tells how the objects begin.
+pub(super) const START: &str = "start";
 
 /// How long the writer sleeps when there is nothing to write.
 const NAP: Duration = Duration::from_millis(5);
@@ -140,7 +143,7 @@ fn failed(error: impl std::error::Error) -> Error {
 }
 
 impl<W: Write + Seek> LogWriter<W> {
-    /// Begin a log of a scene at its start, with facts about it and the files that it was read from.
+    /// Begin a log of a scene that goes from a state on, with facts about it and the files that it was read from.
     ///
     /// # Errors
     /// When it can't be written.
@@ -167,7 +170,14 @@ impl<W: Write + Seek> LogWriter<W> {
             };
             writer.attach(&attachment).map_err(failed)?;
         }
-        writer.write_metadata(&Metadata { name: "palpate".to_string(), metadata: facts }).map_err(failed)?;
+        let begins = |(name, motion)| {
+            serde_json::to_string(&StartMessage::from(motion)).map(|text| (String::clone(name), text))
+        };
+        let motions = state.motions();
+        let starts: Result<_, _> = names.objects.iter().zip(&motions).map(begins).collect();
+        for (name, metadata) in [("palpate", facts), (START, starts.map_err(failed)?)] {
+            writer.write_metadata(&Metadata { name: name.to_string(), metadata }).map_err(failed)?;
+        }
         let mut channel = |topic: &str, schema: &str, text: &str| -> Result<u16, Error> {
             let schema = writer.add_schema(schema, "jsonschema", text.as_bytes()).map_err(failed)?;
             writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(failed)

@@ -1,12 +1,13 @@
 //! Logs: what was written comes back to the bit, and repeats.
 
-use super::scenes::{STEP_S, half_width, model, process};
+use super::scenes::{STEP_S, half_width, model, process_from};
 use glam::DVec3;
-use palpate::{DeviceMode, State, step};
+use palpate::{DeviceInput, DeviceMode, Input, Model, State, step};
 use palpate_haptics::Motion;
 use palpate_haptics::log::{LogWriter, Names, Reader};
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 fn names() -> Names {
@@ -16,11 +17,16 @@ fn names() -> Names {
 /// A log of 400 steps of a finger that presses, and falls silent in between.
 fn log() -> Vec<u8> {
     let model = model(1, 300.0);
-    let edge = half_width(&model) + 0.004;
-    let (mut force, mut ports) = process(&model);
+    log_from(State::new(&model), &model)
+}
+
+/// The same from a state of the model's.
+fn log_from(state: State, model: &Arc<Model>) -> Vec<u8> {
+    let edge = half_width(model) + 0.004;
+    let (mut force, mut ports) = process_from(state, model);
     let facts = BTreeMap::from([("scene".to_string(), "a.toml".to_string())]);
     let files = [("a.toml".to_string(), b"step = 1".to_vec())];
-    let start = (&*model, force.state(), force.input());
+    let start = (&**model, force.state(), force.input());
     let (mut hand, writer) =
         LogWriter::new(Cursor::new(Vec::new()), names(), facts, &files, start).expect("a log in memory");
     for tick in 1..=400_u64 {
@@ -61,7 +67,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
             let mut input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
             away += u32::from(input.devices[0].mode == DeviceMode::Away);
             if other == Some(logged.step) {
-                input.devices[0] = palpate::DeviceInput::touching(DVec3::X * 0.02);
+                input.devices[0] = DeviceInput::touching(DVec3::X * 0.02);
             }
             step(&model, &mut state, &input);
             differs = differs.or_else(|| {
@@ -74,6 +80,43 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
         }
         assert!(away > 40, "{away}");
     }
+}
+
+#[test]
+fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
+    let model = model(1, 300.0);
+    let press = |number: u32| {
+        let place = DVec3::new(half_width(&model) + 0.004 - 2e-5 * f64::from(number), 1e-3, 0.0);
+        Input { devices: vec![DeviceInput::touching(place)], ..Input::default() }
+    };
+    let mut before = State::new(&model);
+    for number in 0..150 {
+        step(&model, &mut before, &press(number));
+    }
+    let motions = before.motions();
+    let begins = State::going_on(&model, &motions);
+    assert!(begins.output().energy.elastic > 1e-9, "{:?}", begins.output().energy);
+    assert!(motions[0].angular_momentum != DVec3::ZERO && motions[0].twist.linear.x < 0.0, "{motions:?}");
+
+    let bytes = log_from(begins, &model);
+    let reader = Reader::new(&bytes).expect("a log");
+    let read = reader.start(&names()).expect("readable").expect("it tells how the body begins");
+    assert_eq!(read, motions, "to the last bit");
+    let mut state = State::going_on(&model, &read);
+    let mut at_rest = State::new(&model);
+    let mut differs = 0;
+    for logged in reader.each_step() {
+        let logged = logged.expect("a step");
+        let input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
+        step(&model, &mut state, &input);
+        assert_eq!(logged.difference(&names(), state.output()), None, "step {}", logged.step);
+        step(&model, &mut at_rest, &input);
+        differs += u32::from(logged.difference(&names(), at_rest.output()).is_some());
+    }
+    assert_eq!(differs, 400, "from rest it would be another motion");
+    let unknown = Names { objects: vec!["other".into()], ..Names::default() };
+    let error = reader.start(&unknown).expect_err("there is none of that name").to_string();
+    assert_eq!(error, "the log does not tell how \"other\" begins");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate::{
     Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
-    Recording, Shape, Twist,
+    Recording, Shape, State, Twist,
 };
 use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, Mover, port};
 use std::sync::Arc;
@@ -44,6 +44,11 @@ pub fn model(fingers: usize, stiffness: f64) -> Arc<Model> {
 
 /// The force process of a model whose devices all touch, with the devices' ends of its ports.
 pub fn process(model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
+    process_from(State::new(model), model)
+}
+
+/// The same from a state of the model's.
+pub fn process_from(state: State, model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
     let devices = model.parameters().devices.len();
     let (ends, seats): (Vec<_>, Vec<_>) = (0..devices)
         .map(|_| {
@@ -53,7 +58,7 @@ pub fn process(model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
         .unzip();
     let floor = model.parameters().obstacles[0].pose;
     let mover: Mover = Box::new(move |_| floor);
-    (ForceProcess::new(model.clone(), seats, vec![mover], 0.05), ends)
+    (ForceProcess::from_state(state, model.clone(), seats, vec![mover], 0.05), ends)
 }
 
 /// A path from text.

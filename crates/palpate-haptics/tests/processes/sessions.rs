@@ -1,14 +1,14 @@
 //! The processes as threads.
 
 use super::scenes::{half_width, model, path};
-use palpate::{DeviceMode, Pose};
+use palpate::{DeviceMode, Input, Pose};
 use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
 use palpate_haptics::log::{LogWriter, Names, Reader};
 use palpate_haptics::{
     Attached, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
 };
 use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::io::{Cursor, Error, Seek, SeekFrom, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -58,9 +58,10 @@ fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
         devices: vec!["a".into(), "b".into()],
         obstacles: vec!["floor".into()],
     };
-    let mut input = process.input().clone();
-    input.devices = vec![palpate::DeviceInput::away(); 2];
-    input.obstacles = vec![session.model.parameters().obstacles[0].pose];
+    let input = Input {
+        devices: vec![palpate::DeviceInput::away(); 2],
+        obstacles: vec![session.model.parameters().obstacles[0].pose],
+    };
     let start = (&*session.model, process.state(), &input);
     let log = LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log");
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
@@ -83,8 +84,51 @@ fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
     }
     let logged = report.log.expect("a log");
     assert_eq!(logged.steps + logged.missed, 400);
-    let bytes = out.expect("what it was written to").into_inner();
+    let bytes = out.expect("what it was written to").expect("memory is not full").into_inner();
     assert_eq!(Reader::new(&bytes).expect("a log").steps(), logged.steps);
+}
+
+/// A disk with room for so many bytes.
+struct Disk(Cursor<Vec<u8>>, usize);
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let fits = self.0.get_ref().len() + bytes.len() <= self.1;
+        if fits { self.0.write(bytes) } else { Err(Error::other("no room is left")) }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Disk {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+#[test]
+fn a_disk_that_is_full_ends_the_log_and_nothing_else() {
+    let session = session(Some(400));
+    let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
+    let names = Names {
+        objects: vec!["body".into()],
+        devices: vec!["a".into(), "b".into()],
+        obstacles: vec!["floor".into()],
+    };
+    let input = Input {
+        devices: vec![palpate::DeviceInput::away(); 2],
+        obstacles: vec![session.model.parameters().obstacles[0].pose],
+    };
+    let start = (&*session.model, process.state(), &input);
+    let disk = Disk(Cursor::new(Vec::new()), 20_000);
+    let log = LogWriter::new(disk, names, BTreeMap::new(), &[], start).expect("so much fits");
+    let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
+    let (report, out) = session.run(Some(log), &stop, &steps, |_| ()).expect("it runs");
+    assert_eq!((report.steps, report.log), (400, None));
+    let error = out.expect("there was a log").err().expect("it can't be written").to_string();
+    assert!(error.starts_with("cannot write the log: ") && error.contains("no room is left"), "{error}");
 }
 
 #[test]

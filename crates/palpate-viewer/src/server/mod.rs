@@ -161,16 +161,21 @@ impl Server {
             .enable_all()
             .build()
             .map_err(said)?;
-        runtime.block_on(async {
+        let hall = Arc::new(hall);
+        let served = runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(said)?;
-            let routes = routes(Arc::new(hall));
+            let routes = routes(hall.clone());
             tokio::select! {
                 served = axum::serve(listener, routes) => served.map_err(said),
                 () = stopped(stop) => Ok(()),
             }
-        })?;
+        });
+        // Whoever still holds the hall: the scene ends here.
+        if let Some(live) = &hall.live {
+            live.end();
+        }
         runtime.shutdown_timeout(Duration::from_secs(1));
-        Ok(())
+        served
     }
 }
 
@@ -345,6 +350,9 @@ async fn record(State(hall): State<Arc<Hall>>, Query(wish): Query<RecordWish>, r
         material: MaterialDescription { young: wish.young, poisson: wish.poisson, density: wish.density },
         modes: wish.modes.unwrap_or(MODES).clamp(1, MOST_MODES),
     };
+    if !live.claim() {
+        return (StatusCode::CONFLICT, live::BUSY).into_response();
+    }
     match live.commands.send(live::Command::Record(upload)) {
         Ok(()) => StatusCode::ACCEPTED.into_response(),
         Err(_) => StatusCode::SERVICE_UNAVAILABLE.into_response(),

@@ -59,6 +59,7 @@ pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
         model,
         devices: vec![StageDevice::Pointer; 2],
         movers: vec![Arc::new(move |_: f64| floor)],
+        log: None,
     }
 }
 
@@ -84,6 +85,9 @@ impl Workshop for OneScene {
     }
 
     fn record(&self, upload: Upload, _: Tell) -> Result<Stage, String> {
+        if upload.name == "slow.msh" {
+            std::thread::sleep(Duration::from_secs(2));
+        }
         Err(format!("{} bytes of {}", upload.bytes.len(), upload.name))
     }
 }

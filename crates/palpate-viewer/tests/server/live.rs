@@ -142,3 +142,22 @@ fn rules_change_without_a_jump_and_reset_begins_anew() {
     assert_eq!(status, 202);
     assert_eq!(page.wait("error")["text"], "300000 bytes of a.msh");
 }
+
+#[test]
+fn one_mesh_is_recorded_at_a_time() {
+    let served = Served::live();
+    let mut page = served.page();
+    page.wait("scene");
+    let record = |name: &str| {
+        served.request(&format!("POST /record?name={name}&young=1&poisson=0.3&density=1"), b"xyz")
+    };
+    assert_eq!(record("slow.msh").0, 202);
+    let busy = "a recording is under way: ask again when it is done";
+    let (status, text) = record("b.msh");
+    assert_eq!((status, String::from_utf8_lossy(&text).as_ref()), (409, busy));
+    page.send(r#"{"type":"open","scene":"float"}"#);
+    assert_eq!(page.wait("error")["text"], busy);
+    assert_eq!(page.wait("error")["text"], "3 bytes of slow.msh");
+    assert_eq!(record("c.msh").0, 202);
+    assert_eq!(page.wait("error")["text"], "3 bytes of c.msh");
+}

@@ -3,4 +3,5 @@
 mod client;
 mod guard;
 mod live;
+mod logging;
 mod logs;

@@ -284,11 +284,11 @@ impl ResponseState {
         }
     }
 
-    /// Whether the other is of as many modes, and if so take over how they move.
-    pub(crate) fn go_on_from(&mut self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Modal(own), Self::Modal(other)) if own.modes.len() == other.modes.len() => {
-                own.go_on_from(other);
+    /// Whether it has as many modes, and if so let them move so.
+    pub(crate) fn go_on_from(&mut self, modes: &[Oscillation]) -> bool {
+        match self {
+            Self::Modal(own) if own.modes.len() == modes.len() => {
+                own.go_on_from(modes);
                 true
             }
             _ => false,

@@ -79,10 +79,10 @@ impl ModalState {
         self.acting.iter().map(|other| body.residual(place, &other.place) * other.force).sum()
     }
 
-    /// Take over how the same modes move.
-    pub(super) fn go_on_from(&mut self, other: &Self) {
-        self.modes.copy_from_slice(&other.modes);
-        self.q.copy_from_slice(&other.q);
+    /// Let the modes move so.
+    pub(super) fn go_on_from(&mut self, modes: &[Oscillation]) {
+        self.modes.copy_from_slice(modes);
+        self.q.iter_mut().zip(modes).for_each(|(q, mode)| *q = mode.q);
     }
 
     fn rows(&self, slot: usize) -> &[f64] {

@@ -4,7 +4,6 @@ use super::{Arguments, tell_of};
 use crate::Failure;
 use crate::logged_run::LoggedRun;
 use crate::outputs::{OutputFiles, Wanted, Window};
-use palpate::State;
 use serde_json::json;
 
 /// Frames a second, as films have.
@@ -38,7 +37,7 @@ pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
             window.from_s, window.to_s
         )));
     }
-    let mut state = State::new(&scene.model);
+    let mut state = run.state_at_start()?;
     let start = run.input_at_start()?;
     let mut files = OutputFiles::new(&wanted, scene, &state, &start, run.steps as usize)?;
     let needed = window.last_step(run.steps, step_s).max(1);

@@ -5,6 +5,7 @@ use super::attach::{attach, attach_real};
 use super::realtime_report::{json, text};
 use super::{Arguments, count_steps};
 use crate::Failure;
+use crate::logs::LoggedScene;
 use crate::scene_file::{Scene, SceneDevice};
 use crate::verbs::{print, print_json};
 use crate::whole_file::{WholeFile, stop_on_interrupt};
@@ -16,7 +17,6 @@ use palpate_haptics::log::{LogHand, LogWriter};
 use palpate_haptics::{
     DeformationProcess, DevicePort, Mover, Report, Scheduling, Session, SessionDevice, port,
 };
-use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -99,7 +99,8 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     // Hands without a path have no end but Ctrl-C.
     let endless = arguments.duration.is_none() && scene.devices.iter().any(|device| device.path.is_none());
     let steps = if endless { None } else { Some(count_steps(scene, arguments)? as u64) };
-    let log = options.log.as_deref().map(|path| begin_log(scene, arguments, path)).transpose()?;
+    let begin = |path: &Path| LoggedScene::new(scene, None).begin(path, &State::new(&scene.model));
+    let log = options.log.as_deref().map(begin).transpose()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let start = Instant::now();
     let mut linked = Vec::new();
@@ -176,7 +177,8 @@ fn watch(
             pictures.cycle(moment);
         });
         over.store(true, Ordering::Relaxed);
-        ran.map_err(Failure::from)
+        let (report, out) = ran?;
+        Ok((report, out.transpose()?))
     })
 }
 
@@ -211,30 +213,4 @@ fn movers(scene: &Scene) -> Vec<Mover> {
         Box::new(move |t: f64| -> Pose { obstacle.at(t) })
     };
     scene.obstacles.iter().map(one).collect()
-}
-
-fn begin_log(
-    scene: &Scene,
-    arguments: &Arguments,
-    path: &Path,
-) -> Result<(LogHand, LogWriter<WholeFile>), Failure> {
-    let inputs: Vec<&Path> = scene.inputs.iter().map(PathBuf::as_path).collect();
-    let file = WholeFile::create(path, &inputs)?;
-    let mut files = Vec::new();
-    for input in &scene.inputs {
-        let name = input.display().to_string();
-        if input.is_dir() {
-            crate::tell(&format!("warning: {name} is not taken into the log: a replay needs it where it is"));
-        } else if !files.iter().any(|(known, _)| *known == name) {
-            files.push((name, std::fs::read(input).map_err(|e| Failure::file("read", input, &e))?));
-        }
-    }
-    let facts = BTreeMap::from([
-        ("scene".to_string(), arguments.scene.display().to_string()),
-        ("step_s".to_string(), format!("{:?}", scene.model.parameters().step_s)),
-        ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
-    ]);
-    let state = State::new(&scene.model);
-    let input = scene.input_at(0.0);
-    Ok(LogWriter::new(file, scene.names(), facts, &files, (&scene.model, &state, &input))?)
 }
