@@ -9,6 +9,7 @@
 use crate::error::Error;
 use alloc::format;
 use alloc::vec::Vec;
+use core::cmp::Ordering;
 use glam::{DMat3, DVec3};
 
 /// Residual compliance between surface nodes.
@@ -43,18 +44,21 @@ impl ResidualCompliance {
         match self {
             Self::None => DMat3::ZERO,
             Self::Whole(packed) => {
-                let entry = |r: usize, c: usize| {
-                    let (r, c) = if r < c { (c, r) } else { (r, c) };
-                    f64::from(packed[r * (r + 1) / 2 + c])
+                // Three numbers in each of three rows lie side by side below the diagonal.
+                let (low, high) = (i.min(j), i.max(j));
+                let row = |axis: usize| {
+                    let at = 3 * high + axis;
+                    let numbers = &packed[at * (at + 1) / 2 + 3 * low..];
+                    let own = |k: usize| if low < high || k <= axis { f64::from(numbers[k]) } else { 0.0 };
+                    DVec3::new(own(0), own(1), own(2))
                 };
-                let column = |b: usize| {
-                    DVec3::new(
-                        entry(3 * i, 3 * j + b),
-                        entry(3 * i + 1, 3 * j + b),
-                        entry(3 * i + 2, 3 * j + b),
-                    )
-                };
-                DMat3::from_cols(column(0), column(1), column(2))
+                // The columns of the block of (low, high) are its rows.
+                let block = DMat3::from_cols(row(0), row(1), row(2));
+                match i.cmp(&j) {
+                    Ordering::Less => block,
+                    Ordering::Greater => block.transpose(),
+                    Ordering::Equal => block + block.transpose() - DMat3::from_diagonal(block.diagonal()),
+                }
             }
             Self::NearField(near) => {
                 let row = near.offsets[i] as usize..near.offsets[i + 1] as usize;
@@ -63,6 +67,18 @@ impl ResidualCompliance {
                     Err(_) => DMat3::ZERO,
                 }
             }
+        }
+    }
+
+    /// The trace of a block [m/N].
+    pub(crate) fn trace(&self, i: usize, j: usize) -> f64 {
+        match self {
+            Self::Whole(packed) if i != j => {
+                let (low, high) = (i.min(j), i.max(j));
+                let row = |axis: usize| (3 * high + axis) * (3 * high + axis + 1) / 2 + 3 * low + axis;
+                (0..3).map(|axis| f64::from(packed[row(axis)])).sum()
+            }
+            _ => self.block(i, j).diagonal().element_sum(),
         }
     }
 

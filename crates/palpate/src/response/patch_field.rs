@@ -140,20 +140,25 @@ impl PatchField {
                     weights.of(c).for_each(|(node, _)| spread[node] = 0.0);
                     sum
                 }
-                _ => {
-                    let pairs =
-                        weights.of(c).flat_map(|(i, wi)| weights.of(c).map(move |(j, wj)| (i, j, wi * wj)));
-                    pairs.map(|(i, j, w)| recording.residual.block(i, j) * w).sum()
+                residual => {
+                    let of_lower = |(i, wi): (usize, f64)| {
+                        let below = weights.of(c).filter(move |(j, _)| *j < i);
+                        let half = residual.block(i, i) * (0.5 * wi);
+                        let sum =
+                            below.map(|(j, wj)| residual.block(i, j) * wj).fold(half, |a, b| a + b) * wi;
+                        sum + sum.transpose()
+                    };
+                    weights.of(c).map(of_lower).sum()
                 }
             })
             .collect();
         let roots = own.iter().map(root).collect();
         let places: Vec<DVec3> = nodes.iter().map(|&node| surface.positions[node as usize]).collect();
-        let mut field = vec![DMat3::ZERO; surface.positions.len()];
+        let mut field = vec![0.0; surface.positions.len()];
         let shares = |c: usize, others: &[usize]| -> Vec<f64> {
             answer(&recording.residual, weights.of(c), &mut field);
             let scale = |d: usize| libm::sqrt(trace(&own[c]) * trace(&own[d]));
-            let between = |d: usize| weights.of(d).map(|(j, w)| trace(&field[j]) * w).sum::<f64>();
+            let between = |d: usize| weights.of(d).map(|(j, w)| field[j] * w).sum::<f64>();
             others.iter().map(|&d| between(d) / scale(d)).collect()
         };
         let range = fit_range(&places, surface.mean_edge(), radius, shares);
@@ -312,7 +317,7 @@ pub(crate) fn residual_size(recording: &Recording, node: usize) -> f64 {
 }
 
 fn trace(matrix: &DMat3) -> f64 {
-    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
+    matrix.diagonal().element_sum()
 }
 
 /// Lower Cholesky factor of a positive semi-definite matrix; directions without compliance get none.
@@ -334,13 +339,16 @@ fn root(matrix: &DMat3) -> DMat3 {
     DMat3::from_cols_array_2d(&lower).transpose()
 }
 
-/// What a force that is spread over a patch does to every node by the residual compliance, for each direction: Σᵢ wᵢ·Sᵢⱼ.
-fn answer(residual: &ResidualCompliance, patch: impl Iterator<Item = (usize, f64)>, field: &mut [DMat3]) {
-    field.fill(DMat3::ZERO);
+/// What a force that is spread over a patch does to every node by the residual compliance, on average over its directions,
+/// times three: Σᵢ wᵢ·tr Sᵢⱼ.
+fn answer(residual: &ResidualCompliance, patch: impl Iterator<Item = (usize, f64)>, field: &mut [f64]) {
+    field.fill(0.0);
     for (i, w) in patch {
         match residual {
-            ResidualCompliance::NearField(near) => near.row(i).for_each(|(j, block)| field[j] += block * w),
-            _ => field.iter_mut().enumerate().for_each(|(j, sum)| *sum += residual.block(i, j) * w),
+            ResidualCompliance::NearField(near) => {
+                near.row(i).for_each(|(j, block)| field[j] += trace(&block) * w);
+            }
+            _ => field.iter_mut().enumerate().for_each(|(j, sum)| *sum += residual.trace(i, j) * w),
         }
     }
 }
