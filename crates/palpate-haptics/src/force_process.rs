@@ -153,8 +153,7 @@ impl ForceProcess {
                 seat.proxy = device.proxy;
             }
             let stretch = seat.motion.position - seat.proxy;
-            let stored =
-                if force == DVec3::ZERO { 0.0 } else { 0.5 * seat.stiffness * stretch.length_squared() };
+            let stored = 0.5 * seat.stiffness * stretch.length_squared();
             seat.sequence += 1;
             seat.port.answer(Effort {
                 sequence: seat.sequence,

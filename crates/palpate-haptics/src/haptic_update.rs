@@ -15,6 +15,10 @@ const TOLD: usize = 1024;
 /// A device that has told nothing for so long [s] is lost: force passes again at a press of its button only, if it has one.
 const LOST_S: f64 = 0.1;
 
+/// What is told of an encoder's steps is smoothed over this share of the time that answers take: a coupling's damper would make a
+/// blow of every step.
+const SMOOTHED: f64 = 0.1;
+
 /// One device's haptic update without its thread: what happens in a cycle.
 pub struct HapticUpdate {
     device: Box<dyn Device>,
@@ -32,6 +36,8 @@ pub struct HapticUpdate {
     answered: u64,
     answers: Spread,
     last: Option<(f64, DVec3)>,
+    /// The place that was told last [m].
+    placed: Option<DVec3>,
     /// When the last update was [s].
     updated: Option<f64>,
     /// Why a reading or a push failed first.
@@ -85,6 +91,7 @@ impl HapticUpdate {
             answered: 0,
             answers: Spread::default(),
             last: None,
+            placed: None,
             updated: None,
             failure: None,
             held: DVec3::ZERO,
@@ -150,10 +157,11 @@ impl HapticUpdate {
             self.sequence += 1;
             self.told[(self.sequence % TOLD as u64) as usize] = now_s;
             let orientation = reading.orientation.unwrap_or(DQuat::IDENTITY);
+            let placed = self.smoothed(position, now_s, since_update);
             self.port.tell(Motion {
                 sequence: self.sequence,
                 time_s: now_s,
-                position,
+                position: placed,
                 orientation: self.mount.world_orientation(orientation),
                 buttons: reading.buttons,
                 mode: None,
@@ -175,6 +183,20 @@ impl HapticUpdate {
         };
         let force = self.safety.limit(wanted, age_s, speed, since_update);
         self.push(force, now_s);
+    }
+
+    /// A place that was read [m, world], smoothed if it comes in steps.
+    fn smoothed(&mut self, position: DVec3, now_s: f64, dt_s: f64) -> DVec3 {
+        let told_s = self.told[(self.answered % TOLD as u64) as usize];
+        let over_s = if self.answered > 0 && self.device.traits().resolution_m > 0.0 {
+            SMOOTHED * (now_s - told_s).clamp(0.0, LOST_S)
+        } else {
+            0.0
+        };
+        let before = self.placed.unwrap_or(position);
+        let placed =
+            if dt_s > 0.0 { before + (position - before) * (dt_s / (dt_s + over_s)) } else { position };
+        *self.placed.insert(placed)
     }
 
     /// Push the hand no more.

@@ -282,9 +282,8 @@ fn account_coupling(model: &Model, number: usize, device: &mut DeviceState, coup
         device.proxy = device.last;
         return;
     }
-    // A device that meets nothing takes its proxy along; what was stored is lost then too.
-    let meets = coupling.is_none() || device.force != DVec3::ZERO;
-    let after = if meets { device.target - device.proxy_under_force() } else { DVec3::ZERO };
+    // Without force the stretch goes as the damper lets it: a proxy that was pulled off a surface does not fall into the body.
+    let after = device.target - device.proxy_under_force();
     if coupling.is_some() {
         let (work, change) = (device.force.dot(after - before), stored(after) - stored(before));
         couplings.input += work;
