@@ -57,7 +57,8 @@ fn a_log_of_a_run_in_real_time_repeats_bit_for_bit_anywhere() {
     assert!(steps.column("left.fx").iter().any(|force| *force < -1e-3), "the left finger feels the cube");
     assert!(elsewhere.text("contacts.csv").contains("cube,floor,"));
     assert_eq!(elsewhere.files(), ["contacts.csv", "run.mcap", "steps.csv"], "and leaves nothing behind");
-    let text = elsewhere.succeed(&["replay", "run.mcap"]);
+    assert_eq!(elsewhere.fail(&["replay", "run.mcap", "--runs", "0"]), "--runs is 0, expected 1 or more");
+    let text = elsewhere.succeed(&["replay", "run.mcap", "--runs", "3"]);
     assert!(text.starts_with("300 steps replayed: every number came out again, bit for bit\n"), "{text}");
 
     // Whatever byte of it is wrong, it says so or comes out the same, and never breaks.
