@@ -82,8 +82,9 @@ pub(crate) struct Vicinity {
     walk: Walk,
     passed: usize,
     part: usize,
-    /// How far the point and the surface had gone in the last step [m], and go in one on average [m].
-    gone: f64,
+    /// How far the point and the surface had gone in the last step [m], if the same was known then, and go in one on
+    /// average [m].
+    gone: Option<f64>,
     speed: f64,
     many: usize,
 }
@@ -97,7 +98,7 @@ impl Vicinity {
             walk: Walk::OVER,
             passed: 0,
             part: LEAST_PART,
-            gone: 0.0,
+            gone: None,
             speed: 0.0,
             many: MANY,
         }
@@ -111,8 +112,9 @@ impl Vicinity {
         let gone = self.now.gone(sight, p);
         let spare = self.now.reach - reach;
         let left = spare - gone;
-        self.speed += SHARE * ((gone - self.gone).max(0.0) - self.speed);
-        self.gone = gone;
+        if let Some(before) = self.gone.replace(gone) {
+            self.speed += SHARE * ((gone - before).max(0.0) - self.speed);
+        }
         let parts = PARTS * spare / self.speed;
         let soon = self.walk.is_over() && parts < LEAST_PARTS && left < EARLY * spare && !search.renewed;
         if left <= 0.0 || self.now.reach == 0.0 || soon {
@@ -203,7 +205,7 @@ impl Vicinity {
             next.seeds.extend(found.iter().map(|found| found.triangle));
         }
         core::mem::swap(now, next);
-        self.gone = 0.0;
+        self.gone = None;
     }
 }
 
