@@ -44,6 +44,6 @@ pub use passivity::PassivityController;
 pub use playback::Playback;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};
 pub use safety::{Safety, SafetyCounts, SafetyLimits};
-pub use scheduling::{Granted, Scheduling};
+pub use scheduling::{Granted, Scheduling, stolen_s};
 pub use session::{Attached, DeviceReport, Report, Session, SessionDevice, run_update};
 pub use timing::{Cycle, CycleListener, CycleTeller, Percentiles, Spread, Timing, cycles};

@@ -57,6 +57,19 @@ impl Scheduling {
     }
 }
 
+/// Time [s] since the start in which the machine below this one ran something else when it was a core's turn, or any
+/// core's (the steal time of a virtual machine); none where the system does not tell. It comes in hundredths of a second.
+pub fn stolen_s(core: Option<usize>) -> Option<f64> {
+    parse_stolen(&std::fs::read_to_string("/proc/stat").ok()?, core)
+}
+
+fn parse_stolen(text: &str, core: Option<usize>) -> Option<f64> {
+    let name = core.map_or_else(|| "cpu".to_string(), |core| format!("cpu{core}"));
+    let mut numbers =
+        text.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(&name))?;
+    numbers.nth(8)?.parse::<f64>().ok().map(|hundredths| hundredths / 100.0)
+}
+
 /// Keep all memory of the process in memory, now and later.
 fn lock_memory() -> Result<(), String> {
     use rustix::mm::{MlockAllFlags, mlockall};
@@ -87,6 +100,15 @@ impl fmt::Display for Granted {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stolen_time_is_that_of_the_core() {
+        let text =
+            "cpu  4 5 4 1 2 0 5 5555 0 0\ncpu1 2 3 0 0 7 0 9 2866 0 0\ncpu10 1 1 1 1 1 1 1 1 0 0\ncpu2 1 2\n";
+        let of = |core| parse_stolen(text, core);
+        assert_eq!((of(None), of(Some(1)), of(Some(10))), (Some(55.55), Some(28.66), Some(0.01)));
+        assert_eq!((of(Some(0)), of(Some(2))), (None, None));
+    }
 
     #[test]
     fn what_is_not_granted_says_why() {

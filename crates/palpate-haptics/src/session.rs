@@ -12,7 +12,7 @@ use crate::passivity::PassivityController;
 use crate::playback::Playback;
 use crate::port::{DevicePort, ForcePort, port};
 use crate::safety::{Safety, SafetyLimits};
-use crate::scheduling::{Granted, Scheduling};
+use crate::scheduling::{Granted, Scheduling, stolen_s};
 use crate::timing::{Cycle, CycleTeller, Spread, Timing};
 use palpate::{DeviceMode, Model, State};
 use std::io::{Seek, Write};
@@ -99,6 +99,9 @@ pub struct Report {
     pub log: Option<LogSummary>,
     /// Wall-clock time [s] that the steps took.
     pub wall_s: f64,
+    /// Of that what the machine below this one took from the force process's core, where the system tells, see
+    /// [`crate::stolen_s`].
+    pub stolen_s: Option<f64>,
 }
 
 /// How it went for a device.
@@ -134,6 +137,7 @@ struct Forces {
     timing: Timing,
     unsolved: u64,
     wall_s: f64,
+    stolen_s: Option<f64>,
     missed: u64,
 }
 
@@ -227,6 +231,7 @@ impl Session {
                 unsolved: forces.unsolved,
                 log: steps.map(|steps| LogSummary { steps, missed: forces.missed }),
                 wall_s: forces.wall_s,
+                stolen_s: forces.stolen_s,
             };
             Ok((report, out))
         })
@@ -281,6 +286,8 @@ impl Running<'_> {
             cycles.begin(granted.clone());
         }
         process.warm_up();
+        let stolen = || stolen_s(granted.core.clone().ok().flatten());
+        let stolen_before = stolen();
         std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();
         let mut unsolved = 0;
@@ -333,8 +340,9 @@ impl Running<'_> {
             tick = next;
         }
         let wall_s = Instant::now().saturating_duration_since(begun_all).as_secs_f64();
+        let stolen_s = stolen().zip(stolen_before).map(|(after, before)| after - before);
         let missed = hand.map_or(0, |hand| hand.missed());
-        Forces { process, granted, timing, unsolved, wall_s, missed }
+        Forces { process, granted, timing, unsolved, wall_s, stolen_s, missed }
     }
 }
 

@@ -56,6 +56,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         "steps": report.steps,
         "step_s": scene.model.parameters().step_s,
         "wall_s": report.wall_s,
+        "stolen_s": report.stolen_s,
         "granted": report.granted.to_string(),
         "force_process": timing(&report.force),
         "deformation_process": timing(&report.pictures),
@@ -105,6 +106,12 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     }
     out += "\n";
     out += &overruns(report, step_s);
+    if let Some(stolen_s) = report.stolen_s.filter(|stolen_s| *stolen_s > 0.0) {
+        let share = 100.0 * stolen_s / report.wall_s;
+        out += &format!(
+            "  stolen       {stolen_s:.2} s of its core ({share:.2} %) went to something else on the machine below this one\n"
+        );
+    }
     for (device, own) in here() {
         out += &format!("  {:<12} {}\n", device.name, device_line(own));
     }
