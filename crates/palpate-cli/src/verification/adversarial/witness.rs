@@ -199,21 +199,21 @@ impl<'a> Witness<'a> {
         self.work -= out.force_on_hand.dot(given.position - place);
         self.tally.one_sided.take(is_one_sided(device, output), at);
         let tiny = 8.0 * f64::EPSILON * (given.position.length() + out.proxy.length());
-        let away = stretch.length() > tiny;
         let parameters = &self.model.parameters().devices[device];
-        match parameters.coupling {
-            Some(coupling) => {
-                let rate = coupling.damping / self.model.parameters().step_s;
-                let bound = coupling.stiffness * stretch.length() + rate * (stretch - last).length();
-                let slack = (coupling.stiffness + 2.0 * rate) * tiny;
-                self.tally.ratio.take(force / (bound + slack), at);
-                self.tally.left_behind.take(away && force == 0.0, at);
-            }
-            None => self.tally.left_behind.take(away, at),
+        // Without force a proxy goes as its coupling lets it: f = k·e + d·ė = 0.
+        let mut left_behind = stretch.length() > tiny;
+        if let Some(coupling) = parameters.coupling {
+            let rate = coupling.damping / self.model.parameters().step_s;
+            let bound = coupling.stiffness * stretch.length() + rate * (stretch - last).length();
+            let slack = (coupling.stiffness + 2.0 * rate) * tiny;
+            self.tally.ratio.take(force / (bound + slack), at);
+            let free = last * (rate / (coupling.stiffness + rate));
+            left_behind = force == 0.0 && (stretch - free).length() > tiny;
         }
+        self.tally.left_behind.take(left_behind, at);
         if hand.escaped {
             self.tally.escapes += 1;
-            self.tally.stuck.take(away || force != 0.0, at);
+            self.tally.stuck.take(left_behind || force != 0.0, at);
         }
         self.before[device] = Some([given.position, stretch]);
     }
@@ -287,7 +287,7 @@ impl Tally {
             ),
             none("steps unsolved that don't say so", &self.silent),
             Check::new(format!("{of}: force over what its coupling gives"), self.ratio.value, 1.0, 1e-9),
-            none("proxies without force and not at their device", &self.left_behind),
+            none("proxies without force that do not go as their coupling", &self.left_behind),
             none(&format!("of {} steps of devices that left, with force", self.escapes), &self.stuck),
         ]
     }
