@@ -39,7 +39,7 @@ pub struct Tally {
     pub unbooked: Worst,
     /// Forces on hands that are not what their contacts do to the objects.
     pub one_sided: Seen,
-    /// Devices without force whose proxy is elsewhere.
+    /// Devices without force whose proxy is not where their coupling lets it be.
     pub left_behind: Seen,
     /// Steps of devices that have escaped, and those in which something still held them.
     pub escapes: u64,
