@@ -73,7 +73,7 @@ pub struct DeviceOutput {
     /// Force on the hand [N, world]: the reaction, held over the step.
     pub force_on_hand: DVec3,
     /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
-    /// the device's position if it meets nothing.
+    /// the device's position if it meets nothing and no coupling's damper lets it come later.
     pub proxy: DVec3,
 }
 
