@@ -56,6 +56,8 @@ pub struct View<'a> {
     pub step: usize,
     /// A direction in which nothing is in the way of the proxy, and the proxy [m], if asked for and if there is one.
     pub way_out: &'a dyn Fn() -> Option<(DVec3, DVec3)>,
+    /// The share of what the proxy is behind the hand that it is behind after a step in which nothing holds it.
+    pub lag: f64,
 }
 
 /// A random hand.
@@ -105,7 +107,8 @@ impl Hand {
         if self.phase == Phase::Escape {
             self.left = STAY;
             if let Some((direction, proxy)) = (view.way_out)() {
-                self.position = proxy + direction * (FAR * view.size);
+                // The proxy goes in that direction.
+                self.position = proxy + direction * (FAR * view.size) + (self.position - proxy) * view.lag;
                 self.escaped = true;
             }
         }

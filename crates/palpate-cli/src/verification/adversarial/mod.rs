@@ -60,7 +60,8 @@ fn play(body: &Arc<Recording>, number: usize, scene: usize) -> Result<Tally, Fai
         let poses: Vec<Pose> = state.output().objects.iter().map(|object| object.pose).collect();
         let devices = hands.iter_mut().enumerate().map(|(device, hand)| {
             let way_out = || way_out::way_out(&model, &state, device);
-            let view = View { poses: &poses, size: body.surface.radius(), step: number, way_out: &way_out };
+            let (size, lag) = (body.surface.radius(), lag(&model, device));
+            let view = View { poses: &poses, size, step: number, way_out: &way_out, lag };
             hand.next(&mut random, &view)
         });
         let input = Input { devices: devices.collect(), ..Input::default() };
@@ -69,6 +70,15 @@ fn play(body: &Arc<Recording>, number: usize, scene: usize) -> Result<Tally, Fai
         }
     }
     Ok(witness.tally)
+}
+
+/// The share of a device's stretch that its coupling's damper leaves after a step without force.
+fn lag(model: &Model, device: usize) -> f64 {
+    let parameters = model.parameters();
+    parameters.devices[device].coupling.map_or(0.0, |coupling| {
+        let rate = coupling.damping / parameters.step_s;
+        rate / (coupling.stiffness + rate)
+    })
 }
 
 /// One to three devices, one object or two, with gravity or without, on a floor or not.

@@ -207,7 +207,7 @@ impl<'a> Witness<'a> {
             let bound = coupling.stiffness * stretch.length() + rate * (stretch - last).length();
             let slack = (coupling.stiffness + 2.0 * rate) * tiny;
             self.tally.ratio.take(force / (bound + slack), at);
-            let free = last * (rate / (coupling.stiffness + rate));
+            let free = last * super::lag(self.model, device);
             left_behind = force == 0.0 && (stretch - free).length() > tiny;
         }
         self.tally.left_behind.take(left_behind, at);
