@@ -50,6 +50,12 @@ impl Serving {
         (head.split(' ').nth(1).unwrap_or_default().to_string(), answer[end..].to_vec())
     }
 
+    /// A frame of the second of two logs, when it is made.
+    fn frame_of_the_second_log(&self, number: u32) -> Vec<u8> {
+        let path = format!("/log/1/frames?from={number}&count=1");
+        std::iter::repeat_with(|| self.get(&path).1).find(|frame| !frame.is_empty()).expect("it repeats")
+    }
+
     /// Its status after Ctrl-C.
     fn interrupt(self) -> Option<i32> {
         self.interrupted().0
@@ -238,11 +244,7 @@ fn what_is_done_with_a_pointer_is_logged_and_every_scene_is_a_log_of_its_own() {
     let glb = elsewhere.read("run.glb");
     assert!(String::from_utf8_lossy(&glb).contains("\"scale\":[0.0,0.0,0.0]"), "fingers that are away");
     let serving = Serving::new(&elsewhere, &["run.mcap", "run-3.mcap"]);
-    let mut frames = Vec::new();
-    while frames.is_empty() {
-        frames = serving.get("/log/1/frames?from=1&count=1").1;
-    }
-    assert_eq!(&frames[4..8], b"PLPF");
+    assert_eq!(&serving.frame_of_the_second_log(1)[4..8], b"PLPF");
     assert_eq!(serving.interrupt(), Some(0));
 }
 
@@ -251,11 +253,7 @@ fn a_log_is_shown_and_drawn_the_same_every_time() {
     let workplace = realtime::workplace();
     workplace.succeed(&["run", "fingers.toml", "--realtime", "--duration", "0.4", "--log", "run.mcap"]);
     let serving = Serving::new(&workplace, &["run.mcap", "run.mcap"]);
-    let mut frames = Vec::new();
-    while frames.is_empty() {
-        frames = serving.get("/log/1/frames?from=20&count=1").1;
-    }
-    assert_eq!(&frames[4..8], b"PLPF");
+    assert_eq!(&serving.frame_of_the_second_log(20)[4..8], b"PLPF");
     assert_eq!(serving.interrupt(), Some(0));
 
     for (arguments, expected) in [

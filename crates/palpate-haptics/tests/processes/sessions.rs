@@ -3,7 +3,7 @@
 use super::scenes::{half_width, model, path};
 use palpate::{DeviceMode, Input, Pose};
 use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
-use palpate_haptics::log::{LogWriter, Names, Reader};
+use palpate_haptics::log::{LogHand, LogWriter, Names, Reader};
 use palpate_haptics::{
     Attached, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
 };
@@ -49,9 +49,8 @@ fn session(steps: Option<u64>) -> Session {
     }
 }
 
-#[test]
-fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
-    let session = session(Some(400));
+/// A log of a session, whose begin fits.
+fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogHand, LogWriter<W>) {
     let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
     let names = Names {
         objects: vec!["body".into()],
@@ -63,7 +62,13 @@ fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
         obstacles: vec![session.model.parameters().obstacles[0].pose],
     };
     let start = (&*session.model, process.state(), &input);
-    let log = LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log");
+    LogWriter::new(out, names, BTreeMap::new(), &[], start).expect("a log")
+}
+
+#[test]
+fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
+    let session = session(Some(400));
+    let log = log_to(Cursor::new(Vec::new()), &session);
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let mut frames = 0;
     let mut pictures = DeformationProcess::new(session.model.clone());
@@ -111,19 +116,8 @@ impl Seek for Disk {
 #[test]
 fn a_disk_that_is_full_ends_the_log_and_nothing_else() {
     let session = session(Some(400));
-    let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
-    let names = Names {
-        objects: vec!["body".into()],
-        devices: vec!["a".into(), "b".into()],
-        obstacles: vec!["floor".into()],
-    };
-    let input = Input {
-        devices: vec![palpate::DeviceInput::away(); 2],
-        obstacles: vec![session.model.parameters().obstacles[0].pose],
-    };
-    let start = (&*session.model, process.state(), &input);
     let disk = Disk(Cursor::new(Vec::new()), 20_000);
-    let log = LogWriter::new(disk, names, BTreeMap::new(), &[], start).expect("so much fits");
+    let log = log_to(disk, &session);
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let (report, out) = session.run(Some(log), &stop, &steps, |_| ()).expect("it runs");
     assert_eq!((report.steps, report.log), (400, None));

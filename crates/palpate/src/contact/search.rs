@@ -2,6 +2,7 @@
 
 use super::sight::{Found, Sight};
 use crate::response::Body;
+use crate::surface::Walk;
 use alloc::vec::Vec;
 use glam::DVec3;
 
@@ -40,17 +41,8 @@ impl Search {
     /// # Real time
     /// Costs the triangles within reach, and the logarithm of all.
     pub(crate) fn near(&mut self, sight: &mut Sight, p: DVec3, reach: f64) {
-        let found = &mut self.found;
-        found.clear();
-        sight.walk(
-            |_, _, centre, radius| (p - centre).length() - radius < reach,
-            |sight, triangle, _| {
-                let one = sight.nearest_on(triangle, p);
-                if one.distance < reach {
-                    take_in(found, one);
-                }
-            },
-        );
+        self.found.clear();
+        take_near(sight, (&mut Walk::BEGUN.clone(), usize::MAX), p, reach, &mut self.found);
         sort(&mut self.found);
     }
 
@@ -127,8 +119,29 @@ impl Search {
     }
 }
 
+/// Take in the triangles within a reach [m] of a body point from where a walk stands, past so many spheres and triangles.
+/// Gives how many they were.
+pub(super) fn take_near(
+    sight: &mut Sight,
+    walk: (&mut Walk, usize),
+    p: DVec3,
+    reach: f64,
+    found: &mut Vec<Found>,
+) -> usize {
+    sight.walk_on(
+        walk,
+        |_, _, centre, radius| (p - centre).length() - radius < reach,
+        |sight, triangle, _| {
+            let one = sight.nearest_on(triangle, p);
+            if one.distance < reach {
+                take_in(found, one);
+            }
+        },
+    )
+}
+
 /// Take in what was found; where there is no room the nearest stay.
-pub(super) fn take_in(found: &mut Vec<Found>, one: Found) {
+fn take_in(found: &mut Vec<Found>, one: Found) {
     if found.len() < MOST_FOUND {
         found.push(one);
         return;

@@ -162,17 +162,17 @@ pub(crate) fn touch(
 ///
 /// # Real time
 pub(crate) fn look_ahead(scene: &mut Finding, number: usize, at: usize) {
+    let of = number * scene.model.objects.len() + at;
+    let Some(moment) = scene.vicinities[of].lend_moment() else { return };
     let dents = own_dents(scene, number, at);
-    let vicinity = &mut scene.vicinities[number * scene.model.objects.len() + at];
-    let Some(moment) = vicinity.lend_moment() else { return };
     let (body, own) = (&scene.model.objects[at].body, &scene.objects[at]);
     let parameters = &scene.model.parameters.devices[number];
     let (reading, cache) = (body.reading(parameters.patch_radius), &mut scene.caches[at]);
     let moment_then = Err(&moment[..own.response.coordinates().len()]);
     let mut sight = Sight::new(body, reading, &own.response, &own.points, cache, moment_then);
     sight.without_dents(dents, flat(parameters, body));
-    vicinity.grow(&mut sight);
-    vicinity.take_back(moment, body);
+    scene.vicinities[of].grow(&mut sight);
+    scene.vicinities[of].take_back(moment, body);
 }
 
 /// The places that a device touches already: their dents are its own.

@@ -1,7 +1,7 @@
 //! The triangles around a point that moves little from step to step: remembered while they are all that can be near, and
 //! found anew a part in each step before they are needed.
 
-use super::search::{MOST_FOUND, Search, keep_minima, sort, take_in};
+use super::search::{MOST_FOUND, Search, keep_minima, sort, take_near};
 use super::sight::{Found, Sight};
 use crate::response::Body;
 use crate::surface::Walk;
@@ -177,16 +177,7 @@ impl Vicinity {
         let Self { next, found, walk, .. } = self;
         let (p, reach, dent) = (next.point, next.reach, sight.most_dent());
         next.dent = [next.dent[0].min(dent), next.dent[1].max(dent)];
-        self.passed += sight.walk_on(
-            (walk, most),
-            |_, _, centre, radius| (p - centre).length() - radius < reach,
-            |sight, triangle, _| {
-                let one = sight.nearest_on(triangle, p);
-                if one.distance < reach {
-                    take_in(found, one);
-                }
-            },
-        );
+        self.passed += take_near(sight, (walk, most), p, reach, found);
     }
 
     /// All is found: let it take its place.
