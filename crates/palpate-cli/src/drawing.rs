@@ -3,7 +3,7 @@
 use crate::Failure;
 use crate::log_shows::ShownLog;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_viewer::{Exhibit, RenderJob, RenderWish, Server, Settings};
+use palpate_viewer::{RenderJob, RenderRequest, ServedContent, Server, Settings};
 use std::io::IsTerminal;
 use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub type TakePicture<'a> = &'a mut dyn FnMut(u64, Vec<u8>) -> Result<(), Failure
 /// Compute a log again and draw what is wished for, in its order, until it is done or `stop` is set.
 pub fn draw(
     log: ShownLog,
-    wish: RenderWish,
+    wish: RenderRequest,
     browser: &Path,
     stop: &AtomicBool,
     take: TakePicture,
@@ -39,7 +39,8 @@ pub fn draw(
     let done = AtomicBool::new(false);
     let (size, count) = ((wish.width, wish.height), wish.frames.len() as u64);
     std::thread::scope(|scope| {
-        let serving = scope.spawn(|| server.run(Exhibit::Render(show, RenderJob { wish, pictures }), &done));
+        let serving =
+            scope.spawn(|| server.run(ServedContent::Render(show, RenderJob { wish, pictures }), &done));
         let drawn = Browser::open(browser, &address, size)
             .and_then(|mut browser| collect(&mut browser, &arrived, count, stop, take));
         done.store(true, Ordering::Release);

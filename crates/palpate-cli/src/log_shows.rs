@@ -3,8 +3,8 @@
 use crate::Failure;
 use crate::logged_run::LoggedRun;
 use crate::stages::describe;
-use palpate_haptics::Moment;
-use palpate_viewer::{LogMaker, LogShow};
+use palpate_haptics::Snapshot;
+use palpate_viewer::{LogFrameBuilder, LogFrames};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,9 +16,9 @@ const MOST_FRAMES: u64 = 36_000;
 pub struct ShownLog {
     run: LoggedRun,
     wanted: Wanted,
-    maker: LogMaker,
+    maker: LogFrameBuilder,
     /// What the viewer is given.
-    pub show: Arc<LogShow>,
+    pub show: Arc<LogFrames>,
 }
 
 /// The steps, counted from the start at 0, that become pictures.
@@ -78,7 +78,7 @@ impl ShownLog {
         let about = format!("{:.1} s at {:.0} Hz", run.steps as f64 * step_s, 1.0 / step_s);
         let description = describe(&run.scene, (None, name.clone(), about), |_, _| false);
         let model = run.scene.model.clone();
-        let (show, maker) = LogShow::new(number, name, model, description, frames.count, frames.apart_s);
+        let (show, maker) = LogFrames::new(number, name, model, description, frames.count, frames.apart_s);
         Ok(Self { run, wanted, maker, show })
     }
 
@@ -93,7 +93,7 @@ impl ShownLog {
         let model = &run.scene.model;
         let starts = run.state_at_start().and_then(|state| Ok((state, run.input_at_start()?)));
         let made = starts.and_then(|(mut state, start)| {
-            let mut moment = Moment::new(model, &state, &start);
+            let mut moment = Snapshot::new(model, &state, &start);
             if wanted.has(0) {
                 maker.take(&moment);
             }

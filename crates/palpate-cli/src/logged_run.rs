@@ -46,7 +46,7 @@ impl LoggedRun {
     pub fn state_at_start(&self) -> Result<State, Failure> {
         let model = &self.scene.model;
         let motions = self.reader()?.start(&self.names).map_err(|error| named(&self.path, &error))?;
-        Ok(motions.map_or_else(|| State::new(model), |motions| State::going_on(model, &motions)))
+        Ok(motions.map_or_else(|| State::new(model), |motions| State::resume(model, &motions)))
     }
 
     /// Where devices and obstacles are at the start; of a device without a path that is known from the first step on.

@@ -4,8 +4,8 @@ use crate::Failure;
 use crate::scene_file::Scene;
 use crate::whole_file::{WholeFile, check_target, check_writable};
 use palpate::{Input, Model, State};
-use palpate_haptics::log::{LogHand, LogSummary, LogWriter, Names};
-use palpate_viewer::{LogFile, LogOpener, PageTeller};
+use palpate_haptics::log::{LogSender, LogSummary, LogWriter, Names};
+use palpate_viewer::{LogFile, LogOpener, PageNotifier};
 use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -40,11 +40,15 @@ impl LoggedScene {
     }
 
     /// Begin a log in a file that takes its name when it is finished.
-    pub fn begin(&self, path: &Path, state: &State) -> Result<(LogHand, LogWriter<WholeFile>), Failure> {
+    pub fn begin(&self, path: &Path, state: &State) -> Result<(LogSender, LogWriter<WholeFile>), Failure> {
         self.begin_in(WholeFile::create(path, &self.inputs())?, state)
     }
 
-    fn begin_in<W: Write + Seek>(&self, file: W, state: &State) -> Result<(LogHand, LogWriter<W>), Failure> {
+    fn begin_in<W: Write + Seek>(
+        &self,
+        file: W,
+        state: &State,
+    ) -> Result<(LogSender, LogWriter<W>), Failure> {
         let facts = BTreeMap::from([
             (
                 "scene".to_string(),
@@ -168,7 +172,7 @@ struct SeriesFile {
     path: PathBuf,
     step_s: f64,
     series: Arc<LogSeries>,
-    pages: PageTeller,
+    pages: PageNotifier,
     /// Until then whoever begins it tells what fails.
     begun: Arc<AtomicBool>,
     failed: bool,

@@ -12,7 +12,7 @@ use crate::system::System;
 use faer::Mat;
 use glam::{DMat3, DVec3};
 use palpate::{
-    Certificate, CertificateEvent, Damping, HeldOscillator, Oscillation, ResidualCompliance, Surface,
+    Certificate, CertificateEvent, Damping, OscillatorState, ResidualCompliance, SampledOscillator, Surface,
 };
 
 /// Sampled points, and how many of them carry a patch as well.
@@ -250,9 +250,9 @@ fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     (difference / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
-fn oscillator(mode: &LoadedMode, damping: Damping) -> HeldOscillator {
+fn oscillator(mode: &LoadedMode, damping: Damping) -> SampledOscillator {
     let omega = mode.square.sqrt();
-    HeldOscillator::new(omega, damping.ratio(omega), EVENT.step_s)
+    SampledOscillator::new(omega, damping.ratio(omega), EVENT.step_s)
 }
 
 impl Response {
@@ -317,7 +317,7 @@ impl Response {
     fn press(&self, damping: Damping, axis: DVec3, steps: usize, all: bool) -> Vec<DVec3> {
         let modes = self.kept.iter().chain(self.left_out.iter().filter(|_| all));
         let mut modes: Vec<_> =
-            modes.map(|m| (oscillator(m, damping), m.gain, Oscillation::default())).collect();
+            modes.map(|m| (oscillator(m, damping), m.gain, OscillatorState::default())).collect();
         let compliance = if all { self.instantaneous(damping) } else { self.modelled_instantaneous(damping) };
         let inverse = compliance.inverse();
         (1..=steps)

@@ -10,7 +10,7 @@ use crate::residual::missed;
 use crate::transient::{Motion, Transient};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, Par};
-use palpate::{Damping, HeldOscillator, Oscillation, ResidualCompliance, Sampling};
+use palpate::{Damping, OscillatorState, ResidualCompliance, SampledOscillator, Sampling};
 use rayon::prelude::*;
 
 /// What is put into a table.
@@ -269,8 +269,8 @@ impl ClosedForm {
         let looks = looks(parameters.sampling);
         for (i, square) in modes.squares.iter().enumerate() {
             let omega = square.sqrt();
-            let oscillator = HeldOscillator::new(omega, damping.ratio(omega), between_looks(parameters));
-            let mut state = Oscillation::default();
+            let oscillator = SampledOscillator::new(omega, damping.ratio(omega), between_looks(parameters));
+            let mut state = OscillatorState::default();
             for look in 0..parameters.samples * looks {
                 state = oscillator.advance(state, if look < looks { 1.0 } else { 0.0 });
                 answers[look / looks * m + i] += state.q / looks as f64;

@@ -1,8 +1,8 @@
 //! The deformation process (paper, section 3.2): whole surfaces for the eye, beside the force.
 
-use crate::moment::Moment;
+use crate::snapshot::Snapshot;
 use glam::DVec3;
-use palpate::{Model, PictureMemory, Pose};
+use palpate::{Model, Pose, ResidualFieldCache};
 use std::sync::Arc;
 
 /// The surfaces of all objects at one moment.
@@ -31,7 +31,7 @@ pub struct DeformationProcess {
     frame: Frame,
     displacement: Vec<DVec3>,
     sums: Vec<DVec3>,
-    memories: Vec<PictureMemory>,
+    memories: Vec<ResidualFieldCache>,
 }
 
 impl DeformationProcess {
@@ -45,20 +45,20 @@ impl DeformationProcess {
             normals: vec![[0.0; 3]; nodes],
         };
         let frame = Frame { time_s: 0.0, objects: nodes.into_iter().map(empty).collect() };
-        let memories = vec![PictureMemory::default(); frame.objects.len()];
+        let memories = vec![ResidualFieldCache::default(); frame.objects.len()];
         Self { model, frame, displacement: vec![DVec3::ZERO; most], sums: vec![DVec3::ZERO; most], memories }
     }
 
     /// Make the surfaces of a moment.
-    pub fn cycle(&mut self, moment: &Moment) -> &Frame {
-        let Moment { time_s, objects, .. } = moment;
+    pub fn cycle(&mut self, moment: &Snapshot) -> &Frame {
+        let Snapshot { time_s, objects, .. } = moment;
         self.frame.time_s = *time_s;
         let drawn = objects.iter().zip(&mut self.frame.objects).zip(&mut self.memories);
         for (((deformation, frame), memory), recording) in drawn.zip(self.model.recordings()) {
             let surface = &recording.surface;
             let nodes = surface.positions.len();
             let (places, sums) = (&mut self.displacement[..nodes], &mut self.sums[..nodes]);
-            deformation.remembered_displacement(&self.model, memory, places);
+            deformation.surface_displacement_cached(&self.model, memory, places);
             places.iter_mut().zip(&surface.positions).for_each(|(place, rest)| *place += *rest);
             sums.fill(DVec3::ZERO);
             for triangle in &surface.triangles {

@@ -7,7 +7,7 @@ use palpate::{DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
 
 /// Where an obstacle is at a time of the simulation [s]. It must not allocate.
-pub type Mover = Box<dyn Fn(f64) -> Pose + Send>;
+pub type ObstacleTrajectory = Box<dyn Fn(f64) -> Pose + Send>;
 
 /// A device as the force process sees it.
 struct Seat {
@@ -31,7 +31,7 @@ pub struct ForceProcess {
     state: State,
     input: Input,
     seats: Vec<Seat>,
-    movers: Vec<Mover>,
+    movers: Vec<ObstacleTrajectory>,
     steps: u64,
     /// A device that has told nothing for so long [s] is away.
     patience_s: f64,
@@ -44,7 +44,7 @@ impl ForceProcess {
     pub fn new(
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        movers: Vec<Mover>,
+        movers: Vec<ObstacleTrajectory>,
         patience_s: f64,
     ) -> Self {
         let state = State::new(&model);
@@ -56,7 +56,7 @@ impl ForceProcess {
         state: State,
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        movers: Vec<Mover>,
+        movers: Vec<ObstacleTrajectory>,
         patience_s: f64,
     ) -> Self {
         let coupling = |at: usize| model.parameters().devices.get(at).and_then(|device| device.coupling);
@@ -72,7 +72,7 @@ impl ForceProcess {
         });
         let seats: Vec<Seat> = seats.collect();
         let obstacles = movers.iter().map(|mover| mover(0.0)).collect();
-        let input = Input { devices: vec![DeviceInput::away(); seats.len()], obstacles };
+        let input = Input { devices: vec![DeviceInput::inactive(); seats.len()], obstacles };
         Self { model, state, input, seats, movers, steps: 0, patience_s }
     }
 
@@ -135,7 +135,7 @@ impl ForceProcess {
                 seat.motion = motion;
             }
             *input = if silent || !motion.position.is_finite() {
-                DeviceInput::away()
+                DeviceInput::inactive()
             } else {
                 DeviceInput { position: motion.position, mode: motion.mode.unwrap_or(seat.mode) }
             };
@@ -146,7 +146,7 @@ impl ForceProcess {
         let output = step(&self.model, &mut self.state, &self.input);
         for ((seat, input), device) in self.seats.iter_mut().zip(&self.input.devices).zip(&output.devices) {
             let force = device.force_on_hand;
-            if input.mode == DeviceMode::Away {
+            if input.mode == DeviceMode::Inactive {
                 seat.proxy = seat.motion.position;
             } else {
                 seat.worked_j -= force.dot(device.proxy - seat.proxy);

@@ -17,7 +17,7 @@ pub struct Scheduling {
 
 /// What it got; what was not granted says why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Granted {
+pub struct GrantedScheduling {
     /// Its real-time priority.
     pub priority: Result<Option<u8>, String>,
     /// Its core.
@@ -28,8 +28,8 @@ pub struct Granted {
 
 impl Scheduling {
     /// Ask the system, for the thread that calls. Whatever it refuses, the thread goes on without.
-    pub fn claim(&self) -> Granted {
-        Granted { priority: self.claim_priority(), core: self.claim_core(), memory: lock_memory() }
+    pub fn claim(&self) -> GrantedScheduling {
+        GrantedScheduling { priority: self.claim_priority(), core: self.claim_core(), memory: lock_memory() }
     }
 
     fn claim_priority(&self) -> Result<Option<u8>, String> {
@@ -59,7 +59,7 @@ impl Scheduling {
 
 /// Time [s] since the start in which the machine below this one ran something else when it was a core's turn, or any
 /// core's (the steal time of a virtual machine); none where the system does not tell. It comes in hundredths of a second.
-pub fn stolen_s(core: Option<usize>) -> Option<f64> {
+pub fn steal_time_s(core: Option<usize>) -> Option<f64> {
     parse_stolen(&std::fs::read_to_string("/proc/stat").ok()?, core)
 }
 
@@ -78,7 +78,7 @@ fn lock_memory() -> Result<(), String> {
     })
 }
 
-impl fmt::Display for Granted {
+impl fmt::Display for GrantedScheduling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.priority {
             Ok(Some(priority)) => write!(f, "real-time priority {priority}")?,

@@ -3,17 +3,17 @@
 use crate::clock::Clock;
 use crate::device::{Device, Mount, Traits};
 use crate::error::Error;
-use crate::force_process::{ForceProcess, Mover};
+use crate::force_process::{ForceProcess, ObstacleTrajectory};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
-use crate::log::{LogHand, LogSummary, LogWriter};
-use crate::moment::{Moment, Showing, showing};
+use crate::log::{LogSender, LogSummary, LogWriter};
 use crate::motion_path::MotionPath;
 use crate::passivity::PassivityController;
 use crate::playback::Playback;
 use crate::port::{DevicePort, ForcePort, port};
 use crate::safety::{Safety, SafetyLimits};
-use crate::scheduling::{Granted, Scheduling, stolen_s};
-use crate::timing::{Cycle, CycleTeller, Spread, Timing};
+use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
+use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer};
+use crate::timing::{Cycle, CycleSender, Spread, Timing};
 use palpate::{DeviceMode, Model, State};
 use std::io::{Seek, Write};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 const HEAD_START: Duration = Duration::from_millis(20);
 
 /// A device with everything that its haptic update needs.
-pub struct Attached {
+pub struct AttachedDevice {
     /// The driver.
     pub device: Box<dyn Device>,
     /// What it does in the scene.
@@ -45,7 +45,7 @@ pub struct Attached {
 /// A device of a session.
 pub enum SessionDevice {
     /// On this machine, with a haptic update of its own.
-    Here(Attached),
+    Here(AttachedDevice),
     /// Elsewhere, behind a link or under a pointer: this is its port.
     Linked(ForcePort, DeviceMode),
     /// Nobody's: it follows a path by simulated time, and feels nothing.
@@ -63,7 +63,7 @@ pub struct Session {
     /// A device for each of the model's.
     pub devices: Vec<SessionDevice>,
     /// A mover for each obstacle.
-    pub movers: Vec<Mover>,
+    pub movers: Vec<ObstacleTrajectory>,
     /// Steps after which it ends; none goes on until it is stopped.
     pub steps: Option<u64>,
     /// Pictures per second; 0 for none.
@@ -75,14 +75,14 @@ pub struct Session {
     /// What those who watch ask for.
     pub playback: Arc<Playback>,
     /// Who listens to how the force process keeps its time.
-    pub cycles: Option<CycleTeller>,
+    pub cycles: Option<CycleSender>,
 }
 
 /// How a run in real time went.
 #[derive(Debug, Clone)]
 pub struct Report {
     /// What the force process got from the system.
-    pub granted: Granted,
+    pub granted: GrantedScheduling,
     /// How it kept its time.
     pub force: Timing,
     /// How long pictures took; lateness is not looked at.
@@ -100,8 +100,8 @@ pub struct Report {
     /// Wall-clock time [s] that the steps took.
     pub wall_s: f64,
     /// Of that what the machine below this one took from the force process's core, where the system tells, see
-    /// [`crate::stolen_s`].
-    pub stolen_s: Option<f64>,
+    /// [`crate::steal_time_s`].
+    pub steal_time_s: Option<f64>,
 }
 
 /// How it went for a device.
@@ -112,7 +112,7 @@ pub struct DeviceReport {
     /// What its updates met.
     pub counts: UpdateCounts,
     /// What they got from the system.
-    pub granted: Granted,
+    pub granted: GrantedScheduling,
     /// How they kept their time.
     pub timing: Timing,
     /// How long it took from a motion to an effort that answers it.
@@ -133,11 +133,11 @@ impl Drop for SetWhenDropped<'_> {
 /// What the force process's thread gives back.
 struct Forces {
     process: ForceProcess,
-    granted: Granted,
+    granted: GrantedScheduling,
     timing: Timing,
     unsolved: u64,
     wall_s: f64,
-    stolen_s: Option<f64>,
+    steal_time_s: Option<f64>,
     missed: u64,
 }
 
@@ -149,10 +149,10 @@ impl Session {
     /// When the setting is not one, or a thread can't be started.
     pub fn run<W: Write + Seek + Send>(
         self,
-        log: Option<(LogHand, LogWriter<W>)>,
+        log: Option<(LogSender, LogWriter<W>)>,
         stop: &AtomicBool,
         steps: &AtomicU64,
-        mut show: impl FnMut(&Moment) + Send,
+        mut show: impl FnMut(&Snapshot) + Send,
     ) -> Result<(Report, Option<Result<W, Error>>), Error> {
         self.check()?;
         let Self { model, start, devices, movers, steps: most, pictures_hz, scheduling, patience_s, .. } =
@@ -166,7 +166,8 @@ impl Session {
         for (device, path) in follows.into_iter().enumerate() {
             path.into_iter().for_each(|path| process.follow(device, path));
         }
-        let (showing, mut moments) = showing(&Moment::new(&model, process.state(), process.input()));
+        let (snapshot_buffer, mut moments) =
+            snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));
         let (hand, writer) = log.unzip();
         let flags = [AtomicBool::new(false), AtomicBool::new(false)];
         let [ended, logged] = &flags;
@@ -189,8 +190,18 @@ impl Session {
                     .push(spawn(scope, "haptic update", move || run_update(update, &clock, asked, ended))?);
             }
             let clock = Clock::new(start, step_s);
-            let parts =
-                Running { process, clock, hand, showing, picture_every, most, stop, steps, playback, cycles };
+            let parts = Running {
+                process,
+                clock,
+                hand,
+                snapshot_buffer,
+                picture_every,
+                most,
+                stop,
+                steps,
+                playback,
+                cycles,
+            };
             let forcing = spawn(scope, "force", move || parts.run(scheduling))?;
             let seeing = spawn(scope, "deformation", move || {
                 let mut timing = Timing::default();
@@ -231,7 +242,7 @@ impl Session {
                 unsolved: forces.unsolved,
                 log: steps.map(|steps| LogSummary { steps, missed: forces.missed }),
                 wall_s: forces.wall_s,
-                stolen_s: forces.stolen_s,
+                steal_time_s: forces.steal_time_s,
             };
             Ok((report, out))
         })
@@ -246,7 +257,7 @@ impl Session {
             ));
         }
         for device in &self.devices {
-            let SessionDevice::Here(Attached { rate_hz: rate, .. }) = device else { continue };
+            let SessionDevice::Here(AttachedDevice { rate_hz: rate, .. }) = device else { continue };
             if !(50.0..=5000.0).contains(rate) {
                 return fail(format!("a device is to be updated at {rate} Hz, expected 50 to 5000"));
             }
@@ -266,27 +277,29 @@ impl Session {
 struct Running<'a> {
     process: ForceProcess,
     clock: Clock,
-    hand: Option<LogHand>,
-    showing: Showing,
+    hand: Option<LogSender>,
+    snapshot_buffer: SnapshotWriter,
     /// Ticks.
     picture_every: u64,
     most: Option<u64>,
     stop: &'a AtomicBool,
     steps: &'a AtomicU64,
     playback: Arc<Playback>,
-    cycles: Option<CycleTeller>,
+    cycles: Option<CycleSender>,
 }
 
 impl Running<'_> {
     fn run(self, scheduling: Scheduling) -> Forces {
-        let Self { mut process, clock, mut hand, mut showing, picture_every, most, stop, steps, .. } = self;
+        let Self {
+            mut process, clock, mut hand, mut snapshot_buffer, picture_every, most, stop, steps, ..
+        } = self;
         let (playback, mut cycles) = (self.playback, self.cycles);
         let granted = scheduling.claim();
         if let Some(cycles) = &mut cycles {
             cycles.begin(granted.clone());
         }
         process.warm_up();
-        let stolen = || stolen_s(granted.core.clone().ok().flatten());
+        let stolen = || steal_time_s(granted.core.clone().ok().flatten());
         let stolen_before = stolen();
         std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();
@@ -301,18 +314,18 @@ impl Running<'_> {
                 // A run that pauses shows where.
                 if playback.is_paused() && picture_every > 0 && pictured_step < process.steps() {
                     pictured_step = process.steps();
-                    showing.show(process.steps(), process.input(), process.state());
+                    snapshot_buffer.show(process.steps(), process.input(), process.state());
                 }
                 tick = clock.next_after(tick);
                 continue;
             }
             let begun = Instant::now();
             let output = process.cycle(clock.now_s());
-            unsolved += u64::from(output.status.unsolved_objects > 0 || output.status.dropped_contacts > 0);
+            unsolved += u64::from(output.status.unsolved_islands > 0 || output.status.dropped_contacts > 0);
             let pictured = picture_every > 0 && (tick >= picture_at || playback.is_paused());
             if pictured {
                 (picture_at, pictured_step) = (tick + picture_every, process.steps());
-                showing.show(process.steps(), process.input(), process.state());
+                snapshot_buffer.show(process.steps(), process.input(), process.state());
             }
             let took = begun.elapsed();
             if let Some(hand) = &mut hand {
@@ -340,9 +353,9 @@ impl Running<'_> {
             tick = next;
         }
         let wall_s = Instant::now().saturating_duration_since(begun_all).as_secs_f64();
-        let stolen_s = stolen().zip(stolen_before).map(|(after, before)| after - before);
+        let steal_time_s = stolen().zip(stolen_before).map(|(after, before)| after - before);
         let missed = hand.map_or(0, |hand| hand.missed());
-        Forces { process, granted, timing, unsolved, wall_s, stolen_s, missed }
+        Forces { process, granted, timing, unsolved, wall_s, steal_time_s, missed }
     }
 }
 
@@ -394,7 +407,7 @@ impl SessionDevice {
     }
 }
 
-impl Attached {
+impl AttachedDevice {
     /// Its haptic update, on a port: with a passivity controller if it is to be passive, and safety limits that its device
     /// bears.
     pub fn update(self, port: DevicePort) -> HapticUpdate {

@@ -1,6 +1,6 @@
 //! How a process keeps its time: histograms that record without allocating.
 
-use crate::scheduling::Granted;
+use crate::scheduling::GrantedScheduling;
 use hdrhistogram::Histogram;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::{Arc, OnceLock};
@@ -54,21 +54,21 @@ pub struct Cycle {
 }
 
 /// A process's end of a line over which it tells of its cycles while it runs.
-pub struct CycleTeller(Producer<Cycle>, Arc<OnceLock<Granted>>);
+pub struct CycleSender(Producer<Cycle>, Arc<OnceLock<GrantedScheduling>>);
 
 /// The other end.
-pub struct CycleListener(Consumer<Cycle>, Arc<OnceLock<Granted>>);
+pub struct CycleReceiver(Consumer<Cycle>, Arc<OnceLock<GrantedScheduling>>);
 
 /// A line for so many cycles that nobody has listened to yet; more are not told.
-pub fn cycles(room: usize) -> (CycleTeller, CycleListener) {
+pub fn cycles(room: usize) -> (CycleSender, CycleReceiver) {
     let (producer, consumer) = RingBuffer::new(room);
     let granted = Arc::default();
-    (CycleTeller(producer, Arc::clone(&granted)), CycleListener(consumer, granted))
+    (CycleSender(producer, Arc::clone(&granted)), CycleReceiver(consumer, granted))
 }
 
-impl CycleTeller {
+impl CycleSender {
     /// Tell what the system has granted, before the first cycle.
-    pub(crate) fn begin(&mut self, granted: Granted) {
+    pub(crate) fn begin(&mut self, granted: GrantedScheduling) {
         let _ = self.1.set(granted);
     }
 
@@ -80,9 +80,9 @@ impl CycleTeller {
     }
 }
 
-impl CycleListener {
+impl CycleReceiver {
     /// What the system granted the process; none before it has begun.
-    pub fn granted(&self) -> Option<&Granted> {
+    pub fn granted(&self) -> Option<&GrantedScheduling> {
         self.1.get()
     }
 

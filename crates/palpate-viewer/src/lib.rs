@@ -5,7 +5,7 @@
 //!               ↖ pictures: modal coordinates, poses and dents, 60 times a second
 //! ```
 //!
-//! docs/viewer-protocol.md is the contract with the page, `viewer/`, which is embedded here. A [`Workshop`] makes the scenes: the
+//! docs/viewer-protocol.md is the contract with the page, `viewer/`, which is embedded here. A [`SceneProvider`] makes the scenes: the
 //! server knows neither scene files nor recording. No page can make the force process wait: pictures are taken from
 //! its newest state, and a page that is slow misses some.
 
@@ -16,13 +16,14 @@ mod server;
 mod stage;
 mod wire;
 
-pub use log_show::{LogMaker, LogShow};
-pub use server::{Exhibit, Live, RenderJob, Server, Settings};
+pub use log_show::{LogFrameBuilder, LogFrames};
+pub use server::{Live, RenderJob, ServedContent, Server, Settings};
 pub use stage::{
-    BegunLog, LogFile, LogOpener, Opener, PageTeller, Stage, StageDevice, StageMover, Tell, Upload, Workshop,
+    DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier, ProgressCallback, SceneProvider,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 pub use wire::{
-    CameraView, CouplingDescription, DeviceDescription, Form, FrameTimes, MaterialDescription,
-    ObjectDescription, ObstacleDescription, PictureMaker, RenderWish, Rules, SceneDescription, SceneTitle,
-    ShapeDescription, View,
+    CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
+    MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,
+    SceneDescription, SceneSummary, ShapeDescription, View,
 };

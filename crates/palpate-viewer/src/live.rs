@@ -1,13 +1,15 @@
 //! A scene that runs while it is looked at: one thread manages it, one makes paths of pointers, others do long jobs.
 
 use crate::pointers::Pointers;
-use crate::stage::{PageTeller, Stage, StageDevice, Upload, Workshop};
-use crate::wire::{Answer, Form, MaterialDescription, PictureMaker, ProcessTiming, Rules, Status};
+use crate::stage::{PageNotifier, SceneProvider, Upload, ViewerDevice, ViewerScene};
+use crate::wire::{
+    Answer, FrameEncoder, FrameFormat, MaterialDescription, PhysicsSettings, ProcessTiming, Status,
+};
 use axum::body::Bytes;
-use palpate::{Input, Model, ObjectMotion, State};
+use palpate::{Input, Model, ObjectSnapshot, State};
 use palpate_haptics::{
-    Clock, CycleListener, Moment, Mover, Playback, Report, Scheduling, Session, SessionDevice, Timing,
-    cycles, port,
+    Clock, CycleReceiver, ObstacleTrajectory, Playback, Report, Scheduling, Session, SessionDevice, Snapshot,
+    Timing, cycles, port,
 };
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -38,21 +40,21 @@ const EVENTS: usize = 256;
 pub(crate) enum Command {
     Open(String),
     Reset,
-    Rules(Rules),
+    PhysicsSettings(PhysicsSettings),
     Material(usize, MaterialDescription),
     /// From whoever has claimed the job.
     Record(Upload),
     /// What a job has made.
-    Made(Result<Box<Stage>, String>),
+    Made(Result<Box<ViewerScene>, String>),
     /// There is a new viewer: tell how things are.
-    Tell,
+    ProgressCallback,
     End,
 }
 
 /// A scene as pages get it.
 pub(crate) struct Shown {
     pub generation: u32,
-    pub stage: Stage,
+    pub stage: ViewerScene,
     /// Its `scene` message.
     pub message: Arc<str>,
 }
@@ -101,19 +103,19 @@ struct Screens {
 }
 
 impl Screens {
-    fn show(&self, maker: &mut PictureMaker, moment: &Moment) {
+    fn show(&self, maker: &mut FrameEncoder, moment: &Snapshot) {
         if self.viewers.all.load(Ordering::Relaxed) > 0 {
-            self.modal.send_replace(maker.make(moment, Form::Modal).into());
+            self.modal.send_replace(maker.make(moment, FrameFormat::Modal).into());
         }
         if self.viewers.vertices.load(Ordering::Relaxed) > 0 {
-            self.vertices.send_replace(maker.make(moment, Form::Vertices).into());
+            self.vertices.send_replace(maker.make(moment, FrameFormat::Vertices).into());
         }
     }
 
     /// So that whoever comes has a picture.
-    fn show_all(&self, maker: &mut PictureMaker, moment: &Moment) {
-        self.modal.send_replace(maker.make(moment, Form::Modal).into());
-        self.vertices.send_replace(maker.make(moment, Form::Vertices).into());
+    fn show_all(&self, maker: &mut FrameEncoder, moment: &Snapshot) {
+        self.modal.send_replace(maker.make(moment, FrameFormat::Modal).into());
+        self.vertices.send_replace(maker.make(moment, FrameFormat::Vertices).into());
     }
 }
 
@@ -122,7 +124,11 @@ impl Live {
     ///
     /// # Errors
     /// When a thread can't be started.
-    pub fn new(workshop: Arc<dyn Workshop>, first: Stage, scheduling: Scheduling) -> std::io::Result<Self> {
+    pub fn new(
+        workshop: Arc<dyn SceneProvider>,
+        first: ViewerScene,
+        scheduling: Scheduling,
+    ) -> std::io::Result<Self> {
         let (commands, asked) = channel();
         let (modal_in, modal) = watch::channel(Bytes::new());
         let (vertices_in, vertices) = watch::channel(Bytes::new());
@@ -173,7 +179,7 @@ impl Drop for Live {
 }
 
 impl Shown {
-    fn new(generation: u32, stage: Stage) -> Self {
+    fn new(generation: u32, stage: ViewerScene) -> Self {
         let message = Answer::Scene { generation, scene: &stage.description }.text().into();
         Self { generation, stage, message }
     }
@@ -183,14 +189,14 @@ impl Shown {
 struct Running {
     stop: Arc<AtomicBool>,
     steps: Arc<AtomicU64>,
-    thread: JoinHandle<Option<Vec<ObjectMotion>>>,
+    thread: JoinHandle<Option<Vec<ObjectSnapshot>>>,
     pointing: JoinHandle<()>,
     timing: Timing,
-    listener: CycleListener,
+    listener: CycleReceiver,
 }
 
 struct Manager {
-    workshop: Arc<dyn Workshop>,
+    workshop: Arc<dyn SceneProvider>,
     scheduling: Scheduling,
     shown: watch::Sender<Arc<Shown>>,
     screens: Screens,
@@ -230,7 +236,7 @@ impl Manager {
             Command::Record(upload) => {
                 self.begin_job("mesh", move |workshop, tell| workshop.record(upload, tell));
             }
-            Command::Rules(rules) => {
+            Command::PhysicsSettings(rules) => {
                 if self.busy.load(Ordering::Acquire) {
                     self.say(&Answer::Error {
                         text: "a recording is under way: change this when it is done",
@@ -260,7 +266,7 @@ impl Manager {
                     Err(text) => self.say(&Answer::Error { text: &text }),
                 }
             }
-            Command::Tell => self.tell_status(),
+            Command::ProgressCallback => self.tell_status(),
             Command::End => {}
         }
     }
@@ -269,7 +275,9 @@ impl Manager {
     fn begin_job(
         &mut self,
         job: &'static str,
-        make: impl FnOnce(&dyn Workshop, crate::stage::Tell) -> Result<Stage, String> + Send + 'static,
+        make: impl FnOnce(&dyn SceneProvider, crate::stage::ProgressCallback) -> Result<ViewerScene, String>
+        + Send
+        + 'static,
     ) {
         let (workshop, events, commands) =
             (self.workshop.clone(), self.events.clone(), self.commands.clone());
@@ -291,13 +299,13 @@ impl Manager {
         let _ = self.events.send(answer.text().into());
     }
 
-    fn page_teller(&self) -> PageTeller {
+    fn page_teller(&self) -> PageNotifier {
         let events = self.events.clone();
         Arc::new(move |text| drop(events.send(Answer::Error { text }.text().into())))
     }
 
     /// End what runs; gives how its objects moved.
-    fn stop(&mut self) -> Option<Vec<ObjectMotion>> {
+    fn stop(&mut self) -> Option<Vec<ObjectSnapshot>> {
         let Running { stop, thread, pointing, .. } = self.running.take()?;
         stop.store(true, Ordering::Release);
         let motions = thread.join().ok().flatten();
@@ -307,11 +315,10 @@ impl Manager {
     }
 
     /// Run a scene, from its start or from where another has ended.
-    fn show(&mut self, stage: Stage, from: Option<Vec<ObjectMotion>>) {
+    fn show(&mut self, stage: ViewerScene, from: Option<Vec<ObjectSnapshot>>) {
         let generation = self.shown.borrow().generation + 1;
-        let state =
-            from.map_or_else(|| State::new(&stage.model), |from| State::going_on(&stage.model, &from));
-        let mut maker = PictureMaker::new(stage.model.clone(), generation);
+        let state = from.map_or_else(|| State::new(&stage.model), |from| State::resume(&stage.model, &from));
+        let mut maker = FrameEncoder::new(stage.model.clone(), generation);
         self.shown.send_replace(Arc::new(Shown::new(generation, stage.clone())));
         self.say_scene();
         match self.start(&stage, state, &mut maker, generation) {
@@ -327,27 +334,27 @@ impl Manager {
 
     fn start(
         &self,
-        stage: &Stage,
+        stage: &ViewerScene,
         state: State,
-        maker: &mut PictureMaker,
+        maker: &mut FrameEncoder,
         generation: u32,
     ) -> Result<Running, String> {
         let model = stage.model.clone();
         self.screens.show_all(maker, &first_moment(&model, &state, stage));
         let mut ports = Vec::new();
-        let seat = |(at, device): (usize, &StageDevice)| match device {
-            StageDevice::Pointer => {
+        let seat = |(at, device): (usize, &ViewerDevice)| match device {
+            ViewerDevice::Pointer => {
                 let (device_port, force_port) = port();
                 ports.push((at, device_port));
                 Ok(SessionDevice::Linked(force_port, palpate::DeviceMode::Touch))
             }
-            StageDevice::Following(path, mode) => Ok(SessionDevice::Following(path.clone(), *mode)),
-            StageDevice::Here(open) => open().map(SessionDevice::Here),
+            ViewerDevice::Following(path, mode) => Ok(SessionDevice::Following(path.clone(), *mode)),
+            ViewerDevice::Here(open) => open().map(SessionDevice::Here),
         };
         let devices: Result<Vec<_>, String> = stage.devices.iter().enumerate().map(seat).collect();
         let movers = stage.movers.iter().map(|mover| {
             let mover = mover.clone();
-            Box::new(move |t: f64| mover(t)) as Mover
+            Box::new(move |t: f64| mover(t)) as ObstacleTrajectory
         });
         let log = stage.log.as_ref().map(|open| open(&state, self.page_teller()));
         let log = log.and_then(|log| {
@@ -379,9 +386,9 @@ impl Manager {
         };
         let (screens, events) = (self.screens.clone(), self.events.clone());
         let (stopped, counted) = (stop.clone(), steps.clone());
-        let mut maker = PictureMaker::new(model, generation);
+        let mut maker = FrameEncoder::new(model, generation);
         let force = move || {
-            let show = |moment: &Moment| screens.show(&mut maker, moment);
+            let show = |moment: &Snapshot| screens.show(&mut maker, moment);
             match session.run(log, &stopped, &counted, show) {
                 Ok((Report { state, log, .. }, out)) => {
                     // What could not be written has been told by who opened it.
@@ -422,22 +429,22 @@ impl Manager {
     }
 }
 
-impl Stage {
+impl ViewerScene {
     /// Whether it makes sense to go on under other rules: where nothing follows a path from the start.
     fn goes_on(&self) -> bool {
-        let follows = |device: &StageDevice| matches!(device, StageDevice::Following(..));
-        let moves = |mover: &crate::StageMover| mover(0.0) != mover(1.0) || mover(0.0) != mover(0.37);
+        let follows = |device: &ViewerDevice| matches!(device, ViewerDevice::Following(..));
+        let moves = |mover: &crate::SharedTrajectory| mover(0.0) != mover(1.0) || mover(0.0) != mover(0.37);
         !self.devices.iter().any(follows) && !self.movers.iter().any(moves)
     }
 }
 
 /// The scene before its first step.
-fn first_moment(model: &Arc<Model>, state: &State, stage: &Stage) -> Moment {
+fn first_moment(model: &Arc<Model>, state: &State, stage: &ViewerScene) -> Snapshot {
     let input = Input {
-        devices: vec![palpate::DeviceInput::away(); stage.devices.len()],
+        devices: vec![palpate::DeviceInput::inactive(); stage.devices.len()],
         obstacles: stage.movers.iter().map(|mover| mover(0.0)).collect(),
     };
-    Moment::new(model, state, &input)
+    Snapshot::new(model, state, &input)
 }
 
 fn move_pointers(stop: &AtomicBool, pointers: &Mutex<Pointers>, clock: &Clock) {

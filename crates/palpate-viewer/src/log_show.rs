@@ -1,8 +1,8 @@
 //! A log that is looked at: its pictures, which are made while it is computed again.
 
-use crate::wire::{Answer, Form, FrameTimes, PictureMaker, SceneDescription};
+use crate::wire::{Answer, FrameEncoder, FrameFormat, FrameTimes, SceneDescription};
 use palpate::{EnergyLedger, Model};
-use palpate_haptics::Moment;
+use palpate_haptics::Snapshot;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -11,7 +11,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 const MOST_MOMENTS: usize = 4000;
 
 /// The pictures of a log so far.
-pub struct LogShow {
+pub struct LogFrames {
     /// Its file's name.
     pub name: String,
     /// What it shows.
@@ -33,12 +33,12 @@ struct Made {
 }
 
 /// Makes the pictures of a log.
-pub struct LogMaker {
-    show: Arc<LogShow>,
-    maker: PictureMaker,
+pub struct LogFrameBuilder {
+    show: Arc<LogFrames>,
+    maker: FrameEncoder,
 }
 
-impl LogShow {
+impl LogFrames {
     /// A log of so many frames, a time [s] apart; `number` is its place among those that are shown together.
     pub fn new(
         number: usize,
@@ -47,7 +47,7 @@ impl LogShow {
         description: SceneDescription,
         frames: u64,
         frame_s: f64,
-    ) -> (Arc<Self>, LogMaker) {
+    ) -> (Arc<Self>, LogFrameBuilder) {
         let devices = description.devices.iter().map(|device| device.name.clone()).collect::<Vec<_>>();
         let made = Made { forces: vec![Vec::new(); devices.len()], ..Made::default() };
         let times = FrameTimes { log: number, frames, frame_s };
@@ -58,7 +58,7 @@ impl LogShow {
             devices,
             made: RwLock::new(made),
         });
-        (show.clone(), LogMaker { show, maker: PictureMaker::new(model, number as u32) })
+        (show.clone(), LogFrameBuilder { show, maker: FrameEncoder::new(model, number as u32) })
     }
 
     fn read<T>(&self, look: impl FnOnce(&Made) -> T) -> T {
@@ -129,10 +129,10 @@ impl LogShow {
     }
 }
 
-impl LogMaker {
+impl LogFrameBuilder {
     /// Add the next frame.
-    pub fn take(&mut self, moment: &Moment) {
-        let picture = self.maker.make(moment, Form::Modal);
+    pub fn take(&mut self, moment: &Snapshot) {
+        let picture = self.maker.make(moment, FrameFormat::Modal);
         self.show.write(|made| {
             made.pictures.push(picture);
             made.times.push(moment.time_s);

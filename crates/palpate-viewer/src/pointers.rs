@@ -44,7 +44,7 @@ impl Pointers {
             device,
             port,
             holder: None,
-            mode: DeviceMode::Away,
+            mode: DeviceMode::Inactive,
             told: DVec3::ZERO,
             position: DVec3::ZERO,
             velocity: DVec3::ZERO,
@@ -84,7 +84,7 @@ impl Pointers {
 
     fn release_where(&mut self, which: impl Fn(Holder) -> bool) {
         for pointer in self.0.iter_mut().filter(|pointer| pointer.holder.is_some_and(&which)) {
-            (pointer.holder, pointer.mode) = (None, DeviceMode::Away);
+            (pointer.holder, pointer.mode) = (None, DeviceMode::Inactive);
         }
     }
 
@@ -183,7 +183,7 @@ mod tests {
         pointers.go((2, 1), DVec3::Z);
         pointers.release_viewer(1);
         pointers.advance(1e-3, 0.0);
-        assert_eq!(forces[0].newest().mode, Some(DeviceMode::Away));
+        assert_eq!(forces[0].newest().mode, Some(DeviceMode::Inactive));
         assert_eq!(forces[1].newest().mode, Some(DeviceMode::Touch));
         assert_eq!(press(&mut pointers, (3, 9)), Some(0));
     }

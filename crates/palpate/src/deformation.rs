@@ -22,7 +22,7 @@ use glam::DVec3;
 /// # }
 /// ```
 #[derive(Debug, Clone)]
-pub struct Deformation {
+pub struct DeformationSnapshot {
     pub(crate) object: usize,
     pub(crate) pose: Pose,
     pub(crate) deformed: Deformed,
@@ -31,9 +31,9 @@ pub struct Deformation {
 /// What was computed for the pictures of one object and will be needed again: what contact patches do to its surface.
 /// Pictures that share it cost less where the same places press.
 #[derive(Debug, Clone, Default)]
-pub struct PictureMemory(Answers);
+pub struct ResidualFieldCache(Answers);
 
-impl Deformation {
+impl DeformationSnapshot {
     /// The object's place in the model.
     pub fn object(&self) -> usize {
         self.object
@@ -64,7 +64,7 @@ impl Deformation {
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.
-    pub fn dents(&self, model: &Model, memory: &mut PictureMemory, out: &mut [DVec3]) {
+    pub fn dents(&self, model: &Model, memory: &mut ResidualFieldCache, out: &mut [DVec3]) {
         let (object, gravity) = self.drawn(model, out);
         self.deformed.dents((&object.response, &object.body), gravity, &mut memory.0, out);
     }
@@ -75,14 +75,19 @@ impl Deformation {
     /// # Panics
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, out: &mut [DVec3]) {
-        self.remembered_displacement(model, &mut PictureMemory::default(), out);
+        self.surface_displacement_cached(model, &mut ResidualFieldCache::default(), out);
     }
 
     /// The same with a memory that pictures of the object share.
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.
-    pub fn remembered_displacement(&self, model: &Model, memory: &mut PictureMemory, out: &mut [DVec3]) {
+    pub fn surface_displacement_cached(
+        &self,
+        model: &Model,
+        memory: &mut ResidualFieldCache,
+        out: &mut [DVec3],
+    ) {
         let (object, gravity) = self.drawn(model, out);
         let drawn = (&object.response, &object.body);
         self.deformed.surface_displacement(drawn, gravity, &mut memory.0, out);

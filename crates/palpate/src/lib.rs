@@ -39,24 +39,24 @@ mod state;
 mod step;
 mod surface;
 
-pub use contact::{Against, Grasp};
-pub use deformation::{Deformation, PictureMemory};
+pub use contact::{Collider, Grasp};
+pub use deformation::{DeformationSnapshot, ResidualFieldCache};
 pub use energy::EnergyLedger;
 pub use error::Error;
-pub use motion::MotionRule;
+pub use motion::RigidIntegrator;
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     Certificate, CertificateEvent, Column, ColumnsInMemory, Damping, FORMAT_VERSION, GravityResponse,
     ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField,
     Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
-pub use response::{HeldOscillator, Oscillation, ResponseForm};
+pub use response::{OscillatorState, ResponseForm, SampledOscillator};
 pub use scene::{
     Coupling, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, RigidCompliance,
 };
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
 pub use state::{
-    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectMotion, ObjectOutput, Output, State,
+    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, ObjectSnapshot, Output, State,
     StepStatus,
 };
 pub use step::step;

@@ -21,20 +21,20 @@ use glam::{DMat3, DQuat, DVec3};
 
 /// How the rigid motion is advanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum MotionRule {
+pub enum RigidIntegrator {
     /// Exact for a held force; the rigid and the elastic part are sampled alike.
     #[default]
-    ExactHeld,
+    ExactHold,
     /// Semi-implicit Euler, equations (11)-(14) of the paper. Loses energy at contact and in
     /// free fall; for comparison.
     Paper,
 }
 
-impl MotionRule {
+impl RigidIntegrator {
     /// c in the displacement c·h²·F/m at the end of a step under a held force.
     pub(crate) fn held_factor(self) -> f64 {
         match self {
-            Self::ExactHeld => 0.5,
+            Self::ExactHold => 0.5,
             Self::Paper => 1.0,
         }
     }
@@ -113,7 +113,7 @@ impl Inertia {
     /// # Real time
     pub(crate) fn advance(
         &self,
-        rule: MotionRule,
+        rule: RigidIntegrator,
         start: &RigidState,
         h: f64,
         (force, torque): (DVec3, DVec3),
@@ -121,14 +121,14 @@ impl Inertia {
     ) -> RigidStep {
         let velocity = start.velocity + force * (h / self.mass);
         match rule {
-            MotionRule::ExactHeld => {
+            RigidIntegrator::ExactHold => {
                 let position = start.pose.position + (start.velocity + velocity) * (0.5 * h);
                 let angular_momentum = start.angular_momentum + torque * h;
                 let (orientation, turn, miss) = self.midpoint(start, h, angular_momentum, nearly);
                 let pose = Pose { position, orientation };
                 RigidStep { end: RigidState { pose, velocity, angular_momentum }, turn, miss }
             }
-            MotionRule::Paper => {
+            RigidIntegrator::Paper => {
                 let position = start.pose.position + velocity * h;
                 let inverse = self.inverse_in_world(start.pose.orientation);
                 let spin = inverse * (start.angular_momentum + torque * h);
@@ -200,7 +200,8 @@ mod tests {
         let (inertia, start) = brick();
         let mut state = start;
         for _ in 0..(duration / h).round() as usize {
-            state = inertia.advance(MotionRule::ExactHeld, &state, h, (DVec3::ZERO, DVec3::ZERO), None).end;
+            state =
+                inertia.advance(RigidIntegrator::ExactHold, &state, h, (DVec3::ZERO, DVec3::ZERO), None).end;
         }
         let energy = inertia.kinetic_energy(&start);
         (state, inertia.kinetic_energy(&state) / energy - 1.0)
@@ -227,7 +228,8 @@ mod tests {
         let mut state = RigidState { pose, velocity: DVec3::ZERO, angular_momentum };
         let energy = inertia.kinetic_energy(&state);
         for _ in 0..1000 {
-            let step = inertia.advance(MotionRule::ExactHeld, &state, 1e-3, (DVec3::ZERO, DVec3::ZERO), None);
+            let step =
+                inertia.advance(RigidIntegrator::ExactHold, &state, 1e-3, (DVec3::ZERO, DVec3::ZERO), None);
             assert!(step.miss < 1e-12, "{}", step.miss);
             state = step.end;
         }
@@ -238,7 +240,7 @@ mod tests {
     fn torque_changes_the_energy_by_exactly_its_work() {
         let (inertia, start) = brick();
         let torque = DVec3::new(0.3, -0.2, 0.5);
-        let step = inertia.advance(MotionRule::ExactHeld, &start, 1e-2, (DVec3::ZERO, torque), None);
+        let step = inertia.advance(RigidIntegrator::ExactHold, &start, 1e-2, (DVec3::ZERO, torque), None);
         let change = inertia.kinetic_energy(&step.end) - inertia.kinetic_energy(&start);
         let work = torque.dot(step.turn);
         assert!((change - work).abs() < 1e-13, "{change} {work}");
@@ -249,8 +251,8 @@ mod tests {
         let (inertia, start) = brick();
         let (force, torque) = (DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.0, 0.1, 0.2));
         let gap = |h: f64| {
-            let a = inertia.advance(MotionRule::ExactHeld, &start, h, (force, torque), None).end;
-            let b = inertia.advance(MotionRule::Paper, &start, h, (force, torque), None).end;
+            let a = inertia.advance(RigidIntegrator::ExactHold, &start, h, (force, torque), None).end;
+            let b = inertia.advance(RigidIntegrator::Paper, &start, h, (force, torque), None).end;
             (a.pose.position - b.pose.position).length()
                 + a.pose.orientation.angle_between(b.pose.orientation)
         };

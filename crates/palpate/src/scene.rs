@@ -2,7 +2,7 @@
 
 use crate::contact::{Grasp, MOST_FACES};
 use crate::error::Error;
-use crate::motion::{Inertia, MotionRule, RigidState, RigidStep};
+use crate::motion::{Inertia, RigidIntegrator, RigidState, RigidStep};
 use crate::obstacle::Obstacle;
 use crate::recording::{Recording, Support};
 use crate::response::{Body, Response, ResponseForm};
@@ -60,7 +60,7 @@ pub struct ModelParameters {
     /// Gravity [m/s², world].
     pub gravity: DVec3,
     /// How rigid motion is advanced.
-    pub motion: MotionRule,
+    pub motion: RigidIntegrator,
     /// Whether rigid motion counts within the step.
     pub rigid_compliance: RigidCompliance,
     /// The devices.
@@ -68,10 +68,10 @@ pub struct ModelParameters {
     /// Planes and rigid obstacles.
     pub obstacles: Vec<Obstacle>,
     /// Most contact points of one object, 9·n² numbers of memory. Beyond it contacts are left out, and the status says so.
-    pub most_contact_points: usize,
+    pub max_contact_points: usize,
     /// Most places at which an object meets an obstacle or another object. Where more of its surface nodes come near, fewer stand for all, each
     /// for the patch around it.
-    pub most_places: usize,
+    pub max_contact_samples: usize,
 }
 
 impl Default for ModelParameters {
@@ -80,12 +80,12 @@ impl Default for ModelParameters {
         Self {
             step_s: 1e-3,
             gravity: DVec3::ZERO,
-            motion: MotionRule::default(),
+            motion: RigidIntegrator::default(),
             rigid_compliance: RigidCompliance::default(),
             devices: Vec::new(),
             obstacles: Vec::new(),
-            most_contact_points: 512,
-            most_places: usize::MAX,
+            max_contact_points: 512,
+            max_contact_samples: usize::MAX,
         }
     }
 }
@@ -158,9 +158,11 @@ impl Model {
         if !parameters.gravity.is_finite() {
             return Err(Error::Model(format!("gravity is {}, expected finite numbers", parameters.gravity)));
         }
-        if parameters.most_places < LEAST_PLACES {
-            let given = parameters.most_places;
-            return Err(Error::Model(format!("most_places is {given}, expected {LEAST_PLACES} or more")));
+        if parameters.max_contact_samples < LEAST_PLACES {
+            let given = parameters.max_contact_samples;
+            return Err(Error::Model(format!(
+                "max_contact_samples is {given}, expected {LEAST_PLACES} or more"
+            )));
         }
         for (at, device) in parameters.devices.iter().enumerate() {
             device.check(at)?;
@@ -209,7 +211,7 @@ impl Model {
 impl ModelParameters {
     /// Whether few places may stand for many nodes, of so many objects.
     pub(crate) fn thins_faces(&self, objects: usize) -> bool {
-        self.most_places < usize::MAX && self.touches_surfaces(objects)
+        self.max_contact_samples < usize::MAX && self.touches_surfaces(objects)
     }
 
     /// Whether objects, so many, have something to lie on: obstacles, or one another.
@@ -284,7 +286,8 @@ impl SceneObject {
         radii.sort_unstable_by(f64::total_cmp);
         radii.dedup();
         let thins = parameters.thins_faces(objects) && matches!(response, Response::Modal(_));
-        let body = Body::new(recording, &radii, if thins { parameters.most_places } else { usize::MAX });
+        let body =
+            Body::new(recording, &radii, if thins { parameters.max_contact_samples } else { usize::MAX });
         Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
     }
 
@@ -296,7 +299,7 @@ impl SceneObject {
             return devices;
         }
         let surface = if parameters.touches_surfaces(objects) {
-            self.body.recording.surface.positions.len().min(parameters.most_contact_points)
+            self.body.recording.surface.positions.len().min(parameters.max_contact_points)
         } else {
             0
         };

@@ -1,13 +1,13 @@
 //! What changes while a scene runs, what a step takes and what it gives.
 
 use crate::contact::{
-    Against, Contact, ContactPoints, DeviceState, Grasp, Level, Lift, NodeCache, Search, Solver, Vicinity,
+    Collider, Contact, ContactPoints, DeviceState, Grasp, Level, Lift, NodeCache, Search, Solver, Vicinity,
     WantedList,
 };
-use crate::deformation::Deformation;
+use crate::deformation::DeformationSnapshot;
 use crate::energy::EnergyLedger;
 use crate::motion::{RigidState, RigidStep};
-use crate::response::{Oscillation, ResponseState};
+use crate::response::{OscillatorState, ResponseState};
 use crate::scene::{Model, SceneObject};
 use crate::spatial::{Pose, Twist};
 use alloc::vec;
@@ -19,7 +19,7 @@ use glam::DVec3;
 pub enum DeviceMode {
     /// Nothing: it is away.
     #[default]
-    Away,
+    Inactive,
     /// It holds a point in all directions.
     Held(Grasp),
     /// Its tip touches whatever it meets.
@@ -37,14 +37,14 @@ pub struct DeviceInput {
 
 impl From<Option<Grasp>> for DeviceMode {
     fn from(grasp: Option<Grasp>) -> Self {
-        grasp.map_or(Self::Away, Self::Held)
+        grasp.map_or(Self::Inactive, Self::Held)
     }
 }
 
 impl DeviceInput {
     /// A device that is away.
-    pub fn away() -> Self {
-        Self { position: DVec3::ZERO, mode: DeviceMode::Away }
+    pub fn inactive() -> Self {
+        Self { position: DVec3::ZERO, mode: DeviceMode::Inactive }
     }
 
     /// A device that holds a point.
@@ -83,7 +83,7 @@ pub struct ContactOutput {
     /// Position of the object in the model.
     pub object: usize,
     /// What it is in contact with.
-    pub against: Against,
+    pub against: Collider,
     /// Where on the object's surface, at the end of the step [m, world].
     pub point: DVec3,
     /// Out of the object [world].
@@ -116,13 +116,13 @@ pub struct StepStatus {
     pub iterations: u32,
     /// Devices and obstacles whose position was not finite or whose grasp does not exist; the device is away, the
     /// obstacle stays.
-    pub rejected_devices: u32,
+    pub rejected_inputs: u32,
     /// Held directions that repeat others and got no force.
     pub dependent_rows: u32,
     /// Objects, or groups of them, whose contacts could not be solved, or whose turn could not be found, because a hand
     /// or a body moves too far in a step. Their contacts gave a part of the force in this step, or none; those of groups
     /// with nothing but held points gave none.
-    pub unsolved_objects: u32,
+    pub unsolved_islands: u32,
     /// Contacts for which an object had no room.
     pub dropped_contacts: u32,
 }
@@ -146,7 +146,7 @@ pub struct Output {
 
 /// How an object is placed, moves and is deformed: what a scene can begin with.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ObjectMotion {
+pub struct ObjectSnapshot {
     /// Placement.
     pub pose: Pose,
     /// Velocity.
@@ -154,7 +154,7 @@ pub struct ObjectMotion {
     /// Angular momentum about the centre of mass [kg·m²/s, world]: the velocity follows from it but for rounding.
     pub angular_momentum: DVec3,
     /// Its modes; none where a table is used.
-    pub modes: Vec<Oscillation>,
+    pub modes: Vec<OscillatorState>,
 }
 
 /// One object in motion.
@@ -267,15 +267,15 @@ impl State {
     /// The scene where its objects are as they were in another state: placed, moving and deformed alike, with nothing in contact
     /// yet, at time 0 with a ledger of its own. So a scene goes on under other rules: another step, gravity, friction.
     /// Objects with other modes, or tables, begin where the model says.
-    pub fn going_on(model: &Model, from: &[ObjectMotion]) -> Self {
+    pub fn resume(model: &Model, from: &[ObjectSnapshot]) -> Self {
         let mut state = Self::new(model);
         let gravity = model.parameters.gravity;
         let pairs = state.objects.iter_mut().zip(&model.objects).zip(from);
         for (at, ((own, object), before)) in pairs.enumerate() {
-            if !own.response.go_on_from(&before.modes) {
+            if !own.response.resume_from(&before.modes) {
                 continue;
             }
-            let ObjectMotion { pose, twist, angular_momentum, .. } = *before;
+            let ObjectSnapshot { pose, twist, angular_momentum, .. } = *before;
             own.rigid = RigidState { pose, velocity: twist.linear, angular_momentum };
             let still = RigidStep { end: own.rigid, turn: DVec3::ZERO, miss: 0.0 };
             (own.free, own.end) = (still, still);
@@ -289,8 +289,8 @@ impl State {
     }
 
     /// How its objects move at the end of the last step, in the model's order.
-    pub fn motions(&self) -> Vec<ObjectMotion> {
-        let motion = |(own, output): (&ObjectState, &ObjectOutput)| ObjectMotion {
+    pub fn motions(&self) -> Vec<ObjectSnapshot> {
+        let motion = |(own, output): (&ObjectState, &ObjectOutput)| ObjectSnapshot {
             pose: own.rigid.pose,
             twist: Twist { linear: own.rigid.velocity, ..output.twist },
             angular_momentum: own.rigid.angular_momentum,
@@ -305,7 +305,7 @@ impl State {
     }
 
     /// Modal coordinates q [m·√kg] of an object and their rates; none for one that uses a table.
-    pub fn modal_state(&self, object: usize) -> &[Oscillation] {
+    pub fn modal_state(&self, object: usize) -> &[OscillatorState] {
         self.objects[object].response.modes()
     }
 
@@ -319,9 +319,9 @@ impl State {
     }
 
     /// What deforms an object at the end of the last step: a copy that can go elsewhere.
-    pub fn deformation(&self, object: usize) -> Deformation {
+    pub fn deformation(&self, object: usize) -> DeformationSnapshot {
         let own = &self.objects[object];
-        Deformation { object, pose: own.rigid.pose, deformed: own.response.deformed() }
+        DeformationSnapshot { object, pose: own.rigid.pose, deformed: own.response.deformed() }
     }
 }
 

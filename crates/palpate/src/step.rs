@@ -19,7 +19,7 @@
 //! energy and give none, whatever the shape, the normal and the place that were chosen for the step.
 
 use crate::contact::{
-    Against, Contact, DeviceState, Finding, HELD, Key, Law, Other, Parts, Wanted, WantedOther, against,
+    Collider, Contact, DeviceState, Finding, HELD, Key, Law, Other, Parts, Wanted, WantedOther, against,
     look_ahead, renew, touch,
 };
 use crate::energy::EnergyLedger;
@@ -82,7 +82,7 @@ fn move_obstacles(state: &mut State, input: &Input) {
         if wanted.position.is_finite() && (0.99..=1.01).contains(&length) {
             *next = Pose { orientation: wanted.orientation.normalize(), ..*wanted };
         } else {
-            output.status.rejected_devices += 1;
+            output.status.rejected_inputs += 1;
         }
     }
 }
@@ -91,7 +91,7 @@ fn move_obstacles(state: &mut State, input: &Input) {
 fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i DeviceInput> {
     let device_input = input.devices.get(device)?;
     let allowed = match &device_input.mode {
-        DeviceMode::Away => false,
+        DeviceMode::Inactive => false,
         DeviceMode::Held(grasp) => model.accepts(grasp),
         DeviceMode::Touch => true,
     };
@@ -109,9 +109,9 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         Finding { model, objects, contacts, caches, search, vicinities, levels, near, modes, wanted, step };
     let searched = || (0..model.objects.len()).filter(|&at| model.objects[at].is_searched());
     for (number, device) in devices.iter_mut().enumerate() {
-        let asked = input.devices.get(number).is_some_and(|d| d.mode != DeviceMode::Away);
+        let asked = input.devices.get(number).is_some_and(|d| d.mode != DeviceMode::Inactive);
         let Some(device_input) = usable(model, input, number) else {
-            output.status.rejected_devices += u32::from(asked);
+            output.status.rejected_inputs += u32::from(asked);
             device.present = false;
             continue;
         };
@@ -124,7 +124,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         device.begin(parameters, model.parameters.step_s, target, target);
         if let DeviceMode::Held(grasp) = device_input.mode {
             scene.wanted.push(Wanted {
-                key: Key { other: Against::Device(number), object: grasp.object, feature: HELD },
+                key: Key { other: Collider::Device(number), object: grasp.object, feature: HELD },
                 place: Place { point: grasp.point, reading: Reading::Point },
                 other: WantedOther::Device(number),
                 law: Law::Held,
@@ -245,7 +245,7 @@ fn advance(model: &Model, state: &mut State) {
         own.ledger.defect =
             own.ledger.stored() - own.stored_at_start - (own.ledger.input - own.ledger.lost());
     }
-    output.status.unsolved_objects += unsolved;
+    output.status.unsolved_islands += unsolved;
     for (number, device) in devices.iter_mut().enumerate() {
         account_coupling(model, number, device, couplings);
     }

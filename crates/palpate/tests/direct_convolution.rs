@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, HeldOscillator, ImpulseResponse, Input, Model,
-    ModelObject, ModelParameters, ObjectStart, Oscillation, Pose, Recording, ResponseForm, Sampling, State,
-    SurfacePoint, Twist, step,
+    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
+    ModelParameters, ObjectStart, OscillatorState, Pose, Recording, ResponseForm, SampledOscillator,
+    Sampling, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -27,12 +27,12 @@ fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse 
     let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
     let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
     // For each sample the answers of all modes.
-    let mut oscillators: Vec<(HeldOscillator, Oscillation)> = pairs
-        .map(|(&omega, &zeta)| (HeldOscillator::new(omega, zeta, step_s), Oscillation::default()))
+    let mut oscillators: Vec<(SampledOscillator, OscillatorState)> = pairs
+        .map(|(&omega, &zeta)| (SampledOscillator::new(omega, zeta, step_s), OscillatorState::default()))
         .collect();
     let answers: Vec<Vec<f64>> = (0..samples)
         .map(|s| {
-            let advance = |(oscillator, state): &mut (HeldOscillator, Oscillation)| {
+            let advance = |(oscillator, state): &mut (SampledOscillator, OscillatorState)| {
                 *state = oscillator.advance(*state, if s == 0 { 1.0 } else { 0.0 });
                 state.q
             };
@@ -130,7 +130,7 @@ fn differences(
         let mut shapes = [vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]];
         for (at, (model, state)) in scenes.iter_mut().enumerate() {
             let output = step(model, state, &input);
-            assert_eq!(output.status.rejected_devices + output.status.unsolved_objects, 0, "step {number}");
+            assert_eq!(output.status.rejected_inputs + output.status.unsolved_islands, 0, "step {number}");
             forces[at] = [output.devices[0].force_on_hand, output.devices[1].force_on_hand];
             state.surface_displacement(model, 0, &mut shapes[at]);
         }
@@ -289,9 +289,7 @@ fn a_point_that_is_not_touchable_can_not_be_held() {
     );
     let device = DeviceInput::held(DVec3::ZERO, Grasp { object: 0, point });
     assert_eq!(
-        step(&model, &mut state, &Input { devices: vec![device], ..Input::default() })
-            .status
-            .rejected_devices,
+        step(&model, &mut state, &Input { devices: vec![device], ..Input::default() }).status.rejected_inputs,
         1
     );
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart,
-    PictureMemory, Pose, Recording, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, ResidualFieldCache, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -38,14 +38,14 @@ fn pulled(model: &Model) -> State {
 }
 
 fn away() -> Input {
-    Input { devices: vec![DeviceInput::away()], ..Input::default() }
+    Input { devices: vec![DeviceInput::inactive()], ..Input::default() }
 }
 
 #[test]
 fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let mut state = pulled(&model);
-    let mut other = State::going_on(&model, &state.motions());
+    let mut other = State::resume(&model, &state.motions());
     assert_eq!(other.output().objects[0].pose, state.output().objects[0].pose);
     assert_eq!(other.modal_state(0), state.modal_state(0));
     for _ in 0..200 {
@@ -60,7 +60,7 @@ fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
 fn a_scene_at_its_start_goes_on_as_itself() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let start = State::new(&model);
-    let mut other = State::going_on(&model, &start.motions());
+    let mut other = State::resume(&model, &start.motions());
     assert_eq!((other.output(), other.motions()), (start.output(), start.motions()));
     let mut state = start;
     for _ in 0..100 {
@@ -73,7 +73,7 @@ fn under_other_rules_it_keeps_its_motion_and_its_energy_but_for_gravity() {
     let before = model(1e-3, DVec3::ZERO);
     let state = pulled(&before);
     let after = model(5e-4, DVec3::X * 3.0);
-    let mut other = State::going_on(&after, &state.motions());
+    let mut other = State::resume(&after, &state.motions());
     let (old, new) = (state.output(), other.output().clone());
     assert_eq!((old.objects[0].pose, old.objects[0].twist), (new.objects[0].pose, new.objects[0].twist));
     assert_eq!(old.energy.kinetic, new.energy.kinetic);
@@ -96,7 +96,7 @@ fn a_surface_is_its_modes_and_its_dents() {
     let mut whole = vec![DVec3::ZERO; recording.surface.positions.len()];
     let mut dents = whole.clone();
     deformation.surface_displacement(&model, &mut whole);
-    deformation.dents(&model, &mut PictureMemory::default(), &mut dents);
+    deformation.dents(&model, &mut ResidualFieldCache::default(), &mut dents);
     let (q, mut deepest) = (deformation.modal_coordinates(), 0.0_f64);
     assert_eq!(q.len(), recording.modes.len());
     for (node, (u, dent)) in whole.iter().zip(&dents).enumerate() {
@@ -119,7 +119,7 @@ fn a_picture_with_a_memory_is_that_without() {
     let surface = &model.recordings().next().expect("an object").surface;
     let edge = surface.positions.iter().map(|place| place.x).fold(0.0, f64::max);
     let mut state = State::new(&model);
-    let mut memory = PictureMemory::default();
+    let mut memory = ResidualFieldCache::default();
     let mut deepest = 0.0_f64;
     for number in 0..300 {
         // They press, and wander over patches that are new and known.
@@ -130,7 +130,7 @@ fn a_picture_with_a_memory_is_that_without() {
         let mut with = vec![DVec3::ZERO; surface.positions.len()];
         let mut without = with.clone();
         let deformation = state.deformation(0);
-        deformation.remembered_displacement(&model, &mut memory, &mut with);
+        deformation.surface_displacement_cached(&model, &mut memory, &mut with);
         deformation.surface_displacement(&model, &mut without);
         let size = without.iter().map(|u| u.length()).fold(0.0, f64::max);
         let off = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);

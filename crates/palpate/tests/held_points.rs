@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, MotionRule,
-    ObjectStart, Output, Pose, Recording, RigidCompliance, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    ObjectStart, Output, Pose, Recording, RigidCompliance, RigidIntegrator, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
 
@@ -64,7 +64,7 @@ fn a_held_point_is_at_the_hand_at_the_end_of_every_step() {
         let miss = (output.devices[0].proxy - path(f64::from(number) * H)).length();
         // Eight roundings of coordinates below one metre.
         assert!(miss < 2e-15, "step {number}: {miss}");
-        assert_eq!(output.status.unsolved_objects, 0);
+        assert_eq!(output.status.unsolved_islands, 0);
     });
 }
 
@@ -159,7 +159,7 @@ fn a_hand_that_is_no_number_lets_go_and_the_rest_goes_on() {
     let bad = DVec3::new(f64::NAN, 0.0, 0.0);
     let input = Input { devices: vec![hold(1, bad), hold(5, rest(5) + DVec3::X * 1e-3)], ..Input::default() };
     let output = step(&model, &mut state, &input);
-    assert_eq!(output.status.rejected_devices, 1);
+    assert_eq!(output.status.rejected_inputs, 1);
     assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO);
     assert!(output.devices[1].force_on_hand.x < 0.0 && output.devices[1].force_on_hand.is_finite());
 }
@@ -172,10 +172,10 @@ fn a_hand_that_jumps_too_far_gets_no_force_and_the_state_stays_sound() {
         |position| Input { devices: vec![DeviceInput::held(position, grasp(0, 3))], ..Input::default() };
     step(&model, &mut state, &hold(rest));
     let output = step(&model, &mut state, &hold(rest + DVec3::new(3e6, 4e6, 5e5)));
-    assert_eq!(output.status.unsolved_objects, 1);
+    assert_eq!(output.status.unsolved_islands, 1);
     assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO);
     let output = step(&model, &mut state, &hold(rest + DVec3::X * 1e-4));
-    assert_eq!(output.status.unsolved_objects, 0);
+    assert_eq!(output.status.unsolved_islands, 0);
     assert!(output.devices[0].force_on_hand.is_finite() && output.energy.defect.abs() < 1e-12);
 }
 
@@ -228,7 +228,7 @@ fn without_rigid_compliance_the_point_is_missed_by_half_h_squared_times_the_mobi
 #[test]
 fn the_papers_update_gives_momentum_but_not_the_exact_energy() {
     let recording = free();
-    let paper = ModelParameters { motion: MotionRule::Paper, ..parameters(1) };
+    let paper = ModelParameters { motion: RigidIntegrator::Paper, ..parameters(1) };
     let (model, mut state) = one(recording.clone(), paper);
     let rest = recording.surface.rest_position(&grasp(0, 3).point);
     let mut given = DVec3::ZERO;

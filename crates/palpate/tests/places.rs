@@ -23,11 +23,11 @@ fn floor(friction: f64) -> Obstacle {
     Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction }
 }
 
-fn on_a_floor(recording: &Arc<Recording>, most_places: usize, pose: Pose) -> (Model, State) {
+fn on_a_floor(recording: &Arc<Recording>, max_contact_samples: usize, pose: Pose) -> (Model, State) {
     let parameters = ModelParameters {
         gravity: GRAVITY,
         obstacles: vec![floor(0.4)],
-        most_places,
+        max_contact_samples,
         ..ModelParameters::default()
     };
     let start = ObjectStart { pose, twist: Twist::ZERO };
@@ -116,8 +116,12 @@ fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
     let obstacles: Vec<Obstacle> =
         shapes.into_iter().map(|shape| Obstacle { shape, pose: Pose::IDENTITY, friction: 0.7 }).collect();
     let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.03, friction: 0.5, coupling: None };
-    let parameters =
-        ModelParameters { obstacles, devices: vec![finger], most_places: 8, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        obstacles,
+        devices: vec![finger],
+        max_contact_samples: 8,
+        ..ModelParameters::default()
+    };
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
     let mut state = State::new(&model);
@@ -140,7 +144,7 @@ fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
         assert!(energy.stored() <= energy.input + 1e-9 * (1.0 + energy.input.abs()), "{number}: {energy:?}");
         assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
         for (k, most) in most.iter_mut().enumerate() {
-            let its = |c: &&palpate::ContactOutput| c.against == palpate::Against::Obstacle(k);
+            let its = |c: &&palpate::ContactOutput| c.against == palpate::Collider::Obstacle(k);
             *most = (*most).max(output.contacts.iter().filter(its).count());
         }
     }

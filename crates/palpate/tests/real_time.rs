@@ -90,7 +90,7 @@ fn a_step_makes_no_allocation() {
     let mut state = State::new(&model);
     let grasp =
         |object, triangle| Some(Grasp { object, point: SurfacePoint { triangle, weights: [0.2, 0.3, 0.5] } });
-    let mut input = Input { devices: vec![DeviceInput::away(); 4], ..Input::default() };
+    let mut input = Input { devices: vec![DeviceInput::inactive(); 4], ..Input::default() };
 
     let before = ALLOCATIONS.get();
     for number in 0..200_u32 {
@@ -140,7 +140,7 @@ fn a_step_makes_no_allocation() {
     touch(&Model::new(parameters.clone(), objects.to_vec()).expect("a good model"), "of touching");
     let finer = Arc::new(refined(&free, 3));
     let objects = [0.08, 0.2].map(|y| ModelObject::new(finer.clone(), lying(y)));
-    let parameters = ModelParameters { most_places: 12, ..parameters };
+    let parameters = ModelParameters { max_contact_samples: 12, ..parameters };
     touch(&Model::new(parameters, objects.to_vec()).expect("a good model"), "at few places");
 }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate::{
-    Against, Coupling, DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    Collider, Coupling, DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Obstacle, Output, Pose, Recording, Shape, State, SurfacePoint, Twist, step,
 };
 use std::sync::Arc;
@@ -154,7 +154,7 @@ fn contacts_on_a_floor_carry_the_change_of_momentum() {
         assert!(error < 1e-12, "step {number}: {error}");
         most = most.max(output.contacts.len());
         for contact in &output.contacts {
-            assert_eq!(contact.against, Against::Obstacle(0));
+            assert_eq!(contact.against, Collider::Obstacle(0));
             let normal = contact.force.dot(-contact.normal);
             let across = (contact.force + contact.normal * normal).length();
             assert!(normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9), "in the cone");
@@ -364,7 +364,7 @@ fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
     // Four metres in a step, through the block.
     let beyond = beside - DVec3::X * (40.0 * side);
     let output = step(&model, &mut state, &touching(&[beyond]));
-    assert_eq!(output.status.unsolved_objects, 1, "otherwise this shows nothing: {:?}", output.status);
+    assert_eq!(output.status.unsolved_islands, 1, "otherwise this shows nothing: {:?}", output.status);
     assert!(output.status.solver_residual_m > side);
     let contact = output.contacts.first().expect("a contact");
     assert!(contact.force.x < 0.0 && output.objects[0].twist.linear.x < 0.0, "pushed on: {contact:?}");
@@ -373,7 +373,7 @@ fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
     assert!(e.input > 0.0 && e.lost() >= 0.0 && open(output, start).abs() < 1e-9 * e.input, "{e:?}");
     assert!(e.defect.abs() < 1e-9 * e.input, "{e:?}");
     let after = step(&model, &mut state, &touching(&[beyond]));
-    assert_eq!((after.status.unsolved_objects, after.contacts.len()), (0, 0));
+    assert_eq!((after.status.unsolved_islands, after.contacts.len()), (0, 0));
 }
 
 #[test]

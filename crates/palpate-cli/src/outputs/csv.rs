@@ -3,7 +3,7 @@
 use crate::Failure;
 use crate::scene_file::Scene;
 use crate::whole_file::WholeFile;
-use palpate::{Against, Input, Output};
+use palpate::{Collider, Input, Output};
 use std::path::{Path, PathBuf};
 
 /// Lines of numbers that read back to the same bits.
@@ -95,9 +95,9 @@ impl ContactsCsv {
     pub fn write(&mut self, scene: &Scene, output: &Output) -> Result<(), Failure> {
         for contact in &output.contacts {
             let against = match contact.against {
-                Against::Device(at) => &scene.devices[at].name,
-                Against::Obstacle(at) => &scene.obstacles[at].name,
-                Against::Object(at) => &scene.object_names[at],
+                Collider::Device(at) => &scene.devices[at].name,
+                Collider::Obstacle(at) => &scene.obstacles[at].name,
+                Collider::Object(at) => &scene.object_names[at],
             };
             let vectors = [contact.point, contact.normal, contact.force].into_iter();
             let numbers = vectors.flat_map(|v| v.to_array()).chain([contact.gap, contact.slip_speed]);

@@ -90,7 +90,7 @@ impl Frame<'_> {
 
     /// Whether a device is there: a pointer that nobody holds is nowhere, others wait where they are.
     pub fn shows(&self, device: usize) -> bool {
-        let is_away = self.input.devices[device].mode == DeviceMode::Away;
+        let is_away = self.input.devices[device].mode == DeviceMode::Inactive;
         !(self.scene.devices[device].pointer && is_away)
     }
 

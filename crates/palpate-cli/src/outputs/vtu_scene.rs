@@ -6,7 +6,7 @@ use super::vtu::{Cells, Field, Grid, VtuSeries};
 use crate::Failure;
 use crate::scene_file::Scene;
 use glam::DVec3;
-use palpate::{Against, Input, Pose, State};
+use palpate::{Collider, Input, Pose, State};
 use std::path::{Path, PathBuf};
 
 /// Names of parts can't have a dot: nothing in a scene is called this.
@@ -115,10 +115,10 @@ fn contacts(frame: &Frame) -> Grid<'static> {
     let contacts = &frame.output.contacts;
     let objects = frame.displacements.len();
     // Parts as the index counts them: objects, obstacles; devices from there on.
-    let part = |against: Against| match against {
-        Against::Object(at) => at,
-        Against::Obstacle(at) => objects + at,
-        Against::Device(at) => objects + frame.scene.obstacles.len() + at,
+    let part = |against: Collider| match against {
+        Collider::Object(at) => at,
+        Collider::Obstacle(at) => objects + at,
+        Collider::Device(at) => objects + frame.scene.obstacles.len() + at,
     };
     Grid {
         points: contacts.iter().map(|contact| contact.point).collect(),

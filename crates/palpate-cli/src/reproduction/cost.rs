@@ -95,7 +95,7 @@ fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result
         if number >= samples {
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
         }
-        if status.unsolved_objects + status.rejected_devices > 0 {
+        if status.unsolved_islands + status.rejected_inputs > 0 {
             return Err(Failure(format!("the cost of a step can't be measured: {status:?}")));
         }
     }

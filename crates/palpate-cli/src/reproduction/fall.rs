@@ -1,7 +1,7 @@
 //! Figure 5(a): the cube falls on a floor and bounces.
 
 use super::findings::Finding;
-use super::logged::{Moment, missing, moments};
+use super::logged::{Snapshot, missing, moments};
 use super::processes::{number, report, start};
 use super::series::{Artist, Series as Pictures};
 use super::{Chapter, Desk, csv, damped_cube};
@@ -59,13 +59,13 @@ struct Story {
 }
 
 /// Height of the centre above that of the cube standing undeformed [m].
-fn height(moment: &Moment) -> f64 {
+fn height(moment: &Snapshot) -> f64 {
     moment.centre.y - HALF_M
 }
 
 impl Story {
-    fn find(moments: &[Moment]) -> Option<Self> {
-        let after = |from: usize, is: &dyn Fn(&Moment) -> bool| {
+    fn find(moments: &[Snapshot]) -> Option<Self> {
+        let after = |from: usize, is: &dyn Fn(&Snapshot) -> bool| {
             moments[from..].iter().position(is).map(|found| from + found)
         };
         let lowest = |from: usize, to: usize| {
@@ -82,7 +82,7 @@ impl Story {
     }
 
     /// Steps since the start, and what is to be seen.
-    fn instants(&self, moments: &[Moment]) -> Vec<(u64, String)> {
+    fn instants(&self, moments: &[Snapshot]) -> Vec<(u64, String)> {
         let bends = (self.touch..=self.deepest)
             .find(|&at| height(&moments[at]) < 0.5 * height(&moments[self.deepest]))
             .unwrap_or(self.deepest);
@@ -110,7 +110,7 @@ impl Story {
     }
 }
 
-fn lies_still(moments: &[Moment]) -> bool {
+fn lies_still(moments: &[Snapshot]) -> bool {
     let late = &moments[moments.len().saturating_sub((STILL_S / STEP_S) as usize)..];
     let mean = late.iter().map(|moment| moment.support.y).sum::<f64>() / late.len() as f64;
     late.iter().all(|moment| (moment.support.y - mean).abs() <= STILL * mean)
@@ -124,7 +124,7 @@ fn rebound_of_every_node(desk: &Desk) -> Result<f64, Failure> {
     for number in 1..=(0.5 / STEP_S) as u64 {
         let input = scene.input_at(number as f64 * STEP_S);
         let output = step(&scene.model, &mut state, &input);
-        moments.push(Moment::new(number, &input, output));
+        moments.push(Snapshot::new(number, &input, output));
     }
     Ok(Story::find(&moments).map_or(f64::NAN, |story| height(&moments[story.top])))
 }
@@ -262,7 +262,7 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
 }
 
 /// One curve over what is drawn.
-fn curve(moments: &[Moment], label: &str, of: impl Fn(&Moment) -> f64) -> Series {
+fn curve(moments: &[Snapshot], label: &str, of: impl Fn(&Snapshot) -> f64) -> Series {
     let shown = moments.iter().take_while(|moment| moment.time_s <= DRAWN_S);
     Series {
         label: label.into(),
@@ -290,7 +290,7 @@ fn unreduced(of: impl Fn([f64; 3]) -> f64) -> Series {
     }
 }
 
-fn heights(moments: &[Moment], is_papers: bool) -> Chart {
+fn heights(moments: &[Snapshot], is_papers: bool) -> Chart {
     let mut series = vec![curve(moments, "palpate, in real time", |moment| 1e3 * height(moment))];
     let mut notes = Vec::new();
     if is_papers {
@@ -303,7 +303,7 @@ fn heights(moments: &[Moment], is_papers: bool) -> Chart {
     chart("Height of the centre", "above that of the undeformed cube on the floor [mm]", series, notes)
 }
 
-fn forces(moments: &[Moment], is_papers: bool, weight: f64) -> Chart {
+fn forces(moments: &[Snapshot], is_papers: bool, weight: f64) -> Chart {
     let mut series = vec![curve(moments, "palpate, in real time", |moment| moment.support.y)];
     if is_papers {
         series.push(unreduced(|[.., force]| force));
@@ -312,7 +312,7 @@ fn forces(moments: &[Moment], is_papers: bool, weight: f64) -> Chart {
     chart("Force of the floor", "upward [N]", series, notes)
 }
 
-fn energies(moments: &[Moment], mass: f64) -> Chart {
+fn energies(moments: &[Snapshot], mass: f64) -> Chart {
     let standing = mass * G * HALF_M;
     let series = vec![
         curve(moments, "of height", |m| 1e3 * (m.energy.potential - standing)),
@@ -334,9 +334,9 @@ mod tests {
     use palpate::EnergyLedger;
 
     /// A ball on a spring floor, in numbers.
-    fn bounce() -> Vec<Moment> {
+    fn bounce() -> Vec<Snapshot> {
         let heights = [50, 30, 0, -10, -5, 0, 10, 24, 12, 0, -6, -3, 4, 0];
-        let moment = |(at, mm): (usize, i32)| Moment {
+        let moment = |(at, mm): (usize, i32)| Snapshot {
             step: at as u64 + 1,
             time_s: 0.01 * (at + 1) as f64,
             centre: DVec3::Y * (HALF_M + 1e-3 * f64::from(mm)),

@@ -3,12 +3,12 @@
 use crate::Failure;
 use crate::logged_run::LoggedRun;
 use glam::DVec3;
-use palpate::{Against, EnergyLedger, Input, Output, State};
+use palpate::{Collider, EnergyLedger, Input, Output, State};
 use std::path::Path;
 
 /// The end of one step.
 #[derive(Debug, Clone)]
-pub struct Moment {
+pub struct Snapshot {
     /// Steps since the start.
     pub step: u64,
     /// Simulated time [s].
@@ -23,12 +23,12 @@ pub struct Moment {
     pub energy: EnergyLedger,
 }
 
-impl Moment {
+impl Snapshot {
     /// What a step has left.
     pub fn new(step: u64, input: &Input, output: &Output) -> Self {
         let hands = input.devices.iter().zip(&output.devices);
         let supports =
-            output.contacts.iter().filter(|contact| matches!(contact.against, Against::Obstacle(_)));
+            output.contacts.iter().filter(|contact| matches!(contact.against, Collider::Obstacle(_)));
         Self {
             step,
             time_s: output.time_s,
@@ -41,19 +41,19 @@ impl Moment {
 }
 
 /// Every step of a log.
-pub fn moments(log: &Path) -> Result<Vec<Moment>, Failure> {
+pub fn moments(log: &Path) -> Result<Vec<Snapshot>, Failure> {
     let run = LoggedRun::read(log)?;
     let mut state = State::new(&run.scene.model);
     let mut moments = Vec::new();
     run.repeat(&mut state, run.steps, |input, state, _| {
-        moments.push(Moment::new(moments.len() as u64 + 1, input, state.output()));
+        moments.push(Snapshot::new(moments.len() as u64 + 1, input, state.output()));
         Ok(())
     })?;
     Ok(moments)
 }
 
 /// Largest energy [J] that the ledger has lost track of: stored + lost − input, against that at the start of the run.
-pub fn missing(moments: &[Moment], at_start_j: f64) -> f64 {
+pub fn missing(moments: &[Snapshot], at_start_j: f64) -> f64 {
     let sum = |energy: &EnergyLedger| energy.stored() + energy.lost() - energy.input;
     moments.iter().map(|moment| (sum(&moment.energy) - at_start_j).abs()).fold(0.0, f64::max)
 }
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn energy_that_goes_from_one_form_to_another_is_not_missing_and_energy_that_goes_nowhere_is() {
-        let moment = |kinetic, dissipated, input| Moment {
+        let moment = |kinetic, dissipated, input| Snapshot {
             step: 1,
             time_s: 0.0,
             centre: DVec3::ZERO,

@@ -15,7 +15,7 @@ use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Mark, Scale, Section, figure, paragraph, table};
 use faer::Mat;
 use glam::DVec3;
-use palpate::{Damping, HeldOscillator, Oscillation};
+use palpate::{Damping, OscillatorState, SampledOscillator};
 use palpate_fem::progress::Progress;
 use palpate_fem::record::Recorded;
 use palpate_fem::reference::{LoadedMode, Reference};
@@ -47,8 +47,8 @@ impl Port {
     fn response(&self, step: f64, held: usize, samples: usize) -> Vec<f64> {
         let mut sum = vec![0.0; samples];
         for &(square, gain, zeta) in &self.0 {
-            let oscillator = HeldOscillator::new(square.sqrt(), zeta, step);
-            let mut state = Oscillation::default();
+            let oscillator = SampledOscillator::new(square.sqrt(), zeta, step);
+            let mut state = OscillatorState::default();
             for (s, value) in sum.iter_mut().enumerate() {
                 state = oscillator.advance(state, if s < held { 1.0 } else { 0.0 });
                 *value += gain * state.q;
@@ -61,8 +61,8 @@ impl Port {
     fn impulse_response(&self, samples: usize) -> Vec<f64> {
         let mut sum = vec![0.0; samples];
         for &(square, gain, zeta) in &self.0 {
-            let free = HeldOscillator::new(square.sqrt(), zeta, STEP_S);
-            let mut state = Oscillation { q: 0.0, v: 1.0 };
+            let free = SampledOscillator::new(square.sqrt(), zeta, STEP_S);
+            let mut state = OscillatorState { q: 0.0, v: 1.0 };
             for value in &mut sum {
                 state = free.advance(state, 0.0);
                 *value += gain * state.q;

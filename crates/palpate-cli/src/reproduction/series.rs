@@ -5,7 +5,7 @@ use crate::drawing::{draw, find_browser};
 use crate::log_shows::ShownLog;
 use crate::report::{gallery, image, paragraph};
 use crate::verbs::write_whole;
-use palpate_viewer::{CameraView, RenderWish};
+use palpate_viewer::{CameraView, RenderRequest};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -69,7 +69,7 @@ fn pictures(series: &Series, browser: &Path) -> Result<Vec<Vec<u8>>, Failure> {
     let mut steps: Vec<u64> = series.instants.iter().map(|(step, _)| *step).collect();
     steps.dedup();
     let frame = |(step, _): &(u64, String)| steps.iter().position(|known| known == step).map(|at| at as u64);
-    let wish = RenderWish {
+    let wish = RenderRequest {
         frames: series.instants.iter().filter_map(frame).collect(),
         width: WIDTH,
         height: HEIGHT,

@@ -1,6 +1,6 @@
 //! Figure 5(b) from its log: one period as pictures, the forces on both hands, the ledger.
 
-use super::logged::{Moment, missing, moments};
+use super::logged::{Snapshot, missing, moments};
 use super::series::{Artist, Series as Pictures};
 use super::shake::{LOG_NAME, SHAKES_HZ, SIDES};
 use super::{DataFile, Desk, csv};
@@ -32,14 +32,14 @@ pub struct Figure {
 }
 
 /// How far the hands have gone to the right, in the mean [m].
-fn sway(moment: &Moment) -> f64 {
+fn sway(moment: &Snapshot) -> f64 {
     let hands = moment.hands.iter().zip(SIDES);
     hands.map(|((place, _), (_, side))| place.x - side).sum::<f64>() / moment.hands.len().max(1) as f64
 }
 
 /// Where a period of the shaking begins, on the way to the right through the middle: the last one that is whole before a
 /// time [s].
-fn last_period(moments: &[Moment], before_s: f64) -> Option<usize> {
+fn last_period(moments: &[Snapshot], before_s: f64) -> Option<usize> {
     let period_s = 1.0 / SHAKES_HZ;
     (1..moments.len())
         .rev()
@@ -48,7 +48,7 @@ fn last_period(moments: &[Moment], before_s: f64) -> Option<usize> {
 }
 
 /// Steps since the start over one period, and what is to be seen.
-fn instants(moments: &[Moment], begin: usize) -> Vec<(u64, String)> {
+fn instants(moments: &[Snapshot], begin: usize) -> Vec<(u64, String)> {
     let of = |k: usize| {
         let after_s = k as f64 / PICTURES as f64 / SHAKES_HZ;
         let from = &moments[begin..];
@@ -84,9 +84,9 @@ pub fn figure(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Figur
     progress.finish();
     let last = moments[begin].time_s + 1.0 / SHAKES_HZ;
     let first = last - PERIODS / SHAKES_HZ;
-    let shown: Vec<&Moment> =
+    let shown: Vec<&Snapshot> =
         moments.iter().filter(|moment| moment.time_s >= first && moment.time_s <= last).collect();
-    let force = |moment: &Moment| moment.hands.iter().map(|(_, force)| force.length()).fold(0.0, f64::max);
+    let force = |moment: &Snapshot| moment.hands.iter().map(|(_, force)| force.length()).fold(0.0, f64::max);
     let most = shown.iter().map(|moment| force(moment)).fold(0.0, f64::max);
     let turned = shown.iter().map(|moment| moment.energy.stored()).fold(0.0, f64::max);
     // It begins at rest, without load and without gravity.
@@ -131,13 +131,14 @@ fn chart(title: &str, y: &str, series: Vec<Series>) -> Chart {
     }
 }
 
-fn curve(shown: &[&Moment], label: &str, style: Style, of: impl Fn(&Moment) -> f64) -> Series {
+fn curve(shown: &[&Snapshot], label: &str, style: Style, of: impl Fn(&Snapshot) -> f64) -> Series {
     let points = shown.iter().map(|moment| (moment.time_s, of(moment))).collect();
     Series { label: label.into(), points, style }
 }
 
-fn forces(shown: &[&Moment]) -> Chart {
-    let hand = |at: usize| move |moment: &Moment| moment.hands.get(at).map_or(f64::NAN, |(_, force)| force.x);
+fn forces(shown: &[&Snapshot]) -> Chart {
+    let hand =
+        |at: usize| move |moment: &Snapshot| moment.hands.get(at).map_or(f64::NAN, |(_, force)| force.x);
     let series = vec![
         curve(shown, "left hand", Style::Line, hand(0)),
         curve(shown, "right hand", Style::Line, hand(1)),
@@ -146,7 +147,7 @@ fn forces(shown: &[&Moment]) -> Chart {
     chart("Two hands shake the cube at 2 Hz", "force on the hand along x [N]", series)
 }
 
-fn energies(shown: &[&Moment]) -> Chart {
+fn energies(shown: &[&Snapshot]) -> Chart {
     let start = shown.first().map_or_else(EnergyLedger::default, |moment| moment.energy);
     let series = vec![
         curve(shown, "of motion", Style::Line, |m| 1e3 * m.energy.kinetic),
@@ -163,12 +164,12 @@ mod tests {
     use glam::DVec3;
 
     /// Four seconds of a shake at 1 kHz that begins at 0.3 s.
-    fn shaken() -> Vec<Moment> {
+    fn shaken() -> Vec<Snapshot> {
         let moment = |step: u64| {
             let time_s = 1e-3 * step as f64;
             let x = 0.02 * (std::f64::consts::TAU * SHAKES_HZ * (time_s - 0.3)).sin();
             let hands = SIDES.map(|(_, side)| (DVec3::X * (side + x), DVec3::ZERO)).to_vec();
-            Moment {
+            Snapshot {
                 step,
                 time_s,
                 centre: DVec3::ZERO,

@@ -15,8 +15,8 @@ pub(super) struct SceneFile {
     pub gravity: Numbers<3>,
     pub motion: Option<Spanned<String>>,
     pub rigid_compliance: Option<bool>,
-    pub most_contact_points: Option<Spanned<i64>>,
-    pub most_places: Option<Spanned<i64>>,
+    pub max_contact_points: Option<Spanned<i64>>,
+    pub max_contact_samples: Option<Spanned<i64>>,
     #[serde(default)]
     pub object: Vec<ObjectEntry>,
     #[serde(default)]

@@ -14,8 +14,8 @@ pub use drivers::{RealDevice, STRONGEST_N, known_driver};
 use entries::SceneFile;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters, MotionRule, Pose,
-    RigidCompliance,
+    DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters, Pose,
+    RigidCompliance, RigidIntegrator,
 };
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{Hand, Traits};
@@ -283,8 +283,8 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), Failure> {
 fn read_rules(source: &Source, file: &SceneFile, pace: Pace) -> Result<ModelParameters, Failure> {
     let usual = ModelParameters::default();
     let motion = match file.motion.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
-        None | Some(("exact", _)) => MotionRule::ExactHeld,
-        Some(("paper", _)) => MotionRule::Paper,
+        None | Some(("exact", _)) => RigidIntegrator::ExactHold,
+        Some(("paper", _)) => RigidIntegrator::Paper,
         Some((other, span)) => {
             return source.fail(span, format!("motion is {other:?}, expected \"exact\" or \"paper\""));
         }
@@ -304,13 +304,13 @@ fn read_rules(source: &Source, file: &SceneFile, pace: Pace) -> Result<ModelPara
         source.fail(span, format!("{name} is {count}, expected {least} to {most}"))
     };
     let usual_places = match pace {
-        Pace::Offline => usual.most_places,
+        Pace::Offline => usual.max_contact_samples,
         Pace::RealTime => REALTIME_PLACES,
     };
     let allowed = 1..=MOST_CONTACT_POINTS;
-    let most_contact_points =
-        count("most_contact_points", &file.most_contact_points, usual.most_contact_points, allowed)?;
-    let most_places = count("most_places", &file.most_places, usual_places, PLACES)?;
+    let max_contact_points =
+        count("max_contact_points", &file.max_contact_points, usual.max_contact_points, allowed)?;
+    let max_contact_samples = count("max_contact_samples", &file.max_contact_samples, usual_places, PLACES)?;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
     let gravity = DVec3::from_array(file.gravity.0);
     Ok(ModelParameters {
@@ -318,8 +318,8 @@ fn read_rules(source: &Source, file: &SceneFile, pace: Pace) -> Result<ModelPara
         gravity,
         motion,
         rigid_compliance,
-        most_contact_points,
-        most_places,
+        max_contact_points,
+        max_contact_samples,
         ..usual
     })
 }

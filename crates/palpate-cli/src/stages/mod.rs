@@ -17,8 +17,8 @@ use palpate::{Damping, DeviceMode, Recording, Support};
 use palpate_fem::element::Order;
 use palpate_fem::progress::Progress;
 use palpate_viewer::{
-    MaterialDescription, ObjectDescription, Rules, SceneDescription, SceneTitle, Stage, StageDevice, Tell,
-    Upload, Workshop,
+    MaterialDescription, ObjectDescription, PhysicsSettings, ProgressCallback, SceneDescription,
+    SceneProvider, SceneSummary, Upload, ViewerDevice, ViewerScene,
 };
 pub use recipe::{Recipe, cache_folder};
 use std::collections::HashMap;
@@ -65,7 +65,7 @@ impl Stages {
     }
 
     /// A scene file.
-    pub fn open_file(&self, path: &Path) -> Result<Stage, Failure> {
+    pub fn open_file(&self, path: &Path) -> Result<ViewerScene, Failure> {
         let text = scene_file::read_file(path, path)?;
         let title = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let current = Current {
@@ -84,12 +84,12 @@ impl Stages {
     }
 
     /// Read a scene's text, with pointers if it names none, and keep it as the current one.
-    fn make(&self, current: Current, text: String) -> Result<Stage, Failure> {
+    fn make(&self, current: Current, text: String) -> Result<ViewerScene, Failure> {
         self.made(current, text).map(|(stage, _)| stage)
     }
 
     /// The same, with what its author should know.
-    fn made(&self, mut current: Current, text: String) -> Result<(Stage, Vec<String>), Failure> {
+    fn made(&self, mut current: Current, text: String) -> Result<(ViewerScene, Vec<String>), Failure> {
         let given = text.clone();
         let (scene, text) =
             scene_file::read_changed(&current.path, text, Pace::RealTime, pointers::with_pointers)?;
@@ -107,7 +107,7 @@ impl Stages {
         Ok((stage, told))
     }
 
-    fn stage(&self, current: &mut Current, scene: Scene, text: String) -> Result<Stage, Failure> {
+    fn stage(&self, current: &mut Current, scene: Scene, text: String) -> Result<ViewerScene, Failure> {
         let objects = current.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
         let files = objects.iter().map(|object| {
             let file = object.get("recording").and_then(Value::as_str).unwrap_or_default();
@@ -124,7 +124,7 @@ impl Stages {
         });
         let logged = LoggedScene::new(&scene, Some(text));
         let log = self.logs.as_ref().map(|logs| logs.opener(logged)).transpose()?;
-        Ok(Stage {
+        Ok(ViewerScene {
             description,
             model: scene.model.clone(),
             devices: scene.devices.iter().map(stage_device).collect(),
@@ -133,14 +133,14 @@ impl Stages {
                 .iter()
                 .map(|obstacle| {
                     let obstacle = obstacle.clone();
-                    Arc::new(move |t: f64| obstacle.at(t)) as palpate_viewer::StageMover
+                    Arc::new(move |t: f64| obstacle.at(t)) as palpate_viewer::SharedTrajectory
                 })
                 .collect(),
             log,
         })
     }
 
-    fn open_built_in(&self, id: &str, tell: Tell) -> Result<Stage, Failure> {
+    fn open_built_in(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, Failure> {
         let Some(scene) = BUILT_IN.iter().find(|scene| scene.id == id) else {
             let known = BUILT_IN.map(|scene| scene.id).join(", ");
             return Err(Failure(format!("there is no scene {id:?}; there are {known}")));
@@ -174,7 +174,7 @@ impl Stages {
         self.make(current, text.to_string())
     }
 
-    fn change_rules(&self, rules: &Rules) -> Result<Stage, Failure> {
+    fn change_rules(&self, rules: &PhysicsSettings) -> Result<ViewerScene, Failure> {
         let mut current = self.lock().clone();
         let text = &mut current.text;
         if let Some(gravity) = rules.gravity {
@@ -212,8 +212,8 @@ impl Stages {
         &self,
         object: usize,
         material: MaterialDescription,
-        tell: Tell,
-    ) -> Result<Stage, Failure> {
+        tell: ProgressCallback,
+    ) -> Result<ViewerScene, Failure> {
         let mut current = self.lock().clone();
         let entry = current.text.get_mut("object").and_then(|objects| objects.get_mut(object));
         let Some(entry) = entry else { return Err(Failure(format!("there is no object {object}"))) };
@@ -235,7 +235,7 @@ impl Stages {
         self.make(current, text)
     }
 
-    fn record_upload(&self, upload: Upload, tell: Tell) -> Result<Stage, Failure> {
+    fn record_upload(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, Failure> {
         let Upload { name, bytes, scale, material, modes } = upload;
         let file = Path::new(&name).file_name().filter(|name| !name.is_empty());
         let Some(file) = file else { return Err(Failure("the mesh file has no name".into())) };
@@ -288,9 +288,9 @@ impl Stages {
     }
 }
 
-impl Workshop for Stages {
-    fn titles(&self) -> Vec<SceneTitle> {
-        let title = |scene: &built_in::BuiltIn| SceneTitle {
+impl SceneProvider for Stages {
+    fn titles(&self) -> Vec<SceneSummary> {
+        let title = |scene: &built_in::BuiltIn| SceneSummary {
             id: scene.id.into(),
             title: scene.title.into(),
             about: scene.about.into(),
@@ -298,11 +298,11 @@ impl Workshop for Stages {
         BUILT_IN.iter().map(title).collect()
     }
 
-    fn open(&self, id: &str, tell: Tell) -> Result<Stage, String> {
+    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, String> {
         self.open_built_in(id, tell).map_err(|failure| failure.0)
     }
 
-    fn change(&self, rules: &Rules) -> Result<Stage, String> {
+    fn change(&self, rules: &PhysicsSettings) -> Result<ViewerScene, String> {
         self.change_rules(rules).map_err(|failure| failure.0)
     }
 
@@ -310,12 +310,12 @@ impl Workshop for Stages {
         &self,
         object: usize,
         material: MaterialDescription,
-        tell: Tell,
-    ) -> Result<Stage, String> {
+        tell: ProgressCallback,
+    ) -> Result<ViewerScene, String> {
         self.record_again(object, material, tell).map_err(|failure| failure.0)
     }
 
-    fn record(&self, upload: Upload, tell: Tell) -> Result<Stage, String> {
+    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, String> {
         self.record_upload(upload, tell).map_err(|failure| failure.0)
     }
 }
@@ -364,24 +364,24 @@ fn recipe_of(recording: &Recording) -> Option<Recipe> {
     })
 }
 
-fn stage_device(device: &scene_file::SceneDevice) -> StageDevice {
+fn stage_device(device: &scene_file::SceneDevice) -> ViewerDevice {
     match (&device.real, &device.path) {
         (Some(real), _) => {
             let (real, mode): (RealDevice, DeviceMode) = (real.clone(), device.mode);
-            StageDevice::Here(Arc::new(move || {
+            ViewerDevice::Here(Arc::new(move || {
                 attach_real(&real, mode, DEVICE_HZ, false).map_err(|failure| failure.0)
             }))
         }
         (None, Some(path)) => match device.simulated {
-            None => StageDevice::Following(path.clone(), device.mode),
+            None => ViewerDevice::Following(path.clone(), device.mode),
             simulated => {
                 let (path, mode) = (path.clone(), device.mode);
-                StageDevice::Here(Arc::new(move || {
+                ViewerDevice::Here(Arc::new(move || {
                     Ok(attach(path.clone(), simulated, mode, DEVICE_HZ, false))
                 }))
             }
         },
-        (None, None) => StageDevice::Pointer,
+        (None, None) => ViewerDevice::Pointer,
     }
 }
 

@@ -6,7 +6,7 @@ use crate::log_shows::{Frames, ShownLog};
 use crate::verbs::{print, print_json, write_whole};
 use crate::whole_file::stop_on_interrupt;
 use clap::{Args, ValueEnum};
-use palpate_viewer::{CameraView, RenderWish};
+use palpate_viewer::{CameraView, RenderRequest};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -91,7 +91,7 @@ pub fn render(arguments: &Arguments) -> Result<(), Failure> {
     let log = ShownLog::read(&arguments.log, 0, arguments.fps)?;
     let numbers = chosen(log.frames(), arguments.from, arguments.to)?;
     let frames = log.frames();
-    let wish = RenderWish {
+    let wish = RenderRequest {
         frames: numbers,
         width: arguments.width,
         height: arguments.height,

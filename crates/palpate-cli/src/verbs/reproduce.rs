@@ -74,7 +74,7 @@ pub fn reproduce(arguments: &Arguments) -> Result<(), Failure> {
 /// What the page is about, and the table of what was found.
 fn intro(cells: u32, findings: &[Finding]) -> String {
     let text = paragraph(&format!(
-        "What “A Study on Haptic Interaction and Simulation of Motion and Deformation of Elastic Object” reports of its cube \
+        "What “A Study on Haptic Interaction and Simulation of Motion and DeformationSnapshot of Elastic Object” reports of its cube \
          (side 0.1 m, E = 2000 Pa, ν = 0.49, ρ = 110 kg/m³), measured with palpate {} by the command below. The paper states \
          no damping; here α = 2 1/s, β = 2·10⁻⁴ s where nothing else is said. The numbers behind the figures lie beside this page as CSV, the runs of figure 5 as \
          logs that palpate serve and palpate replay read.",

@@ -8,7 +8,7 @@ use crate::whole_file::stop_on_interrupt;
 use clap::Args;
 use indicatif::ProgressBar;
 use palpate_haptics::Scheduling;
-use palpate_viewer::{Exhibit, Live, Server, Settings, Stage, Workshop};
+use palpate_viewer::{Live, SceneProvider, ServedContent, Server, Settings, ViewerScene};
 use std::io::IsTerminal;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -104,7 +104,7 @@ fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
     std::thread::scope(|scope| {
         // The page tells of a log that can't be computed again; it shows what there is of it.
         scope.spawn(|| logs.into_iter().for_each(|log| drop(log.make(stop))));
-        serving.serve(server, Exhibit::Logs(shows))
+        serving.serve(server, ServedContent::Logs(shows))
     })
 }
 
@@ -128,7 +128,7 @@ pub fn serve_built_in(serving: &Serving, id: &str) -> Result<(), Failure> {
 
 fn serve_live(
     serving: &Serving,
-    first: impl FnOnce(&Stages) -> Result<Stage, Failure>,
+    first: impl FnOnce(&Stages) -> Result<ViewerScene, Failure>,
 ) -> Result<(), Failure> {
     // Before what takes long: a file that can't be written, or a port that is taken, is told at once.
     let logs = serving.log.as_deref().map(LogSeries::new).transpose()?;
@@ -139,7 +139,7 @@ fn serve_live(
     let core = serving.core.or(cores.checked_sub(1));
     let scheduling = Scheduling { priority: Some(PRIORITY), core };
     let live = Live { workshop: Arc::new(stages), first, scheduling };
-    serving.serve(server, Exhibit::Live(Box::new(live)))?;
+    serving.serve(server, ServedContent::Live(Box::new(live)))?;
     logs.map_or(Ok(()), |logs| logs.end())
 }
 
@@ -158,7 +158,7 @@ impl Serving {
     }
 
     /// Say where, open a browser, and answer until Ctrl-C.
-    pub fn serve(&self, server: Server, exhibit: Exhibit) -> Result<(), Failure> {
+    pub fn serve(&self, server: Server, exhibit: ServedContent) -> Result<(), Failure> {
         let mut address = format!("http://{}/", server.address().map_err(Failure)?);
         if let Some(token) = &self.token {
             address += &format!("?token={token}");

@@ -4,7 +4,7 @@ use super::scene::{G, PAPER, Stuff, Watch, at, floor, scene};
 use super::{Check, column};
 use crate::Failure;
 use glam::DVec3;
-use palpate::{HeldOscillator, Input, Oscillation, Recording, State, step};
+use palpate::{Input, OscillatorState, Recording, SampledOscillator, State, step};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use std::sync::Arc;
@@ -132,7 +132,7 @@ fn by_hand(recording: &Recording, step_s: f64, seconds: f64) -> Vec<f64> {
     let row = |i: usize| &modes.mode_shapes[(3 * low[i] + 1) * count..][..count];
     let dot = |a: &[f64], b: &mut dyn Iterator<Item = f64>| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
-    let oscillators: Vec<_> = pairs.map(|(&w, &z)| HeldOscillator::new(w, z, step_s)).collect();
+    let oscillators: Vec<_> = pairs.map(|(&w, &z)| SampledOscillator::new(w, z, step_s)).collect();
     let n = low.len();
     let mut w = vec![vec![0.0; n]; n];
     for i in 0..n {
@@ -142,7 +142,7 @@ fn by_hand(recording: &Recording, step_s: f64, seconds: f64) -> Vec<f64> {
             w[i][j] = dot(row(i), &mut bent) + residual + 0.5 * step_s * step_s / mass;
         }
     }
-    let mut q = vec![Oscillation { q: 0.0, v: 0.0 }; count];
+    let mut q = vec![OscillatorState { q: 0.0, v: 0.0 }; count];
     let (mut height, mut speed, mut forces) = (DROP, 0.0, vec![0.0; n]);
     let run = (0..(seconds / step_s).round() as usize).map(|_| {
         let free: Vec<_> = oscillators.iter().zip(&q).map(|(o, q)| o.advance(*q, 0.0).q).collect();

@@ -11,7 +11,8 @@ use crate::Failure;
 use faer::Mat;
 use glam::DVec3;
 use palpate::{
-    Coupling, DeviceMode, DeviceParameters, Grasp, HeldOscillator, Oscillation, Recording, SurfacePoint,
+    Coupling, DeviceMode, DeviceParameters, Grasp, OscillatorState, Recording, SampledOscillator,
+    SurfacePoint,
 };
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
@@ -286,24 +287,24 @@ fn onset(cell: &Cell, bound: f64) -> Result<f64, Failure> {
 /// The largest eigenvalue of the loop along an axis: modes, stretch, forces under way, device.
 fn spectral_radius(cell: &Cell, place: &PlaceResponse, coupling: Coupling) -> Result<f64, Failure> {
     let LoopTiming { step_s: h, delay_updates } = cell.timing();
-    let swings: Vec<(HeldOscillator, f64)> = place
+    let swings: Vec<(SampledOscillator, f64)> = place
         .swings()
-        .map(|[omega, zeta, gain]| (HeldOscillator::new(omega, zeta, h), gain.sqrt()))
+        .map(|[omega, zeta, gain]| (SampledOscillator::new(omega, zeta, h), gain.sqrt()))
         .collect();
     let mass = Traits::TOUCH.mass_kg + HAND.mass_kg;
     let omega = (HAND.stiffness_n_m / mass).sqrt();
     let zeta = 0.5 * (HAND.damping_n_s_m + Traits::TOUCH.damping_n_s_m) / (mass * omega);
-    let device = HeldOscillator::new(omega, zeta, h);
+    let device = SampledOscillator::new(omega, zeta, h);
     let (rate, within) = (coupling.damping / h, place.within_step(h));
     let sum = coupling.stiffness + rate;
     let (m, d) = (swings.len(), delay_updates as usize);
     let n = 2 * m + 1 + d + 2;
     let next = |state: &[f64]| -> Vec<f64> {
-        let mode = |at: usize| Oscillation { q: state[2 * at], v: state[2 * at + 1] };
+        let mode = |at: usize| OscillatorState { q: state[2 * at], v: state[2 * at + 1] };
         let free: f64 =
             swings.iter().enumerate().map(|(at, (map, phi))| phi * map.advance(mode(at), 0.0).q).sum();
         let (stretch, line) = (state[2 * m], &state[2 * m + 1..2 * m + 1 + d]);
-        let hand = Oscillation { q: state[n - 2], v: state[n - 1] };
+        let hand = OscillatorState { q: state[n - 2], v: state[n - 1] };
         let force = (hand.q - free - rate / sum * stretch) / (within + 1.0 / sum);
         let mut next = Vec::with_capacity(n);
         for (at, (map, phi)) in swings.iter().enumerate() {

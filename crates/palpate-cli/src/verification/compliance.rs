@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::verbs::demo::paper_cube;
 use faer::Mat;
 use glam::DVec3;
-use palpate::HeldOscillator;
+use palpate::SampledOscillator;
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::modes::{all_modes, orthonormality_error};
@@ -46,7 +46,7 @@ pub fn points() -> Result<Vec<Check>, Failure> {
             (0..body.modes.squares.len()).map(|i| (body.modes.squares[i], body.modes.shapes[(row, i)]));
         let all = kept.chain(left_out.iter().map(|mode| (mode.square, mode.gain.y)));
         let response = all.map(|(square, gain)| {
-            gain * gain * HeldOscillator::new(square.sqrt(), 0.0, STEP_S).instantaneous_compliance()
+            gain * gain * SampledOscillator::new(square.sqrt(), 0.0, STEP_S).instantaneous_compliance()
         });
         let quantity = format!("R[0] at 1 ms, {name} [m/N]");
         checks.push(Check::new(quantity, response.sum(), instantaneous_m_n, HALF_DIGIT));

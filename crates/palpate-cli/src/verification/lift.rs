@@ -4,7 +4,7 @@ use super::scene::{G, PAPER, Stuff, Watch, at, floor, scene};
 use super::{Check, smooth};
 use crate::Failure;
 use glam::DVec3;
-use palpate::{Against, Coupling, DeviceInput, DeviceParameters, Input, Output, State, step};
+use palpate::{Collider, Coupling, DeviceInput, DeviceParameters, Input, Output, State, step};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use std::f64::consts::{PI, TAU};
@@ -50,7 +50,7 @@ fn hand(t: f64) -> [f64; 2] {
 
 /// Slip [m] of the fingers over the step: that of the finger that slips more.
 fn slip(output: &Output) -> f64 {
-    let fingers = output.contacts.iter().filter(|contact| matches!(contact.against, Against::Device(_)));
+    let fingers = output.contacts.iter().filter(|contact| matches!(contact.against, Collider::Device(_)));
     fingers.map(|contact| contact.slip_speed * STEP).fold(0.0, f64::max)
 }
 
@@ -76,8 +76,10 @@ pub fn pinch_lift() -> Result<Vec<Check>, Failure> {
             let object = &output.objects[0];
             if (SHAKE - 0.05..THROW).contains(&t) {
                 slipped += slip(output);
-                on_floor = on_floor
-                    .max(output.contacts.iter().filter(|c| c.against == Against::Obstacle(0)).count() as f64);
+                on_floor =
+                    on_floor
+                        .max(output.contacts.iter().filter(|c| c.against == Collider::Obstacle(0)).count()
+                            as f64);
             }
             let above = object.pose.position - DVec3::Y * height;
             if number == ((SHAKE - 0.05) / STEP) as usize {

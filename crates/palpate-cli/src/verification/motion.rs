@@ -125,7 +125,7 @@ pub fn energy() -> Result<Vec<Check>, Failure> {
     let triangles = recording.surface.triangles.len() as u64;
     let mut numbers = Random(0x2545_f491_4f6c_dd1d);
     let mut random = || numbers.unit();
-    let mut input = Input { devices: vec![DeviceInput::away(); 3], ..Input::default() };
+    let mut input = Input { devices: vec![DeviceInput::inactive(); 3], ..Input::default() };
     let start = state.output().energy.stored();
     let (mut gained, mut unexplained, mut backwards, mut moved) = (0.0_f64, 0.0_f64, 0.0_f64, 1e-9_f64);
     for number in 0..4000 {

@@ -4,7 +4,7 @@ use super::Check;
 use super::scene::{G, PAPER, Stuff, Watch, at, floor};
 use crate::Failure;
 use glam::DVec3;
-use palpate::{Against, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
+use palpate::{Collider, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::{ball_mesh, box_mesh};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ const ALL: usize = usize::MAX;
 const USUAL: usize = 48;
 
 fn scene(
-    most_places: usize,
+    max_contact_samples: usize,
     step_s: f64,
     friction: f64,
     objects: Vec<ModelObject>,
@@ -25,7 +25,7 @@ fn scene(
         step_s,
         gravity: DVec3::Y * -G,
         obstacles: vec![floor(friction)],
-        most_places,
+        max_contact_samples,
         ..ModelParameters::default()
     };
     Ok(Model::new(parameters, objects)?)
@@ -128,8 +128,8 @@ fn stacked() -> Result<Vec<Check>, Failure> {
             }
             for contact in &output.contacts {
                 let on_the_upper = match (contact.object, contact.against) {
-                    (1, Against::Object(_)) => contact.force.y,
-                    (_, Against::Object(_)) => -contact.force.y,
+                    (1, Collider::Object(_)) => contact.force.y,
+                    (_, Collider::Object(_)) => -contact.force.y,
                     _ => 0.0,
                 };
                 carried += on_the_upper / f64::from(LATE);

@@ -106,7 +106,7 @@ impl Watch {
         self.moved = self.moved.max(start.abs()).max(energy.kinetic + energy.elastic + energy.input.abs());
         self.gained = self.gained.max(energy.stored() - start - energy.input);
         self.defect = self.defect.max(energy.defect.abs());
-        self.missed += output.status.unsolved_objects + output.status.dropped_contacts;
+        self.missed += output.status.unsolved_islands + output.status.dropped_contacts;
     }
 
     /// What was seen.

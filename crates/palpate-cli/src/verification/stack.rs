@@ -4,7 +4,7 @@ use super::Check;
 use super::scene::{G, Stuff, Watch, at, floor, scene};
 use crate::Failure;
 use glam::{DQuat, DVec3};
-use palpate::{Against, Input, Output, State, step};
+use palpate::{Collider, Input, Output, State, step};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 
@@ -15,11 +15,12 @@ const STEP: f64 = 2e-3;
 const JELLY: Stuff = Stuff { young: 5000.0, poisson: 0.4, density: 110.0, beta: 1e-2 };
 
 /// Sum of the vertical forces [N] on an object from what it lies on.
-fn carried(output: &Output, object: usize, by: Against) -> f64 {
+fn carried(output: &Output, object: usize, by: Collider) -> f64 {
     let under = |c: &&palpate::ContactOutput| c.object == object && c.against == by;
     // A pair has one row: the force on the other is the opposite.
-    let over =
-        |c: &&palpate::ContactOutput| Against::Object(c.object) == by && c.against == Against::Object(object);
+    let over = |c: &&palpate::ContactOutput| {
+        Collider::Object(c.object) == by && c.against == Collider::Object(object)
+    };
     output.contacts.iter().filter(under).map(|c| c.force.y).sum::<f64>()
         - output.contacts.iter().filter(over).map(|c| c.force.y).sum::<f64>()
 }
@@ -57,9 +58,9 @@ pub fn stack() -> Result<Vec<Check>, Failure> {
         checks.push(Check::new(format!("{name} cube turns from 10 s to 60 s [rad]"), turned, 0.0, STILL));
     }
     let weight = cube.mass() * G;
-    let floor = carried(output, 0, Against::Obstacle(0));
+    let floor = carried(output, 0, Collider::Obstacle(0));
     checks.push(Check::new("what the floor carries after 60 s [N]", floor, 2.0 * weight, 1e-6));
-    let pair = carried(output, 1, Against::Object(0));
+    let pair = carried(output, 1, Collider::Object(0));
     checks.push(Check::new("what the lower cube carries after 60 s [N]", pair, weight, 1e-6));
     checks.extend(watch.checks("stack"));
     Ok(checks)

@@ -3,7 +3,7 @@
 use crate::workplace::{CUBE, Workplace};
 
 /// A cube on a floor, a finger that touches it, and a ball that moves.
-const SCENE: &str = r#"most_contact_points = 100
+const SCENE: &str = r#"max_contact_points = 100
 
 [[object]]
 name = "cube"
@@ -70,8 +70,8 @@ fn unknown_keys_of_contacts_are_errors_with_their_line() {
         ("normal = [0.0, 1.0, 0.0]\n", "", 8, "missing field `normal`"),
         ("normal = [0.0, 1.0, 0.0]", "normal = [0.0, 1.0]", 11, "2 numbers, expected 3"),
         (
-            "most_contact_points = 100",
-            "most_contact_points = 1.5",
+            "max_contact_points = 100",
+            "max_contact_points = 1.5",
             1,
             "invalid type: floating point `1.5`, expected a whole number",
         ),
@@ -88,11 +88,15 @@ fn numbers_out_of_range_are_named_with_their_line() {
     let friction = "friction = 0.5\n\n[[device]]";
     for (old, new, error) in [
         (
-            "most_contact_points = 100",
-            "most_contact_points = 0",
-            "line 1: most_contact_points is 0, expected 1 to 4096",
+            "max_contact_points = 100",
+            "max_contact_points = 0",
+            "line 1: max_contact_points is 0, expected 1 to 4096",
         ),
-        ("most_contact_points = 100", "most_places = 3", "line 1: most_places is 3, expected 8 to 1000000"),
+        (
+            "max_contact_points = 100",
+            "max_contact_samples = 3",
+            "line 1: max_contact_samples is 3, expected 8 to 1000000",
+        ),
         ("friction = 0.4", "friction = -0.4", "line 6: friction is -0.4, expected at least 0 and below 1e6"),
         (
             "normal = [0.0, 1.0, 0.0]",

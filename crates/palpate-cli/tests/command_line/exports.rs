@@ -39,7 +39,7 @@ fn model(workplace: &Workplace) -> Model {
     let parameters = ModelParameters {
         step_s: 0.002,
         gravity: DVec3::new(0.0, 0.0, -9.81),
-        most_places: 8,
+        max_contact_samples: 8,
         devices: vec![finger; 2],
         obstacles: vec![floor],
         ..ModelParameters::default()
@@ -341,7 +341,7 @@ fn a_log_that_comes_out_differently_is_told_of_and_leaves_nothing() {
     let workplace = realtime::workplace();
     let model = model(&workplace);
     let mut state = State::new(&model);
-    let mut input = Input { devices: vec![DeviceInput::away(); 2], obstacles: vec![Pose::IDENTITY] };
+    let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles: vec![Pose::IDENTITY] };
     input.devices[0].position = DVec3::new(-0.058, 0.0, 0.05);
     let names = Names {
         objects: vec!["cube".into()],

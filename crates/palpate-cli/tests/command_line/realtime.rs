@@ -32,7 +32,7 @@ fn a_log_of_a_run_in_real_time_repeats_bit_for_bit_anywhere() {
     let run = ["run", "fingers.toml", "--realtime", "--duration", "0.6", "--log", "run.mcap", "--json"];
     let report = workplace.json(&run);
     assert_eq!(report["steps"], 300);
-    assert_eq!(report["most_places"], 8);
+    assert_eq!(report["max_contact_samples"], 8);
     assert_eq!(report["log"]["steps"], 300);
     assert_eq!(report["force_process"]["cycles"], 300);
     assert!(report["deformation_process"]["cycles"].as_u64() > Some(3), "{report:#}");
@@ -126,7 +126,7 @@ fn the_paper_s_two_hands_run_in_real_time() {
         "0",
         "--json",
     ]);
-    assert_eq!((&report["steps"], &report["most_places"]), (&200.into(), &48.into()));
+    assert_eq!((&report["steps"], &report["max_contact_samples"]), (&200.into(), &48.into()));
     assert_eq!(report["deformation_process"]["cycles"], 0);
     assert!(report["devices"][0]["force_max_n"].as_f64() > Some(0.01), "{report:#}");
     let text = workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05"]);

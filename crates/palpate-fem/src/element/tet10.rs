@@ -7,10 +7,10 @@
 use super::{EDGES, Elasticity, ElementMatrices, block, gradients};
 use glam::{DMat3, DVec3};
 
-type Form = [[f64; 4]; 4];
+type FrameFormat = [[f64; 4]; 4];
 
 /// Symmetric Q of each shape function.
-fn forms() -> [Form; 10] {
+fn forms() -> [FrameFormat; 10] {
     let mut forms = [[[0.0; 4]; 4]; 10];
     for (a, form) in forms[..4].iter_mut().enumerate() {
         // 2λ_a² − λ_a·Σ_b λ_b.

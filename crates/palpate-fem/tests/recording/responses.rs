@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use glam::DVec3;
-use palpate::{Damping, HeldOscillator, NearField};
+use palpate::{Damping, NearField, SampledOscillator};
 use palpate_fem::element::Order;
 use palpate_fem::modes::{all_modes, orthonormality_error};
 use palpate_fem::progress::Silent;
@@ -149,7 +149,7 @@ fn the_near_field_is_the_whole_residual_tapered() {
 /// Static compliance and R[0] [m/N] of modes, as the diagonal of the three directions at a load.
 fn compliances(modes: impl Iterator<Item = (f64, DVec3)>, damping: Damping, step_s: f64) -> [DVec3; 2] {
     modes.fold([DVec3::ZERO; 2], |[rest, first], (square, gain)| {
-        let held = HeldOscillator::new(square.sqrt(), damping.ratio(square.sqrt()), step_s);
+        let held = SampledOscillator::new(square.sqrt(), damping.ratio(square.sqrt()), step_s);
         [rest + gain * gain / square, first + gain * gain * held.instantaneous_compliance()]
     })
 }

@@ -3,7 +3,7 @@
 use super::record::{Picture, Record};
 use glam::{DQuat, DVec3};
 use palpate::{
-    Against, DeviceMode, EnergyLedger, Grasp, ObjectMotion, Oscillation, Pose, SurfacePoint, Twist,
+    Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose, SurfacePoint, Twist,
 };
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
@@ -119,8 +119,8 @@ pub(super) struct StartMessage {
     modes: Vec<[f64; 2]>,
 }
 
-impl From<&ObjectMotion> for StartMessage {
-    fn from(motion: &ObjectMotion) -> Self {
+impl From<&ObjectSnapshot> for StartMessage {
+    fn from(motion: &ObjectSnapshot) -> Self {
         let object = ObjectMessage {
             pose: motion.pose.into(),
             velocity: motion.twist.linear.into(),
@@ -131,13 +131,13 @@ impl From<&ObjectMotion> for StartMessage {
     }
 }
 
-impl From<StartMessage> for ObjectMotion {
+impl From<StartMessage> for ObjectSnapshot {
     fn from(StartMessage { object, angular_momentum, modes }: StartMessage) -> Self {
         Self {
             pose: object.pose.into(),
             twist: Twist { linear: object.velocity.into(), angular: object.angular_velocity.into() },
             angular_momentum: angular_momentum.into(),
-            modes: modes.into_iter().map(|[q, v]| Oscillation { q, v }).collect(),
+            modes: modes.into_iter().map(|[q, v]| OscillatorState { q, v }).collect(),
         }
     }
 }
@@ -235,13 +235,13 @@ impl Serialize for StepOf<'_> {
         let device = |at: usize| {
             let (input, output) = (&record.input.devices[at], &record.devices[at]);
             DeviceMessage {
-                present: input.mode != DeviceMode::Away,
+                present: input.mode != DeviceMode::Inactive,
                 position: input.position.into(),
                 force: output.force_on_hand.into(),
                 proxy: output.proxy.into(),
                 holds: match input.mode {
                     DeviceMode::Held(grasp) => Some(grasp.into()),
-                    DeviceMode::Away | DeviceMode::Touch => None,
+                    DeviceMode::Inactive | DeviceMode::Touch => None,
                 },
             }
         };
@@ -255,9 +255,9 @@ impl Serialize for StepOf<'_> {
         };
         let status = StatusMessage {
             residual_m: record.status.solver_residual_m,
-            unsolved: record.status.unsolved_objects,
+            unsolved: record.status.unsolved_islands,
             dropped: record.status.dropped_contacts,
-            rejected: record.status.rejected_devices,
+            rejected: record.status.rejected_inputs,
         };
         let microseconds = |time: std::time::Duration| time.as_nanos() as f64 * 1e-3;
         let timing = TimingMessage {
@@ -298,9 +298,9 @@ pub(super) fn contacts<'a>(
     let one = |contact: &palpate::ContactOutput| ContactMessage {
         object: name(&names.objects, contact.object),
         against: match contact.against {
-            Against::Device(at) => name(&names.devices, at),
-            Against::Obstacle(at) => name(&names.obstacles, at),
-            Against::Object(at) => name(&names.objects, at),
+            Collider::Device(at) => name(&names.devices, at),
+            Collider::Obstacle(at) => name(&names.obstacles, at),
+            Collider::Object(at) => name(&names.objects, at),
         },
         point: contact.point.into(),
         normal: contact.normal.into(),

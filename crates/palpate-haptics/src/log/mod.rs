@@ -18,4 +18,4 @@ mod writer;
 pub use messages::Names;
 pub use reader::{LoggedStep, Reader};
 pub use record::{Picture, Record};
-pub use writer::{LogHand, LogSummary, LogWriter};
+pub use writer::{LogSender, LogSummary, LogWriter};

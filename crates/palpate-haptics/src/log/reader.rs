@@ -8,7 +8,7 @@ use mcap::Summary;
 use mcap::read::parse_record;
 use mcap::records::{Record, op::MESSAGE};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectMotion, Output, Pose};
+use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose};
 use std::collections::BTreeMap;
 
 /// A log in memory.
@@ -54,13 +54,13 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// When the log does not tell of one of them.
-    pub fn start(&self, names: &Names) -> Result<Option<Vec<ObjectMotion>>, Error> {
+    pub fn start(&self, names: &Names) -> Result<Option<Vec<ObjectSnapshot>>, Error> {
         let Some(starts) = self.metadata(START)? else { return Ok(None) };
         let motion = |name: &String| {
             let text = starts.get(name);
             let text =
                 text.ok_or_else(|| Error::Log(format!("the log does not tell how {name:?} begins")))?;
-            serde_json::from_str::<StartMessage>(text).map(ObjectMotion::from).map_err(unreadable)
+            serde_json::from_str::<StartMessage>(text).map(ObjectSnapshot::from).map_err(unreadable)
         };
         names.objects.iter().map(motion).collect::<Result<_, _>>().map(Some)
     }
@@ -156,7 +156,7 @@ impl LoggedStep {
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
             let mode = match device.holds {
-                _ if !device.present => DeviceMode::Away,
+                _ if !device.present => DeviceMode::Inactive,
                 Some(hold) => DeviceMode::Held(hold.into()),
                 None => *mode,
             };

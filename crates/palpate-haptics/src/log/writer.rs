@@ -70,7 +70,7 @@ impl<T> Taker<T> {
 }
 
 /// The force process's end of a log.
-pub struct LogHand {
+pub struct LogSender {
     steps: Giver<Record>,
     pictures: Giver<Picture>,
 }
@@ -108,7 +108,7 @@ pub struct LogSummary {
     pub missed: u64,
 }
 
-impl LogHand {
+impl LogSender {
     /// Hand a step to the log, if a record is free.
     ///
     /// # Real time
@@ -153,7 +153,7 @@ impl<W: Write + Seek> LogWriter<W> {
         facts: BTreeMap<String, String>,
         files: &[(String, Vec<u8>)],
         (model, state, input): (&Model, &State, &Input),
-    ) -> Result<(LogHand, Self), Error> {
+    ) -> Result<(LogSender, Self), Error> {
         let options = WriteOptions::new()
             .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
@@ -191,7 +191,7 @@ impl<W: Write + Seek> LogWriter<W> {
         };
         let (give_steps, steps) = round(STEPS_WAITING, || Record::new(state, input));
         let (give_pictures, pictures) = round(PICTURES_WAITING, || Picture::new(model, state, input));
-        let hand = LogHand { steps: give_steps, pictures: give_pictures };
+        let hand = LogSender { steps: give_steps, pictures: give_pictures };
         let out = Out { writer, names, channels, text: Vec::new(), start_ns, steps: 0 };
         Ok((hand, Self { steps, pictures, out }))
     }

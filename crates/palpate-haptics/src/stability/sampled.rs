@@ -8,7 +8,7 @@
 //! per force, R[0] + R[1]·w + R[2]·w² + …, for a mass of 1 kg [m/N].
 
 use num_complex::Complex64;
-use palpate::{HeldOscillator, Oscillation};
+use palpate::{OscillatorState, SampledOscillator};
 
 /// Exact one-step map of a mass of 1 kg.
 #[derive(Debug, Clone, Copy)]
@@ -20,9 +20,9 @@ pub(super) struct Sampled {
 impl Sampled {
     /// On a spring: ω > 0 [rad/s], ζ [1], step [s].
     pub(super) fn oscillator(angular_frequency: f64, damping_ratio: f64, step_s: f64) -> Self {
-        let map = HeldOscillator::new(angular_frequency, damping_ratio, step_s);
+        let map = SampledOscillator::new(angular_frequency, damping_ratio, step_s);
         let moved = |q: f64, v: f64, p: f64| {
-            let next = map.advance(Oscillation { q, v }, p);
+            let next = map.advance(OscillatorState { q, v }, p);
             [next.q, next.v]
         };
         let (from_q, from_v) = (moved(1.0, 0.0, 0.0), moved(0.0, 1.0, 0.0));

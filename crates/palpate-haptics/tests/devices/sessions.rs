@@ -7,7 +7,7 @@ mod scenes;
 use super::standin::Standin;
 use palpate::{DeviceMode, Pose};
 use palpate_haptics::device::{Driver, Mount};
-use palpate_haptics::{Attached, SafetyLimits, Scheduling, Session, SessionDevice};
+use palpate_haptics::{AttachedDevice, SafetyLimits, Scheduling, Session, SessionDevice};
 use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -22,7 +22,7 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
     // From the right: theirs is y.
     place(0, 0.0, 1.05 * edge, 0.0);
     let device = Driver::Dhd.open("0", Some(standin.place())).expect("a device").1;
-    let attached = Attached {
+    let attached = AttachedDevice {
         device,
         mode: DeviceMode::Touch,
         mount: Mount::default(),

@@ -4,7 +4,7 @@ use super::scenes::{STEP_S, half_width, model, path, process};
 use palpate_haptics::device::{Hand, Mount, Simulated, Traits};
 use palpate_haptics::log::{LogWriter, Names};
 use palpate_haptics::{
-    Cycle, HapticUpdate, Moment, PassivityController, Safety, SafetyLimits, Timing, showing,
+    Cycle, HapticUpdate, PassivityController, Safety, SafetyLimits, Snapshot, Timing, snapshot_buffer,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -58,7 +58,8 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
             HapticUpdate::new(Box::new(device), port, Mount::default(), safety, Some(passivity), false)
         })
         .collect();
-    let (mut showing, _moments) = showing(&Moment::new(&model, force.state(), force.input()));
+    let (mut snapshot_buffer, _moments) =
+        snapshot_buffer(&Snapshot::new(&model, force.state(), force.input()));
     let names = Names {
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
@@ -76,7 +77,7 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         updates.iter_mut().for_each(|update| update.cycle(now_s));
         force.cycle(now_s);
         if tick % 16 == 0 {
-            showing.show(tick, force.input(), force.state());
+            snapshot_buffer.show(tick, force.input(), force.state());
             hand.take_picture(|picture| picture.take(force.input(), force.state()));
         }
         hand.take(|record| record.take(force.input(), force.state()));

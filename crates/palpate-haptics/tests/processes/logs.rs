@@ -65,7 +65,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
             let logged = logged.expect("a step");
             assert_eq!(logged.step, at as u64 + 1);
             let mut input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
-            away += u32::from(input.devices[0].mode == DeviceMode::Away);
+            away += u32::from(input.devices[0].mode == DeviceMode::Inactive);
             if other == Some(logged.step) {
                 input.devices[0] = DeviceInput::touching(DVec3::X * 0.02);
             }
@@ -94,7 +94,7 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
         step(&model, &mut before, &press(number));
     }
     let motions = before.motions();
-    let begins = State::going_on(&model, &motions);
+    let begins = State::resume(&model, &motions);
     assert!(begins.output().energy.elastic > 1e-9, "{:?}", begins.output().energy);
     assert!(motions[0].angular_momentum != DVec3::ZERO && motions[0].twist.linear.x < 0.0, "{motions:?}");
 
@@ -102,7 +102,7 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
     let reader = Reader::new(&bytes).expect("a log");
     let read = reader.start(&names()).expect("readable").expect("it tells how the body begins");
     assert_eq!(read, motions, "to the last bit");
-    let mut state = State::going_on(&model, &read);
+    let mut state = State::resume(&model, &read);
     let mut at_rest = State::new(&model);
     let mut differs = 0;
     for logged in reader.each_step() {

@@ -5,7 +5,7 @@ use palpate::{
     Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
     Recording, Shape, State, Twist,
 };
-use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, Mover, port};
+use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, ObstacleTrajectory, port};
 use std::sync::Arc;
 
 /// Step of all scenes [s].
@@ -57,7 +57,7 @@ pub fn process_from(state: State, model: &Arc<Model>) -> (ForceProcess, Vec<Devi
         })
         .unzip();
     let floor = model.parameters().obstacles[0].pose;
-    let mover: Mover = Box::new(move |_| floor);
+    let mover: ObstacleTrajectory = Box::new(move |_| floor);
     (ForceProcess::from_state(state, model.clone(), seats, vec![mover], 0.05), ends)
 }
 

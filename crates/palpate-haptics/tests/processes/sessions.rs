@@ -3,9 +3,9 @@
 use super::scenes::{half_width, model, path};
 use palpate::{DeviceMode, Input, Pose};
 use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
-use palpate_haptics::log::{LogHand, LogWriter, Names, Reader};
+use palpate_haptics::log::{LogSender, LogWriter, Names, Reader};
 use palpate_haptics::{
-    Attached, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
+    AttachedDevice, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
 };
 use std::collections::BTreeMap;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
@@ -23,7 +23,7 @@ fn session(steps: Option<u64>) -> Session {
         } else {
             Box::new(Simulated::new(Traits::TOUCH, Hand::FIRM, wanted))
         };
-        SessionDevice::Here(Attached {
+        SessionDevice::Here(AttachedDevice {
             device,
             mode: DeviceMode::Touch,
             mount: Mount::default(),
@@ -50,7 +50,7 @@ fn session(steps: Option<u64>) -> Session {
 }
 
 /// A log of a session, whose begin fits.
-fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogHand, LogWriter<W>) {
+fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogSender, LogWriter<W>) {
     let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
     let names = Names {
         objects: vec!["body".into()],
@@ -58,7 +58,7 @@ fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogHand, LogWriter<W>)
         obstacles: vec!["floor".into()],
     };
     let input = Input {
-        devices: vec![palpate::DeviceInput::away(); 2],
+        devices: vec![palpate::DeviceInput::inactive(); 2],
         obstacles: vec![session.model.parameters().obstacles[0].pose],
     };
     let start = (&*session.model, process.state(), &input);

@@ -31,7 +31,7 @@ fn a_device_that_falls_silent_is_away_and_comes_back_while_the_object_goes_on() 
         last = port.newest();
         assert_eq!((last.sequence, last.time_s), (tick, now_s));
         if tick == 360 {
-            assert_eq!(force.input().devices[0].mode, DeviceMode::Away, "60 ms later it is away");
+            assert_eq!(force.input().devices[0].mode, DeviceMode::Inactive, "60 ms later it is away");
             silent_force = last.force.length();
             speed_then = force.state().output().objects[0].twist.linear.x;
         }

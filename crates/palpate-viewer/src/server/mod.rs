@@ -5,9 +5,9 @@ mod guard;
 mod socket;
 
 use crate::live;
-use crate::log_show::LogShow;
-use crate::stage::{Stage, Upload, Workshop};
-use crate::wire::{MaterialDescription, RenderWish, SceneTitle, shapes_bytes, surface_bytes};
+use crate::log_show::LogFrames;
+use crate::stage::{SceneProvider, Upload, ViewerScene};
+use crate::wire::{MaterialDescription, RenderRequest, SceneSummary, shapes_bytes, surface_bytes};
 use axum::body::{Bytes, to_bytes};
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::{StatusCode, header};
@@ -52,9 +52,9 @@ pub struct Settings {
 /// A scene to run and look at.
 pub struct Live {
     /// Makes its scenes.
-    pub workshop: Arc<dyn Workshop>,
+    pub workshop: Arc<dyn SceneProvider>,
     /// What is shown first.
-    pub first: Stage,
+    pub first: ViewerScene,
     /// What the force process asks of the system.
     pub scheduling: Scheduling,
 }
@@ -62,19 +62,19 @@ pub struct Live {
 /// Pictures that a page is to draw, and where they go by their numbers.
 pub struct RenderJob {
     /// What to draw.
-    pub wish: RenderWish,
+    pub wish: RenderRequest,
     /// PNG files.
     pub pictures: Sender<(u64, Vec<u8>)>,
 }
 
 /// What there is to see.
-pub enum Exhibit {
+pub enum ServedContent {
     /// A scene that runs.
     Live(Box<Live>),
     /// Logs, beside one another.
-    Logs(Vec<Arc<LogShow>>),
+    Logs(Vec<Arc<LogFrames>>),
     /// A log whose pictures are drawn by a page without a person.
-    Render(Arc<LogShow>, RenderJob),
+    Render(Arc<LogFrames>, RenderJob),
 }
 
 /// A server that listens and has not begun to answer.
@@ -87,8 +87,8 @@ pub struct Server {
 /// What all requests share.
 pub(crate) struct Hall {
     live: Option<live::Live>,
-    titles: Vec<SceneTitle>,
-    logs: Vec<Arc<LogShow>>,
+    titles: Vec<SceneSummary>,
+    logs: Vec<Arc<LogFrames>>,
     render: Option<RenderJob>,
     guard: Guard,
     kept: Kept,
@@ -134,7 +134,7 @@ impl Server {
     ///
     /// # Errors
     /// When a thread can't be started.
-    pub fn run(self, exhibit: Exhibit, stop: &AtomicBool) -> Result<(), String> {
+    pub fn run(self, exhibit: ServedContent, stop: &AtomicBool) -> Result<(), String> {
         let said = |e: std::io::Error| e.to_string();
         let mut hall = Hall {
             live: None,
@@ -147,13 +147,13 @@ impl Server {
             next_viewer: AtomicU64::new(1),
         };
         match exhibit {
-            Exhibit::Live(live) => {
+            ServedContent::Live(live) => {
                 let Live { workshop, first, scheduling } = *live;
                 hall.titles = workshop.titles();
                 hall.live = Some(live::Live::new(workshop, first, scheduling).map_err(said)?);
             }
-            Exhibit::Logs(logs) => hall.logs = logs,
-            Exhibit::Render(log, job) => (hall.logs, hall.render) = (vec![log], Some(job)),
+            ServedContent::Logs(logs) => hall.logs = logs,
+            ServedContent::Render(log, job) => (hall.logs, hall.render) = (vec![log], Some(job)),
         }
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)

@@ -112,7 +112,7 @@ impl<'h> Viewer<'h> {
         self.send(Message::text(&*scene)).await?;
         let first = modal.borrow_and_update().clone();
         self.send(Message::Binary(first)).await?;
-        let _ = live.commands.send(Command::Tell);
+        let _ = live.commands.send(Command::ProgressCallback);
         loop {
             tokio::select! {
                 biased;
@@ -240,7 +240,7 @@ impl<'h> Viewer<'h> {
             }
             Asked::Pause { paused } => {
                 live.playback.pause(paused);
-                Command::Tell
+                Command::ProgressCallback
             }
             Asked::Step => {
                 live.playback.step();
@@ -248,11 +248,11 @@ impl<'h> Viewer<'h> {
             }
             Asked::Slow { slowness } => {
                 live.playback.slow(slowness.clamp(1, 1000));
-                Command::Tell
+                Command::ProgressCallback
             }
             Asked::Reset => Command::Reset,
             Asked::Open { scene } => Command::Open(scene),
-            Asked::Set(rules) => Command::Rules(rules),
+            Asked::Set(rules) => Command::PhysicsSettings(rules),
             Asked::Material { object, young, poisson, density } => {
                 Command::Material(object, MaterialDescription { young, poisson, density })
             }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// A scene that can be opened.
 #[derive(Debug, Clone, Serialize)]
-pub struct SceneTitle {
+pub struct SceneSummary {
     /// By which it is asked for.
     pub id: String,
     /// For people.
@@ -28,15 +28,15 @@ pub(crate) struct Hello {
     pub protocol: u32,
     pub version: &'static str,
     pub kind: &'static str,
-    pub scenes: Vec<SceneTitle>,
+    pub scenes: Vec<SceneSummary>,
     pub logs: Vec<LogTitle>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub render: Option<RenderWish>,
+    pub render: Option<RenderRequest>,
 }
 
 /// Pictures that a page in a headless browser is to draw.
 #[derive(Debug, Clone, Serialize)]
-pub struct RenderWish {
+pub struct RenderRequest {
     /// Which frames of the first log.
     pub frames: Vec<u64>,
     /// Pixels.
@@ -139,7 +139,7 @@ pub(crate) struct PointerAt {
 /// Rules of a scene that can be changed while it runs; those that are none stay.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rules {
+pub struct PhysicsSettings {
     /// [m/s², world]
     pub gravity: Option<[f64; 3]>,
     /// [s]
@@ -179,7 +179,7 @@ pub(crate) enum Asked {
     Open {
         scene: String,
     },
-    Set(Rules),
+    Set(PhysicsSettings),
     Material {
         object: usize,
         young: f64,

@@ -11,6 +11,6 @@ pub use description::{
     ObstacleDescription, SceneDescription, ShapeDescription, View,
 };
 pub(crate) use messages::{Answer, Asked, Doing, Hello, LogTitle, ProcessTiming, Status, StreamForm};
-pub use messages::{CameraView, RenderWish, Rules, SceneTitle};
-pub use picture::{Form, PictureMaker};
+pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary};
+pub use picture::{FrameEncoder, FrameFormat};
 pub(crate) use surface::{shapes_bytes, surface_bytes};

@@ -3,8 +3,8 @@
 use super::bytes::Bytes;
 use super::surface::mode_scales;
 use glam::DVec3;
-use palpate::{Against, ContactOutput, DeviceMode, Model, PictureMemory};
-use palpate_haptics::Moment;
+use palpate::{Collider, ContactOutput, DeviceMode, Model, ResidualFieldCache};
+use palpate_haptics::Snapshot;
 use std::sync::Arc;
 
 /// `PLPF`.
@@ -18,7 +18,7 @@ const FLAT: f64 = 1e-9;
 
 /// How surfaces are sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub enum FrameFormat {
     /// Modal coordinates and dents: the page makes the surface.
     Modal,
     /// Where every node is.
@@ -27,33 +27,33 @@ pub enum Form {
 
 /// Makes pictures of a model's moments; its buffers are used again.
 #[derive(Debug)]
-pub struct PictureMaker {
+pub struct FrameEncoder {
     model: Arc<Model>,
     generation: u32,
     /// Of every object's modes.
     scales: Vec<Vec<f64>>,
     places: Vec<DVec3>,
-    memories: Vec<PictureMemory>,
+    memories: Vec<ResidualFieldCache>,
     strongest: Vec<ContactOutput>,
 }
 
-impl PictureMaker {
+impl FrameEncoder {
     /// For a scene that is known by a number.
     pub fn new(model: Arc<Model>, generation: u32) -> Self {
         let scales = model.recordings().map(|recording| mode_scales(&recording.modes)).collect();
         let most = model.recordings().map(|recording| recording.surface.positions.len()).max();
         let places = vec![DVec3::ZERO; most.unwrap_or(0)];
-        let memories = vec![PictureMemory::default(); model.recordings().count()];
+        let memories = vec![ResidualFieldCache::default(); model.recordings().count()];
         Self { model, generation, scales, places, memories, strongest: Vec::new() }
     }
 
     /// The picture of a moment. Modal: costs modes, and nodes near contacts; vertices: nodes × modes.
-    pub fn make(&mut self, moment: &Moment, form: Form) -> Vec<u8> {
+    pub fn make(&mut self, moment: &Snapshot, form: FrameFormat) -> Vec<u8> {
         let mut out = Bytes::default();
         out.u32(MAGIC);
         out.u32(match form {
-            Form::Modal => 1,
-            Form::Vertices => 2,
+            FrameFormat::Modal => 1,
+            FrameFormat::Vertices => 2,
         });
         out.u32(self.generation);
         out.u32(moment.step as u32);
@@ -64,7 +64,7 @@ impl PictureMaker {
         for count in [moment.objects.len(), obstacles.len(), devices.len(), self.strongest.len()] {
             out.u32(count as u32);
         }
-        let (unsolved, left_out) = (moment.status.unsolved_objects > 0, moment.status.dropped_contacts > 0);
+        let (unsolved, left_out) = (moment.status.unsolved_islands > 0, moment.status.dropped_contacts > 0);
         out.u32(u32::from(unsolved) | u32::from(left_out) << 1);
         out.u32(0);
         for (at, object) in moment.objects.iter().enumerate() {
@@ -75,15 +75,15 @@ impl PictureMaker {
             let places = &mut self.places[..surface.positions.len()];
             let memory = &mut self.memories[at];
             match form {
-                Form::Modal => {
+                FrameFormat::Modal => {
                     let q = object.modal_coordinates();
                     out.u32(q.len() as u32);
                     q.iter().zip(&self.scales[at]).for_each(|(q, scale)| out.f32(q * scale));
                     object.dents(&self.model, memory, places);
                     write_dents(places, &mut out);
                 }
-                Form::Vertices => {
-                    object.remembered_displacement(&self.model, memory, places);
+                FrameFormat::Vertices => {
+                    object.surface_displacement_cached(&self.model, memory, places);
                     out.u32(places.len() as u32);
                     let moved = places.iter().zip(&surface.positions);
                     moved.for_each(|(u, rest)| out.vector(*rest + *u));
@@ -95,7 +95,7 @@ impl PictureMaker {
         });
         for (input, output) in devices.iter().zip(&moment.devices) {
             out.u32(match input.mode {
-                DeviceMode::Away => 0,
+                DeviceMode::Inactive => 0,
                 DeviceMode::Touch => 1,
                 DeviceMode::Held(_) => 2,
             });
@@ -103,9 +103,9 @@ impl PictureMaker {
         }
         for contact in &self.strongest {
             let (kind, number) = match contact.against {
-                Against::Device(at) => (0, at),
-                Against::Obstacle(at) => (1, at),
-                Against::Object(at) => (2, at),
+                Collider::Device(at) => (0, at),
+                Collider::Obstacle(at) => (1, at),
+                Collider::Object(at) => (2, at),
             };
             out.u32(contact.object as u32 & 0xff | kind << 8 | (number as u32) << 16);
             [contact.point, contact.force].into_iter().for_each(|v| out.vector(v));

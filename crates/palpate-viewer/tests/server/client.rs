@@ -7,8 +7,8 @@ use palpate::{
 };
 use palpate_haptics::Scheduling;
 use palpate_viewer::{
-    Exhibit, Live, MaterialDescription, ObjectDescription, Rules, SceneDescription, SceneTitle, Server,
-    Settings, Stage, StageDevice, Tell, Upload, Workshop,
+    Live, MaterialDescription, ObjectDescription, PhysicsSettings, ProgressCallback, SceneDescription,
+    SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice, ViewerScene,
 };
 use serde_json::Value;
 use std::io::{Read, Write};
@@ -26,7 +26,7 @@ pub fn recording() -> Arc<Recording> {
 }
 
 /// A body that floats above a floor, with two pointers.
-pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
+pub fn stage(gravity: DVec3, step_s: f64) -> ViewerScene {
     let recording = recording();
     let radius = recording.surface.radius();
     let finger = DeviceParameters {
@@ -54,10 +54,10 @@ pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
     let devices = [("left".to_string(), true), ("right".to_string(), true)];
     let titles = (Some("float".into()), "A body".into(), "It floats.".into());
     let description = SceneDescription::new(titles, &model, vec![object], &["floor".into()], &devices);
-    Stage {
+    ViewerScene {
         description,
         model,
-        devices: vec![StageDevice::Pointer; 2],
+        devices: vec![ViewerDevice::Pointer; 2],
         movers: vec![Arc::new(move |_: f64| floor)],
         log: None,
     }
@@ -65,26 +65,31 @@ pub fn stage(gravity: DVec3, step_s: f64) -> Stage {
 
 struct OneScene;
 
-impl Workshop for OneScene {
-    fn titles(&self) -> Vec<SceneTitle> {
-        vec![SceneTitle { id: "float".into(), title: "A body".into(), about: "It floats.".into() }]
+impl SceneProvider for OneScene {
+    fn titles(&self) -> Vec<SceneSummary> {
+        vec![SceneSummary { id: "float".into(), title: "A body".into(), about: "It floats.".into() }]
     }
 
-    fn open(&self, id: &str, tell: Tell) -> Result<Stage, String> {
+    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, String> {
         tell("looking", Some(0.5));
         if id == "float" { Ok(stage(DVec3::ZERO, 1e-3)) } else { Err(format!("there is no scene {id:?}")) }
     }
 
-    fn change(&self, rules: &Rules) -> Result<Stage, String> {
+    fn change(&self, rules: &PhysicsSettings) -> Result<ViewerScene, String> {
         let gravity = rules.gravity.map_or(DVec3::ZERO, DVec3::from_array);
         Ok(stage(gravity, rules.step.unwrap_or(1e-3)))
     }
 
-    fn change_material(&self, _: usize, material: MaterialDescription, _: Tell) -> Result<Stage, String> {
+    fn change_material(
+        &self,
+        _: usize,
+        material: MaterialDescription,
+        _: ProgressCallback,
+    ) -> Result<ViewerScene, String> {
         Err(format!("E = {}", material.young))
     }
 
-    fn record(&self, upload: Upload, _: Tell) -> Result<Stage, String> {
+    fn record(&self, upload: Upload, _: ProgressCallback) -> Result<ViewerScene, String> {
         if upload.name == "slow.msh" {
             std::thread::sleep(Duration::from_secs(2));
         }
@@ -103,10 +108,10 @@ impl Served {
     pub fn live() -> Self {
         let scheduling = Scheduling { priority: None, core: None };
         let first = stage(DVec3::ZERO, 1e-3);
-        Self::new(Exhibit::Live(Box::new(Live { workshop: Arc::new(OneScene), first, scheduling })))
+        Self::new(ServedContent::Live(Box::new(Live { workshop: Arc::new(OneScene), first, scheduling })))
     }
 
-    pub fn new(exhibit: Exhibit) -> Self {
+    pub fn new(exhibit: ServedContent) -> Self {
         let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
         let server = Server::bind(&settings).expect("a free port");
         let address = server.address().expect("an address");

@@ -6,8 +6,8 @@ use palpate::{DeviceInput, DeviceMode, Input, State, step};
 use palpate_haptics::Scheduling;
 use palpate_haptics::log::{LogSummary, LogWriter, Names, Reader};
 use palpate_viewer::{
-    Exhibit, Live, LogFile, LogOpener, MaterialDescription, PageTeller, Rules, SceneTitle, Stage, Tell,
-    Upload, Workshop,
+    Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, ProgressCallback,
+    SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,
 };
 use std::collections::BTreeMap;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
@@ -20,7 +20,7 @@ struct InMemory {
     bytes: Cursor<Vec<u8>>,
     room: usize,
     kept: Kept,
-    pages: PageTeller,
+    pages: PageNotifier,
 }
 
 impl Write for InMemory {
@@ -59,11 +59,11 @@ fn names() -> Names {
 struct Logged(Kept, usize);
 
 impl Logged {
-    fn stage(&self, gravity: DVec3) -> Stage {
+    fn stage(&self, gravity: DVec3) -> ViewerScene {
         let stage = stage(gravity, 1e-3);
         let (kept, room, model) = (self.0.clone(), self.1, stage.model.clone());
         let input = Input {
-            devices: vec![DeviceInput::away(); 2],
+            devices: vec![DeviceInput::inactive(); 2],
             obstacles: stage.movers.iter().map(|mover| mover(0.0)).collect(),
         };
         let open: LogOpener = Arc::new(move |state, pages| {
@@ -72,28 +72,33 @@ impl Logged {
             LogWriter::new(Box::new(file) as Box<dyn LogFile>, names(), BTreeMap::new(), &[], start)
                 .map_err(|error| error.to_string())
         });
-        Stage { log: Some(open), ..stage }
+        ViewerScene { log: Some(open), ..stage }
     }
 }
 
-impl Workshop for Logged {
-    fn titles(&self) -> Vec<SceneTitle> {
+impl SceneProvider for Logged {
+    fn titles(&self) -> Vec<SceneSummary> {
         Vec::new()
     }
 
-    fn open(&self, _: &str, _: Tell) -> Result<Stage, String> {
+    fn open(&self, _: &str, _: ProgressCallback) -> Result<ViewerScene, String> {
         Err("there is no other scene".into())
     }
 
-    fn change(&self, rules: &Rules) -> Result<Stage, String> {
+    fn change(&self, rules: &PhysicsSettings) -> Result<ViewerScene, String> {
         Ok(self.stage(rules.gravity.map_or(DVec3::ZERO, DVec3::from_array)))
     }
 
-    fn change_material(&self, _: usize, _: MaterialDescription, _: Tell) -> Result<Stage, String> {
+    fn change_material(
+        &self,
+        _: usize,
+        _: MaterialDescription,
+        _: ProgressCallback,
+    ) -> Result<ViewerScene, String> {
         Err("there is no other material".into())
     }
 
-    fn record(&self, _: Upload, _: Tell) -> Result<Stage, String> {
+    fn record(&self, _: Upload, _: ProgressCallback) -> Result<ViewerScene, String> {
         Err("there is no other mesh".into())
     }
 }
@@ -104,7 +109,7 @@ fn served(room: usize) -> (Served, Kept) {
     let first = workshop.stage(DVec3::ZERO);
     let scheduling = Scheduling { priority: None, core: None };
     let live = Live { workshop: Arc::new(workshop), first, scheduling };
-    (Served::new(Exhibit::Live(Box::new(live))), kept)
+    (Served::new(ServedContent::Live(Box::new(live))), kept)
 }
 
 #[test]
@@ -145,7 +150,7 @@ fn every_scene_is_a_log_that_repeats_and_one_that_goes_on_begins_where_the_last_
         let reader = Reader::new(bytes).expect("a whole log");
         let model = stage(gravity, 1e-3).model;
         let motions = reader.start(&names()).expect("readable").expect("how the body begins");
-        let mut state = State::going_on(&model, &motions);
+        let mut state = State::resume(&model, &motions);
         let (mut felt, mut steps) = (0.0_f64, 0);
         for logged in reader.each_step() {
             let logged = logged.expect("a step");

@@ -3,23 +3,23 @@
 use super::client::{Served, read_picture, shapes, stage};
 use glam::DVec3;
 use palpate::{DeviceInput, Input, State, step};
-use palpate_haptics::Moment;
-use palpate_viewer::{Exhibit, LogShow, RenderJob, RenderWish};
+use palpate_haptics::Snapshot;
+use palpate_viewer::{LogFrames, RenderJob, RenderRequest, ServedContent};
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 
 /// Frames of a body that falls, one every 20 steps.
-fn log(number: usize, frames: u64) -> Arc<LogShow> {
+fn log(number: usize, frames: u64) -> Arc<LogFrames> {
     let stage = stage(DVec3::Y * -9.81, 1e-3);
     let model = stage.model.clone();
     let (show, mut maker) =
-        LogShow::new(number, format!("{number}.mcap"), model.clone(), stage.description, frames, 0.02);
+        LogFrames::new(number, format!("{number}.mcap"), model.clone(), stage.description, frames, 0.02);
     let mut state = State::new(&model);
     let input = Input {
-        devices: vec![DeviceInput::away(); 2],
+        devices: vec![DeviceInput::inactive(); 2],
         obstacles: vec![model.parameters().obstacles[0].pose],
     };
-    let mut moment = Moment::new(&model, &state, &input);
+    let mut moment = Snapshot::new(&model, &state, &input);
     for number in 1..=20 * frames {
         step(&model, &mut state, &input);
         if number % 20 == 0 {
@@ -44,7 +44,7 @@ fn pieces(mut bytes: &[u8]) -> Vec<&[u8]> {
 
 #[test]
 fn two_logs_are_told_and_their_frames_and_series_are_fetched() {
-    let served = Served::new(Exhibit::Logs(vec![log(0, 30), log(1, 12)]));
+    let served = Served::new(ServedContent::Logs(vec![log(0, 30), log(1, 12)]));
     let mut page = served.page();
     let hello = page.wait("hello");
     assert_eq!((&hello["kind"], &hello["logs"][1]["name"]), (&"logs".into(), &"1.mcap".into()));
@@ -75,7 +75,7 @@ fn two_logs_are_told_and_their_frames_and_series_are_fetched() {
 #[test]
 fn a_page_that_draws_is_told_what_and_its_pictures_arrive() {
     let (pictures, arrived) = channel();
-    let wish = RenderWish {
+    let wish = RenderRequest {
         frames: vec![0, 7],
         width: 640,
         height: 480,
@@ -83,7 +83,7 @@ fn a_page_that_draws_is_told_what_and_its_pictures_arrive() {
         colour: "plain".into(),
         dark: true,
     };
-    let served = Served::new(Exhibit::Render(log(0, 10), RenderJob { wish, pictures }));
+    let served = Served::new(ServedContent::Render(log(0, 10), RenderJob { wish, pictures }));
     let mut page = served.page();
     let hello = page.wait("hello");
     assert_eq!((&hello["kind"], &hello["render"]["frames"]), (&"render".into(), &serde_json::json!([0, 7])));

@@ -7,7 +7,7 @@
 use super::meeting::{Approach, MARGIN, meeting};
 use super::sight::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedList, WantedOther};
-use super::{Against, Contact, Law, known_contacts};
+use super::{Collider, Contact, Law, known_contacts};
 use crate::obstacle::Obstacle;
 use crate::response::{Body, Place, Reading};
 use crate::spatial::Pose;
@@ -76,7 +76,7 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         margin: MARGIN * body.edge + PUSHED * own.pushed,
         beside: if way > 0.5 * obstacle.shape.size() { way } else { 0.0 },
     };
-    let most = scene.model.parameters.most_places;
+    let most = scene.model.parameters.max_contact_samples;
     let level = at * scene.model.others() + number;
     let (first, left_out) = (scene.wanted.list.len(), scene.wanted.left_out);
     loop {
@@ -87,7 +87,7 @@ pub(crate) fn against(scene: &mut Finding, at: usize, number: usize, before: Pos
         sight.widen();
         let all = object.radius + sight.reach() + way + encounter.margin;
         if apart - all <= obstacle.shape.radius() {
-            let known = known_contacts(scene.contacts, Against::Obstacle(number), at);
+            let known = known_contacts(scene.contacts, Collider::Obstacle(number), at);
             encounter.nodes(sight, known, scene.wanted, first.saturating_add(most));
         }
         let found = scene.wanted.list.len() - first;
@@ -249,7 +249,7 @@ impl Encounter<'_> {
     /// Want a contact of a surface point with a point of the obstacle, in its frame.
     fn want(&self, wanted: &mut WantedList, feature: u64, place: Place, normal: DVec3, other: DVec3) {
         wanted.push(Wanted {
-            key: Key { other: Against::Obstacle(self.number), object: self.at, feature },
+            key: Key { other: Collider::Obstacle(self.number), object: self.at, feature },
             place,
             other: WantedOther::Obstacle {
                 number: self.number,
@@ -281,7 +281,7 @@ impl Encounter<'_> {
             |corner, place| {
                 let feature = first + corner;
                 let key =
-                    Key { other: Against::Obstacle(self.number), object: self.at, feature: feature as u64 };
+                    Key { other: Collider::Obstacle(self.number), object: self.at, feature: feature as u64 };
                 let known = contacts.binary_search_by(|c| c.key.cmp(&key)).ok();
                 let known = known.map(|at| self.own.points.of(contacts[at].slot).place.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(place));

@@ -42,7 +42,7 @@ pub struct Grasp {
 
 /// What an object is in contact with; positions in the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Against {
+pub enum Collider {
     /// An interface point.
     Device(usize),
     /// A plane or a rigid obstacle.
@@ -110,11 +110,11 @@ impl Contact {
         self.normal.dot(apart) - self.distance
     }
 
-    pub(crate) fn against(&self) -> Against {
+    pub(crate) fn against(&self) -> Collider {
         match self.other {
-            Other::Device(device) => Against::Device(device),
-            Other::Obstacle { number, .. } => Against::Obstacle(number),
-            Other::Object { number, .. } => Against::Object(number),
+            Other::Device(device) => Collider::Device(device),
+            Other::Obstacle { number, .. } => Collider::Obstacle(number),
+            Other::Object { number, .. } => Collider::Object(number),
         }
     }
 
@@ -138,7 +138,7 @@ impl Contact {
 }
 
 /// The contacts of an object with one other side: they stand together, in the order of their features.
-fn known_contacts(contacts: &[Contact], other: Against, object: usize) -> &[Contact] {
+fn known_contacts(contacts: &[Contact], other: Collider, object: usize) -> &[Contact] {
     let first = contacts.partition_point(|c| (c.key.other, c.key.object) < (other, object));
     let count = contacts[first..].partition_point(|c| (c.key.other, c.key.object) == (other, object));
     &contacts[first..first + count]

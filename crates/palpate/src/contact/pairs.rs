@@ -6,7 +6,7 @@ use super::meeting::{Approach, MARGIN, SPARE, meeting};
 use super::search::Search;
 use super::sight::Sight;
 use super::wanted::{Finding, Key, Wanted, WantedOther};
-use super::{Against, Contact, Law, Other};
+use super::{Collider, Contact, Law, Other};
 use crate::response::{Place, Reading};
 use crate::scene::SceneObject;
 use crate::state::ObjectState;
@@ -43,7 +43,7 @@ impl Finding<'_> {
 
     /// Find the contacts of two objects, as coarsely as they are few enough.
     fn pair(&mut self, a: usize, b: usize) {
-        let most = self.model.parameters.most_places;
+        let most = self.model.parameters.max_contact_samples;
         let (first, left_out) = (self.wanted.list.len(), self.wanted.left_out);
         loop {
             let found = match self.facing(a, b) {
@@ -136,7 +136,7 @@ impl Finding<'_> {
     /// no more than are allowed, where fewer can stand for them.
     fn nodes_against(&mut self, nodes_of: usize, surface_of: usize, beyond: Beyond, first: usize) -> usize {
         let can_be_coarser = self.can_be_coarser(nodes_of, surface_of);
-        let enough = if can_be_coarser { self.model.parameters.most_places } else { usize::MAX };
+        let enough = if can_be_coarser { self.model.parameters.max_contact_samples } else { usize::MAX };
         let readings = [self.reading(nodes_of, surface_of), self.reading(surface_of, nodes_of)];
         let levels = [(nodes_of, surface_of), (surface_of, nodes_of)]
             .map(|(own, other)| self.levels[self.level_at(own, other)].number as u64);
@@ -158,7 +158,7 @@ impl Finding<'_> {
         let mut found = 0;
         for &node in near.iter() {
             let feature = features + u64::from(node);
-            let key = Key { other: Against::Object(nodes_of), object: surface_of, feature };
+            let key = Key { other: Collider::Object(nodes_of), object: surface_of, feature };
             let known = contacts.binary_search_by(|c| c.key.cmp(&key)).ok().map(|at| &contacts[at]);
             let node = node as usize;
             let Some(approach) = approach(&mut nodes, &mut base, node, way, known) else { continue };
@@ -166,7 +166,7 @@ impl Finding<'_> {
             if let Some(contact) = meet(&mut nodes, &mut base, (node, approach), key, known, search) {
                 let is_wanted = |node: usize| {
                     let feature = other_features + node as u64;
-                    let other = Key { other: Against::Object(surface_of), object: nodes_of, feature };
+                    let other = Key { other: Collider::Object(surface_of), object: nodes_of, feature };
                     wanted.list[first..].iter().any(|wanted| wanted.key == other)
                 };
                 let mut corners = base.object.body.corners(&contact.place).into_iter();

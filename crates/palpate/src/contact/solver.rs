@@ -214,7 +214,7 @@ impl Solver {
         if solved {
             parts.drop_traces(&self.members);
         } else {
-            status.unsolved_objects += 1;
+            status.unsolved_islands += 1;
             if !(touching && self.solve_in_part(parts, tight)) {
                 parts.let_go(&self.bodies, &self.members);
             }
@@ -227,7 +227,7 @@ impl Solver {
         parts.end(&self.members);
         // What the last sweep has moved comes on top of the miss that it saw.
         rough |= solved && touching && parts.pushing_apart(&self.members) > 1.9 * LOOSE * size;
-        status.unsolved_objects += u32::from(rough);
+        status.unsolved_islands += u32::from(rough);
     }
 
     /// Whether forces turn a body so far that nothing linear about it is of use.

@@ -17,7 +17,7 @@ use super::projection::stand;
 use super::search::{ONE_FACE, Search};
 use super::sight::{Found, MOST_FACES, Sight};
 use super::wanted::{Finding, Key, Wanted, WantedOther};
-use super::{Against, Contact, Law, known_contacts};
+use super::{Collider, Contact, Law, known_contacts};
 use crate::response::{Body, Place, Reading};
 use crate::scene::DeviceParameters;
 use crate::surface::SurfacePoint;
@@ -178,7 +178,8 @@ pub(crate) fn look_ahead(scene: &mut Finding, number: usize, at: usize) {
 /// The places that a device touches already: their dents are its own.
 fn own_dents(scene: &Finding, number: usize, at: usize) -> [Option<Place>; MOST_FACES] {
     let mut dents = [None; MOST_FACES];
-    for (dent, contact) in dents.iter_mut().zip(known_contacts(scene.contacts, Against::Device(number), at)) {
+    for (dent, contact) in dents.iter_mut().zip(known_contacts(scene.contacts, Collider::Device(number), at))
+    {
         *dent = Some(scene.objects[at].points.of(contact.slot).place);
     }
     dents
@@ -319,7 +320,7 @@ fn want(
     let parameters = &scene.model.parameters.devices[number];
     let size = faces.tip.max(parameters.patch_radius).max(0.1 * body.edge);
     let mut taken = [false; 2 * MOST_FACES];
-    let known = known_contacts(scene.contacts, Against::Device(number), at);
+    let known = known_contacts(scene.contacts, Collider::Device(number), at);
     for meeting in faces.all() {
         let rest = body.recording.surface.rest_position(&meeting.point);
         let mut place = Place { point: meeting.point, reading };
@@ -346,7 +347,7 @@ fn want(
         };
         taken[feature as usize] = true;
         scene.wanted.push(Wanted {
-            key: Key { other: Against::Device(number), object: at, feature },
+            key: Key { other: Collider::Device(number), object: at, feature },
             place,
             other: WantedOther::Device(number),
             law: Law::Touch { friction: parameters.friction },

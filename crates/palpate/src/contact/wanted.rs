@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 /// What makes a contact the same from step to step: the two sides, and a number of the place between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Key {
-    pub(crate) other: super::Against,
+    pub(crate) other: super::Collider,
     pub(crate) object: usize,
     pub(crate) feature: u64,
 }

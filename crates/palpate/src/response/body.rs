@@ -78,7 +78,7 @@ pub(crate) struct Body {
 
 impl Body {
     /// With patches of the given radii [m], and faces that meet something at so many places at most.
-    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], most_places: usize) -> Self {
+    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], max_contact_samples: usize) -> Self {
         let tree = SurfaceTree::new(&recording.surface.positions, &recording.surface.triangles);
         let shapes = &recording.modes.mode_shapes;
         let distances = ModalDistances::new(&recording, shapes);
@@ -90,7 +90,7 @@ impl Body {
         let mut apart = edge;
         let mut count = recording.surface.positions.len();
         for _ in 0..MOST_LEVELS {
-            if count <= most_places {
+            if count <= max_contact_samples {
                 break;
             }
             apart *= COARSER[usize::from(count <= MANY)];

@@ -16,7 +16,7 @@ pub(crate) use answers::Answers;
 pub(crate) use body::{Acting, Body, Place, Placed, Reading};
 pub(crate) use dot::dot;
 pub(crate) use loads::NodalForces;
-pub use oscillator::{HeldOscillator, Oscillation};
+pub use oscillator::{OscillatorState, SampledOscillator};
 
 use crate::contact::ContactPoint;
 use crate::error::Error;
@@ -285,10 +285,10 @@ impl ResponseState {
     }
 
     /// Whether it has as many modes, and if so let them move so.
-    pub(crate) fn go_on_from(&mut self, modes: &[Oscillation]) -> bool {
+    pub(crate) fn resume_from(&mut self, modes: &[OscillatorState]) -> bool {
         match self {
             Self::Modal(own) if own.modes.len() == modes.len() => {
-                own.go_on_from(modes);
+                own.resume_from(modes);
                 true
             }
             _ => false,
@@ -296,7 +296,7 @@ impl ResponseState {
     }
 
     /// Modal coordinates; none where a table is used.
-    pub(crate) fn modes(&self) -> &[Oscillation] {
+    pub(crate) fn modes(&self) -> &[OscillatorState] {
         match self {
             Self::Modal(state) => &state.modes,
             Self::Fir(_) => &[],

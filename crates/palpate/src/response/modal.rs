@@ -7,7 +7,7 @@ use super::answers::Answers;
 use super::dot::{dot, dot3, dot9, dots};
 use super::loads::{NodalForces, add_dents};
 use super::nodes::NodeCompliance;
-use super::oscillator::{HeldOscillator, Oscillation};
+use super::oscillator::{OscillatorState, SampledOscillator};
 use super::{Acting, Body, Place, Placed, Reading};
 use crate::contact::ContactPoint;
 use crate::recording::{ModalBasis, Recording};
@@ -23,7 +23,7 @@ const FLUSH_BELOW: f64 = 1e-150;
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
     step_s: f64,
-    oscillators: Vec<HeldOscillator>,
+    oscillators: Vec<SampledOscillator>,
     /// R[0] between the places of readings, where it is known.
     pub(super) known: Vec<Arc<NodeCompliance>>,
 }
@@ -31,7 +31,7 @@ pub(crate) struct SampledModes {
 /// State of one object in modal form.
 #[derive(Debug, Clone)]
 pub(crate) struct ModalState {
-    pub(crate) modes: Vec<Oscillation>,
+    pub(crate) modes: Vec<OscillatorState>,
     /// q now and at the end of the step without new force.
     pub(super) q: Vec<f64>,
     pub(super) free: Vec<f64>,
@@ -54,7 +54,7 @@ pub(crate) struct ModalState {
 impl ModalState {
     pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
         Self {
-            modes: vec![Oscillation::default(); modes],
+            modes: vec![OscillatorState::default(); modes],
             q: vec![0.0; modes],
             free: vec![0.0; modes],
             predicted: None,
@@ -80,7 +80,7 @@ impl ModalState {
     }
 
     /// Let the modes move so.
-    pub(super) fn go_on_from(&mut self, modes: &[Oscillation]) {
+    pub(super) fn resume_from(&mut self, modes: &[OscillatorState]) {
         self.modes.copy_from_slice(modes);
         self.q.iter_mut().zip(modes).for_each(|(q, mode)| *q = mode.q);
     }
@@ -94,7 +94,7 @@ impl ModalState {
 impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
-        let oscillators = pairs.map(|(&omega, &zeta)| HeldOscillator::new(omega, zeta, step_s)).collect();
+        let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
         Self { step_s, oscillators, known: Vec::new() }
     }
 
@@ -232,7 +232,7 @@ impl SampledModes {
             dissipated += oscillator.dissipation(*mode, p);
             let next = oscillator.advance(*mode, p);
             let quiet = libm::fabs(next.q) + libm::fabs(next.v) < FLUSH_BELOW;
-            *mode = if quiet { Oscillation::default() } else { next };
+            *mode = if quiet { OscillatorState::default() } else { next };
             *q = mode.q;
         }
         state.predicted = None;

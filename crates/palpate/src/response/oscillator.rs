@@ -14,7 +14,7 @@
 
 /// State of one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Oscillation {
+pub struct OscillatorState {
     /// Modal coordinate [m·√kg].
     pub q: f64,
     /// Its rate [m·√kg/s].
@@ -24,16 +24,16 @@ pub struct Oscillation {
 /// Exact one-step map of one mode under a held force.
 ///
 /// ```
-/// use palpate::{HeldOscillator, Oscillation};
+/// use palpate::{SampledOscillator, Oscillation};
 ///
 /// // A mode of 10 Hz without damping, pushed from rest by 1 N/√kg for 1 ms.
 /// let omega = 10.0 * std::f64::consts::TAU;
-/// let mode = HeldOscillator::new(omega, 0.0, 1e-3);
+/// let mode = SampledOscillator::new(omega, 0.0, 1e-3);
 /// let pushed = mode.advance(Oscillation::default(), 1.0);
 /// assert!((pushed.q - (1.0 - (omega * 1e-3_f64).cos()) / omega.powi(2)).abs() < 1e-18);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeldOscillator {
+pub struct SampledOscillator {
     a11: f64,
     a12: f64,
     a21: f64,
@@ -51,7 +51,7 @@ pub struct HeldOscillator {
 /// sixth power over 5040, is then below half an ulp.
 const SERIES_BELOW: f64 = 1e-2;
 
-impl HeldOscillator {
+impl SampledOscillator {
     /// The map for a step of `step_s` [s]; ω > 0 [rad/s], ζ ≥ 0.
     pub fn new(angular_frequency: f64, damping_ratio: f64, step_s: f64) -> Self {
         let (omega, zeta, h) = (angular_frequency, damping_ratio, step_s);
@@ -102,21 +102,21 @@ impl HeldOscillator {
     }
 
     /// The state after a step with held modal force p [N/√kg].
-    pub fn advance(&self, state: Oscillation, p: f64) -> Oscillation {
-        Oscillation {
+    pub fn advance(&self, state: OscillatorState, p: f64) -> OscillatorState {
+        OscillatorState {
             q: self.a11 * state.q + self.a12 * state.v + self.b * p,
             v: self.a21 * state.q + self.a22 * state.v + self.a12 * p,
         }
     }
 
     /// Energy [J] that damping takes in the step that starts from `state` under held force p.
-    pub fn dissipation(&self, state: Oscillation, p: f64) -> f64 {
+    pub fn dissipation(&self, state: OscillatorState, p: f64) -> f64 {
         let shifted = state.q - p / self.stiffness;
         (self.d11 * shifted + 2.0 * self.d12 * state.v) * shifted + self.d22 * state.v * state.v
     }
 
     /// Kinetic and elastic energy [J] of a state.
-    pub fn energy(&self, state: Oscillation) -> (f64, f64) {
+    pub fn energy(&self, state: OscillatorState) -> (f64, f64) {
         (0.5 * state.v * state.v, 0.5 * self.stiffness * state.q * state.q)
     }
 }
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     /// Fourth-order Runge-Kutta with many small steps: the second route.
-    fn integrated(omega: f64, zeta: f64, h: f64, start: Oscillation, p: f64) -> (Oscillation, f64) {
+    fn integrated(omega: f64, zeta: f64, h: f64, start: OscillatorState, p: f64) -> (OscillatorState, f64) {
         let n = 40_000;
         let dt = h / f64::from(n);
         let rate = |s: [f64; 3]| {
@@ -143,7 +143,7 @@ mod tests {
                 s[i] += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
             }
         }
-        (Oscillation { q: s[0], v: s[1] }, s[2])
+        (OscillatorState { q: s[0], v: s[1] }, s[2])
     }
 
     const CASES: [(f64, f64); 8] = [
@@ -159,9 +159,9 @@ mod tests {
 
     #[test]
     fn one_step_is_the_integrated_equation_of_motion_for_every_damping() {
-        let start = Oscillation { q: 0.01, v: -3.0 };
+        let start = OscillatorState { q: 0.01, v: -3.0 };
         for (omega, zeta) in CASES {
-            let map = HeldOscillator::new(omega, zeta, 1e-3);
+            let map = SampledOscillator::new(omega, zeta, 1e-3);
             let (p, scale) = (2000.0, 0.01);
             let (expected, lost) = integrated(omega, zeta, 1e-3, start, p);
             let got = map.advance(start, p);
@@ -176,8 +176,8 @@ mod tests {
     #[test]
     fn work_of_a_held_force_is_stored_or_dissipated() {
         for (omega, zeta) in CASES {
-            let map = HeldOscillator::new(omega, zeta, 1e-3);
-            let mut state = Oscillation { q: 1e-3, v: 1.0 };
+            let map = SampledOscillator::new(omega, zeta, 1e-3);
+            let mut state = OscillatorState { q: 1e-3, v: 1.0 };
             for step in 0..200 {
                 let p = if step % 3 == 0 { 500.0 } else { -200.0 };
                 let next = map.advance(state, p);
@@ -197,7 +197,7 @@ mod tests {
     fn instantaneous_compliance_keeps_its_digits_for_slow_modes() {
         // ωh = 1e-6: 1 − cos would keep four digits. The series in ωh is exact here.
         let (omega, h) = (1e-3, 1e-3);
-        let map = HeldOscillator::new(omega, 0.0, h);
+        let map = SampledOscillator::new(omega, 0.0, h);
         let x = omega * h * omega * h;
         let expected = h * h / 2.0 * (1.0 - x / 12.0);
         assert!((map.instantaneous_compliance() / expected - 1.0).abs() < 4.0 * f64::EPSILON);

@@ -7,8 +7,8 @@ use palpate::{
     DeviceInput, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, Shape,
     State, Twist, step,
 };
-use palpate_haptics::Moment;
-use palpate_viewer::{Form, PictureMaker};
+use palpate_haptics::Snapshot;
+use palpate_viewer::{FrameEncoder, FrameFormat};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,11 +21,11 @@ const EVERY: usize = 16;
 const LEAST: usize = 200;
 
 /// Pictures of an object that two fingers pinch and shake, and that may lie on a floor.
-pub fn case(recording: Arc<Recording>, form: Form, on_floor: bool) -> Case {
+pub fn case(recording: Arc<Recording>, form: FrameFormat, on_floor: bool) -> Case {
     let nodes = recording.surface.positions.len();
     let how = match form {
-        Form::Modal => "modal",
-        Form::Vertices => "vertices",
+        FrameFormat::Modal => "modal",
+        FrameFormat::Vertices => "vertices",
     };
     let floor = if on_floor { " and it lies on a floor" } else { "" };
     let label = format!("{nodes} surface nodes, a picture ({how}), 2 fingers{floor}");
@@ -34,14 +34,14 @@ pub fn case(recording: Arc<Recording>, form: Form, on_floor: bool) -> Case {
 
 fn picture_times(
     recording: &Arc<Recording>,
-    form: Form,
+    form: FrameFormat,
     on_floor: bool,
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
     let mut parameters = ModelParameters { devices: vec![FINGER; 2], ..ModelParameters::default() };
     if on_floor {
         parameters.gravity = DVec3::Y * -9.81;
-        parameters.most_places = 48;
+        parameters.max_contact_samples = 48;
         parameters.obstacles = vec![Obstacle {
             shape: Shape::Plane { normal: DVec3::Y },
             pose: Pose { position: DVec3::Y * -HALF, ..Pose::IDENTITY },
@@ -51,10 +51,10 @@ fn picture_times(
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let model = Arc::new(Model::new(parameters, vec![ModelObject::new(recording.clone(), start)])?);
     let mut state = State::new(&model);
-    let mut maker = PictureMaker::new(model.clone(), 1);
+    let mut maker = FrameEncoder::new(model.clone(), 1);
     let obstacles: Vec<Pose> = model.parameters().obstacles.iter().map(|obstacle| obstacle.pose).collect();
-    let mut input = Input { devices: vec![DeviceInput::away(); 2], obstacles };
-    let mut moment = Moment::new(&model, &state, &input);
+    let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles };
+    let mut moment = Snapshot::new(&model, &state, &input);
     let (mut times, mut bytes) = (Vec::new(), 0);
     for number in 1..=steps.max(EVERY * LEAST) {
         let t = number as f64 * model.parameters().step_s;

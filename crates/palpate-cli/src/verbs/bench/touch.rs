@@ -7,7 +7,7 @@ use palpate::{
     DeviceInput, DeviceParameters, Input, ModalBasis, Model, ModelObject, ModelParameters, NearField,
     ObjectStart, Obstacle, Pose, Recording, ResidualCompliance, Shape, State, Surface, Twist,
 };
-use palpate_viewer::Form;
+use palpate_viewer::FrameFormat;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         }
         fingers(recording.clone(), false);
     }
-    for form in [Form::Modal, Form::Vertices] {
+    for form in [FrameFormat::Modal, FrameFormat::Vertices] {
         cases.push(pictures::case(recording.clone(), form, false));
         cases.push(pictures::case(cube.clone(), form, true));
     }
@@ -59,18 +59,18 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     ];
     // What is to lie still has to lose its energy.
     let calm = Arc::new(damped(&cube));
-    for (height, cubes, most_places, what) in floors {
+    for (height, cubes, max_contact_samples, what) in floors {
         let recording = if height == 0.0 { calm.clone() } else { cube.clone() };
         let label = format!("12³ cells, 200 modes, {what}");
-        let run = move |steps| floor_steps(&recording, (height, cubes, most_places), steps);
+        let run = move |steps| floor_steps(&recording, (height, cubes, max_contact_samples), steps);
         cases.push((label, Box::new(run)));
     }
-    for (most_places, what) in
+    for (max_contact_samples, what) in
         [(ALL, "2 fingers move it on a floor"), (PLACES, "2 fingers move it on a floor, 48 places")]
     {
         let recording = calm.clone();
         let label = format!("12³ cells, 200 modes, {what}");
-        cases.push((label, Box::new(move |steps| moving_steps(&recording, most_places, steps))));
+        cases.push((label, Box::new(move |steps| moving_steps(&recording, max_contact_samples, steps))));
     }
     cases.into_iter()
 }
@@ -118,10 +118,10 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
 /// Times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
 fn floor_steps(
     recording: &Arc<Recording>,
-    (height, cubes, most_places): (f64, usize, usize),
+    (height, cubes, max_contact_samples): (f64, usize, usize),
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
-    let parameters = on_a_floor(most_places);
+    let parameters = on_a_floor(max_contact_samples);
     let cube = |number: usize| {
         let above = height + number as f64 * (2.0 * HALF + height);
         ModelObject::new(recording.clone(), at_height(HALF + above))
@@ -141,15 +141,19 @@ fn floor_steps(
 }
 
 /// A floor, with gravity.
-fn on_a_floor(most_places: usize) -> ModelParameters {
+fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
     let gravity = DVec3::Y * -9.81;
-    ModelParameters { gravity, obstacles: vec![floor], most_places, ..ModelParameters::default() }
+    ModelParameters { gravity, obstacles: vec![floor], max_contact_samples, ..ModelParameters::default() }
 }
 
 /// Times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
-fn moving_steps(recording: &Arc<Recording>, most_places: usize, steps: usize) -> Result<Vec<u32>, Failure> {
-    let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(most_places) };
+fn moving_steps(
+    recording: &Arc<Recording>,
+    max_contact_samples: usize,
+    steps: usize,
+) -> Result<Vec<u32>, Failure> {
+    let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(max_contact_samples) };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
     let mut state = State::new(&model);
     // It settles, then it is pressed, then it is moved.

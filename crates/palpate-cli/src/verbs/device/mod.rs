@@ -11,7 +11,7 @@ use clap::Args;
 use palpate::DeviceMode;
 use palpate_haptics::device::{Hand, Traits};
 use palpate_haptics::link::{LinkClient, LinkState};
-use palpate_haptics::{Attached, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_update};
+use palpate_haptics::{AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_update};
 use real::RealArguments;
 use serde_json::json;
 use std::net::SocketAddr;
@@ -80,7 +80,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// What moves the device.
 enum Source {
     Path(MotionPath, Option<(Traits, Hand)>),
-    Real(Box<Attached>),
+    Real(Box<AttachedDevice>),
 }
 
 /// Run the verb.

@@ -4,7 +4,7 @@ use crate::Failure;
 use crate::scene_file::RealDevice;
 use palpate::DeviceMode;
 use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated, Traits};
-use palpate_haptics::{Attached, MotionPath, SafetyLimits};
+use palpate_haptics::{AttachedDevice, MotionPath, SafetyLimits};
 
 /// A device that follows a path, or whose simulated hand does.
 pub fn attach(
@@ -13,7 +13,7 @@ pub fn attach(
     mode: DeviceMode,
     rate_hz: f64,
     not_passive: bool,
-) -> Attached {
+) -> AttachedDevice {
     let (device, limits): (Box<dyn Device>, _) = match simulated {
         Some((traits, hand)) => {
             let limits = SafetyLimits { force_n: traits.force_n, ..SafetyLimits::default() };
@@ -27,7 +27,7 @@ pub fn attach(
         }
     };
     let passive = simulated.is_some() && !not_passive;
-    Attached { device, mode, mount: Mount::default(), rate_hz, limits, passive, by_button: false }
+    AttachedDevice { device, mode, mount: Mount::default(), rate_hz, limits, passive, by_button: false }
 }
 
 /// A real device, opened: with a careful limit of its force, and disarmed until one of its buttons is pressed, unless it is said
@@ -37,7 +37,7 @@ pub fn attach_real(
     mode: DeviceMode,
     rate_hz: f64,
     not_passive: bool,
-) -> Result<Attached, Failure> {
+) -> Result<AttachedDevice, Failure> {
     let RealDevice { driver, which, mount, force_n, armed } = real;
     let (found, device) = driver.open(which, None)?;
     let usual = SafetyLimits::default();
@@ -46,5 +46,5 @@ pub fn attach_real(
     let arming = if *armed { "from the start" } else { "from the press of one of its buttons on" };
     crate::tell(&format!("{} {found}: at most {force_n:.2} N, {arming}", driver.name()));
     let (mount, passive, by_button) = (*mount, !not_passive, !armed);
-    Ok(Attached { device, mode, mount, rate_hz, limits, passive, by_button })
+    Ok(AttachedDevice { device, mode, mount, rate_hz, limits, passive, by_button })
 }

@@ -166,8 +166,8 @@ fn check_status(scene: &Scene, input: &Input, state: &State) -> Result<(), Failu
     let output = state.output();
     let moves = output.objects.iter().all(|o| o.energy.stored().is_finite() && o.pose.position.is_finite());
     let finite = moves && output.devices.iter().all(|d| d.force_on_hand.is_finite() && d.proxy.is_finite());
-    let solved = output.status.unsolved_objects == 0 || scene.has_touch();
-    if solved && output.status.rejected_devices == 0 && finite {
+    let solved = output.status.unsolved_islands == 0 || scene.has_touch();
+    if solved && output.status.rejected_inputs == 0 && finite {
         return Ok(());
     }
     if scene.has_touch() {

@@ -13,9 +13,9 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{Pose, State};
 use palpate_haptics::link::{LinkServer, Secret};
-use palpate_haptics::log::{LogHand, LogWriter};
+use palpate_haptics::log::{LogSender, LogWriter};
 use palpate_haptics::{
-    DeformationProcess, DevicePort, Mover, Report, Scheduling, Session, SessionDevice, port,
+    DeformationProcess, DevicePort, ObstacleTrajectory, Report, Scheduling, Session, SessionDevice, port,
 };
 use std::io::IsTerminal;
 use std::net::SocketAddr;
@@ -148,7 +148,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
 /// Run with a bar on a terminal, until it is done or interrupted.
 fn watch(
     session: Session,
-    log: Option<(LogHand, LogWriter<WholeFile>)>,
+    log: Option<(LogSender, LogWriter<WholeFile>)>,
     steps: Option<u64>,
 ) -> Result<(Report, Option<WholeFile>), Failure> {
     let (stop, done) = (stop_on_interrupt(), AtomicU64::new(0));
@@ -207,8 +207,8 @@ pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
 }
 
-fn movers(scene: &Scene) -> Vec<Mover> {
-    let one = |obstacle: &crate::scene_file::SceneObstacle| -> Mover {
+fn movers(scene: &Scene) -> Vec<ObstacleTrajectory> {
+    let one = |obstacle: &crate::scene_file::SceneObstacle| -> ObstacleTrajectory {
         let obstacle = obstacle.clone();
         Box::new(move |t: f64| -> Pose { obstacle.at(t) })
     };

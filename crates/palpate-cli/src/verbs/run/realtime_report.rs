@@ -56,12 +56,12 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         "steps": report.steps,
         "step_s": scene.model.parameters().step_s,
         "wall_s": report.wall_s,
-        "stolen_s": report.stolen_s,
+        "steal_time_s": report.steal_time_s,
         "granted": report.granted.to_string(),
         "force_process": timing(&report.force),
         "deformation_process": timing(&report.pictures),
         "unsolved_steps": report.unsolved,
-        "most_places": scene.model.parameters().most_places,
+        "max_contact_samples": scene.model.parameters().max_contact_samples,
         "devices": devices.collect::<Vec<_>>(),
         "objects": objects.collect::<Vec<_>>(),
         "links": links.map(|links| json!({
@@ -106,10 +106,10 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     }
     out += "\n";
     out += &overruns(report, step_s);
-    if let Some(stolen_s) = report.stolen_s.filter(|stolen_s| *stolen_s > 0.0) {
-        let share = 100.0 * stolen_s / report.wall_s;
+    if let Some(steal_time_s) = report.steal_time_s.filter(|steal_time_s| *steal_time_s > 0.0) {
+        let share = 100.0 * steal_time_s / report.wall_s;
         out += &format!(
-            "  stolen       {stolen_s:.2} s of its core ({share:.2} %) went to something else on the machine below this one\n"
+            "  stolen       {steal_time_s:.2} s of its core ({share:.2} %) went to something else on the machine below this one\n"
         );
     }
     for (device, own) in here() {
@@ -124,8 +124,8 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     let parameters = scene.model.parameters();
     if !parameters.obstacles.is_empty() {
         out += &format!(
-            "  contacts     objects meet obstacles at {} places at most (most_places)\n",
-            parameters.most_places
+            "  contacts     objects meet obstacles at {} places at most (max_contact_samples)\n",
+            parameters.max_contact_samples
         );
     }
     if report.unsolved > 0 {

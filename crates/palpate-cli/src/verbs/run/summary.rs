@@ -62,7 +62,7 @@ impl Summary {
         all.iterations = all.iterations.max(now.iterations);
         all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
         all.dropped_contacts = all.dropped_contacts.max(now.dropped_contacts);
-        self.unsolved_steps += usize::from(now.unsolved_objects > 0);
+        self.unsolved_steps += usize::from(now.unsolved_islands > 0);
         self.dropping_steps += usize::from(now.dropped_contacts > 0);
         self.most_contacts = self.most_contacts.max(output.contacts.len());
         let forces = output.contacts.iter().map(|contact| contact.force.length());
@@ -221,10 +221,10 @@ impl Summary {
         }
         if self.dropping_steps > 0 {
             out += &format!(
-                "  warning      in {} steps contacts were left out, up to {} at once: raise most_contact_points above {}\n",
+                "  warning      in {} steps contacts were left out, up to {} at once: raise max_contact_points above {}\n",
                 self.dropping_steps,
                 self.status.dropped_contacts,
-                scene.model.parameters().most_contact_points
+                scene.model.parameters().max_contact_points
             );
         }
         if self.status.dependent_rows > 0 {

@@ -130,7 +130,7 @@ impl Hand {
             Phase::Inside => self.position = pose.world_from_body(self.goal * 0.3) + random.vector() * 1e-4,
             Phase::NoNumber if random.chance(0.3) => return no_number(random, self.position),
             Phase::NoNumber => self.position = centre + self.goal,
-            Phase::AwayAndBack if random.chance(0.3) => return DeviceInput::away(),
+            Phase::AwayAndBack if random.chance(0.3) => return DeviceInput::inactive(),
             Phase::AwayAndBack => self.position = centre + self.goal * random.within(0.0, 2.0),
             Phase::Press => self.position += (centre - self.goal * 0.5 - self.position) * self.rate,
             Phase::Sweep => {

@@ -1,7 +1,7 @@
 //! Whether a proxy can leave: rays against the deformed surfaces.
 
 use glam::DVec3;
-use palpate::{Against, Model, State};
+use palpate::{Collider, Model, State};
 use std::f64::consts::TAU;
 
 /// A way out leads out of every face that is touched, by this cosine at least.
@@ -36,7 +36,7 @@ fn surfaces(model: &Model, state: &State) -> Option<Vec<[DVec3; 3]>> {
 pub fn way_out(model: &Model, state: &State, device: usize) -> Option<(DVec3, DVec3)> {
     let output = state.output();
     let proxy = output.devices[device].proxy;
-    let touched = output.contacts.iter().filter(|contact| contact.against == Against::Device(device));
+    let touched = output.contacts.iter().filter(|contact| contact.against == Collider::Device(device));
     let normals: Vec<DVec3> = touched.map(|contact| contact.normal).collect();
     let triangles = surfaces(model, state)?;
     let away = output.objects.iter().map(|object| proxy - object.pose.position);

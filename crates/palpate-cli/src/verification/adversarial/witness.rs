@@ -4,7 +4,7 @@ use super::super::Check;
 use super::super::scene::ROUND_OFF;
 use super::hands::Hand;
 use glam::DVec3;
-use palpate::{Against, DeviceInput, DeviceMode, Input, Model, Output};
+use palpate::{Collider, DeviceInput, DeviceMode, Input, Model, Output};
 
 /// The solver may miss a contact's law by this share of the object's size (docs/contact.md); beyond it the status says so.
 const LOOSE: f64 = 1e-5;
@@ -176,19 +176,19 @@ impl<'a> Witness<'a> {
     /// Misses of the laws: as the solver sees them, and as contacts that push from afar show them.
     fn status(&mut self, output: &Output, at: [usize; 2]) {
         let status = &output.status;
-        self.tally.unsolved.take(status.unsolved_objects > 0, at);
+        self.tally.unsolved.take(status.unsolved_islands > 0, at);
         let largest = output.contacts.iter().map(|contact| contact.force.length()).fold(0.0, f64::max);
         let pushing = output.contacts.iter().filter(|contact| contact.force.length() > LEFT * largest);
         let apart = pushing.map(|contact| contact.gap).fold(0.0, f64::max);
         // What the last sweep moves comes on top of the miss that it sees.
         let missed = status.solver_residual_m.max(0.5 * apart) > LOOSE * self.size;
-        self.tally.silent.take(missed && status.unsolved_objects == 0, at);
+        self.tally.silent.take(missed && status.unsolved_islands == 0, at);
     }
 
     fn device(&mut self, device: usize, given: &DeviceInput, hand: &Hand, output: &Output, at: [usize; 2]) {
         let out = &output.devices[device];
         let force = out.force_on_hand.length();
-        let present = given.mode != DeviceMode::Away && given.position.is_finite();
+        let present = given.mode != DeviceMode::Inactive && given.position.is_finite();
         if !present {
             self.tally.stuck.take(force != 0.0, at);
             self.before[device] = None;
@@ -221,7 +221,7 @@ impl<'a> Witness<'a> {
 
 /// Whether the force on a hand is other than what its contacts do to the objects, by more than the rounding of their sum.
 fn is_one_sided(device: usize, output: &Output) -> bool {
-    let own = output.contacts.iter().filter(|contact| contact.against == Against::Device(device));
+    let own = output.contacts.iter().filter(|contact| contact.against == Collider::Device(device));
     let (mut sum, mut size) = (output.devices[device].force_on_hand, 0.0);
     for contact in own {
         sum += contact.force;

@@ -1,19 +1,19 @@
 //! What goes from the force process to whoever draws: the newest state, which is enough for a whole picture.
 
 use palpate::{
-    ContactOutput, Deformation, DeviceOutput, EnergyLedger, Input, Model, Output, State, StepStatus,
+    ContactOutput, DeformationSnapshot, DeviceOutput, EnergyLedger, Input, Model, Output, State, StepStatus,
 };
 use triple_buffer::triple_buffer;
 
 /// A scene at the end of a step, as far as pictures take it.
 #[derive(Debug)]
-pub struct Moment {
+pub struct Snapshot {
     /// Steps since the start.
     pub step: u64,
     /// Simulated time [s].
     pub time_s: f64,
     /// What deforms the objects, and where they are.
-    pub objects: Vec<Deformation>,
+    pub objects: Vec<DeformationSnapshot>,
     /// What the step was given: devices and obstacles.
     pub input: Input,
     /// What came out.
@@ -27,12 +27,12 @@ pub struct Moment {
 }
 
 /// The force process's end: it leaves the newest state there.
-pub struct Showing(triple_buffer::Input<Moment>);
+pub struct SnapshotWriter(triple_buffer::Input<Snapshot>);
 
 /// The other end.
-pub struct Moments(triple_buffer::Output<Moment>);
+pub struct SnapshotReader(triple_buffer::Output<Snapshot>);
 
-impl Clone for Moment {
+impl Clone for Snapshot {
     /// With as much room: moments are filled without allocation.
     fn clone(&self) -> Self {
         let mut contacts = Vec::with_capacity(self.contacts.capacity());
@@ -47,7 +47,7 @@ impl Clone for Moment {
     }
 }
 
-impl Moment {
+impl Snapshot {
     /// A state, with room for what later ones hold.
     pub fn new(model: &Model, state: &State, input: &Input) -> Self {
         let Output { time_s, devices, contacts, energy, status, .. } = state.output();
@@ -83,12 +83,12 @@ impl Moment {
 }
 
 /// Two ends between which the newest moment goes: nobody waits for anybody.
-pub fn showing(first: &Moment) -> (Showing, Moments) {
+pub fn snapshot_buffer(first: &Snapshot) -> (SnapshotWriter, SnapshotReader) {
     let (input, output) = triple_buffer(first);
-    (Showing(input), Moments(output))
+    (SnapshotWriter(input), SnapshotReader(output))
 }
 
-impl Showing {
+impl SnapshotWriter {
     /// Leave the state for whoever draws.
     ///
     /// # Real time
@@ -99,9 +99,9 @@ impl Showing {
     }
 }
 
-impl Moments {
+impl SnapshotReader {
     /// The newest moment; none when there is none newer than the last.
-    pub fn newest(&mut self) -> Option<&Moment> {
+    pub fn newest(&mut self) -> Option<&Snapshot> {
         self.0.update().then(|| &*self.0.output_buffer_mut())
     }
 }
