@@ -395,7 +395,7 @@ impl Manager {
                     if let (Some(Ok(file)), Some(summary)) = (out, log) {
                         file.finish(summary);
                     }
-                    Some(state.motions())
+                    Some(state.snapshots())
                 }
                 Err(error) => {
                     let _ = events.send(Answer::Error { text: &error.to_string() }.text().into());

@@ -173,7 +173,7 @@ impl<W: Write + Seek> LogWriter<W> {
         let begins = |(name, motion)| {
             serde_json::to_string(&StartMessage::from(motion)).map(|text| (String::clone(name), text))
         };
-        let motions = state.motions();
+        let motions = state.snapshots();
         let starts: Result<_, _> = names.objects.iter().zip(&motions).map(begins).collect();
         for (name, metadata) in [("palpate", facts), (START, starts.map_err(failed)?)] {
             writer.write_metadata(&Metadata { name: name.to_string(), metadata }).map_err(failed)?;

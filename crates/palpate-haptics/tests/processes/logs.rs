@@ -93,7 +93,7 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
     for number in 0..150 {
         step(&model, &mut before, &press(number));
     }
-    let motions = before.motions();
+    let motions = before.snapshots();
     let begins = State::resume(&model, &motions);
     assert!(begins.output().energy.elastic > 1e-9, "{:?}", begins.output().energy);
     assert!(motions[0].angular_momentum != DVec3::ZERO && motions[0].twist.linear.x < 0.0, "{motions:?}");

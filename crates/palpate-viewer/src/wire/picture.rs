@@ -79,7 +79,7 @@ impl FrameEncoder {
                     let q = object.modal_coordinates();
                     out.u32(q.len() as u32);
                     q.iter().zip(&self.scales[at]).for_each(|(q, scale)| out.f32(q * scale));
-                    object.dents(&self.model, memory, places);
+                    object.residual_displacements(&self.model, memory, places);
                     write_dents(places, &mut out);
                 }
                 FrameFormat::Vertices => {

@@ -163,9 +163,9 @@ fn every_scene_is_a_log_that_repeats_and_one_that_goes_on_begins_where_the_last_
         match before {
             None => assert!(felt > 0.02, "{felt} N"),
             Some(before) if std::ptr::eq(bytes, &kept[1]) => assert_eq!(motions, before),
-            Some(_) => assert_eq!(motions, State::new(&model).motions()),
+            Some(_) => assert_eq!(motions, State::new(&model).snapshots()),
         }
-        before = Some(state.motions());
+        before = Some(state.snapshots());
     }
 }
 
