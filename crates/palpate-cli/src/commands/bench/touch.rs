@@ -1,4 +1,4 @@
-//! Steps with contacts: fingers on meshes of different fineness, a cube on a floor.
+//! Steps with contacts: fingers on meshes of different resolution, a cube on a floor.
 
 use super::{Case, pictures, timed_step};
 use crate::failure::Failure;
@@ -11,21 +11,21 @@ use palpate_viewer::FrameFormat;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Fingers like these are on every haptic workbench.
+/// Typical finger.
 pub const FINGER: DeviceParameters =
     DeviceParameters { tip_radius: 0.005, patch_radius: 0.004, friction: 0.6, coupling: None };
 
 /// Half the side of the cubes [m].
 pub const HALF: f64 = 0.05;
 
-/// All nodes, or few places that stand for them.
+/// Contact samples: at all nodes, or few.
 const ALL: usize = usize::MAX;
-const PLACES: usize = 48;
+const FEW: usize = 48;
 
-/// How often the finest surface is that of the recorded cube with every triangle cut in four.
+/// Refinements of the recorded surface, each of which splits every triangle in four.
 const REFINEMENTS: usize = 3;
 
-/// The cases, with the paper's cube and a finer one.
+/// Cases with the paper's cube and a finer one.
 pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item = Case> {
     let mut cases: Vec<Case> = Vec::new();
     let mut fingers = |recording: Arc<Recording>, sliding: bool| {
@@ -49,26 +49,26 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),
-        (0.0, 1, PLACES, "lies on a floor, 48 places"),
+        (0.0, 1, FEW, "lies on a floor, 48 contact samples"),
         (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
-        (0.05, 1, PLACES, "falls on a floor from 5 cm, contact steps, 48 places"),
+        (0.05, 1, FEW, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
         (0.0, 2, ALL, "one on another on a floor"),
-        (0.0, 2, PLACES, "one on another on a floor, 48 places"),
+        (0.0, 2, FEW, "one on another on a floor, 48 contact samples"),
         (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
-        (0.001, 2, PLACES, "one on another, falls on a floor, contact steps, 48 places"),
+        (0.001, 2, FEW, "one on another, falls on a floor, contact steps, 48 contact samples"),
     ];
-    // What is to lie still has to lose its energy.
-    let calm = Arc::new(damped(&cube));
+    // Damping lets resting cubes come to rest.
+    let damped_cube = Arc::new(damped(&cube));
     for (height, cubes, max_contact_samples, what) in floors {
-        let recording = if height == 0.0 { calm.clone() } else { cube.clone() };
+        let recording = if height == 0.0 { damped_cube.clone() } else { cube.clone() };
         let label = format!("12³ cells, 200 modes, {what}");
         let run = move |steps| floor_steps(&recording, (height, cubes, max_contact_samples), steps);
         cases.push((label, Box::new(run)));
     }
     for (max_contact_samples, what) in
-        [(ALL, "2 fingers move it on a floor"), (PLACES, "2 fingers move it on a floor, 48 places")]
+        [(ALL, "2 fingers move it on a floor"), (FEW, "2 fingers move it on a floor, 48 contact samples")]
     {
-        let recording = calm.clone();
+        let recording = damped_cube.clone();
         let label = format!("12³ cells, 200 modes, {what}");
         cases.push((label, Box::new(move |steps| moving_steps(&recording, max_contact_samples, steps))));
     }
@@ -79,7 +79,7 @@ fn at_height(y: f64) -> ObjectStart {
     ObjectStart { pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY }, twist: Twist::ZERO }
 }
 
-/// Times [ns] of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it.
+/// Compute times of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it [ns].
 fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters {
         devices: vec![
@@ -90,15 +90,15 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
     };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(0.0))])?;
     let mut state = State::new(&model);
-    // A free cube that is stroked from both sides with little friction slips away in the end.
+    // A free cube between sliding fingers slips away in the end.
     let steps = if sliding { steps.min(4000) } else { steps };
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps + 200 {
         let t = number as f64 * 1e-3;
         let press = 0.004 * (t / 0.1).min(1.0) - 0.0005;
-        // As far as friction holds the cube for long.
+        // Amplitude at which friction holds the cube.
         let sway = 0.006 * (std::f64::consts::TAU * 2.0 * t).sin();
-        // Shaken together, or each the other way.
+        // In phase, or in opposite phase when sliding.
         let hand = |side: f64| {
             let across = if sliding { side * sway } else { sway };
             DeviceInput::touching(DVec3::new(side * (HALF + FINGER.tip_radius - press), across, 0.0))
@@ -115,7 +115,7 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
     Ok(times)
 }
 
-/// Times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
+/// Compute times of steps with frictional contact of a face with a floor, or with another cube [ns].
 fn floor_steps(
     recording: &Arc<Recording>,
     (height, cubes, max_contact_samples): (f64, usize, usize),
@@ -128,7 +128,7 @@ fn floor_steps(
     };
     let model = Model::new(parameters, (0..cubes).map(cube).collect())?;
     let mut state = State::new(&model);
-    // One that lies is looked at when it has come to rest.
+    // Resting cubes settle first.
     let settling = if height > 0.0 { 0 } else { 3000 };
     let mut times = Vec::new();
     for number in 0..settling + steps.min(2000) {
@@ -140,14 +140,14 @@ fn floor_steps(
     Ok(times)
 }
 
-/// A floor, with gravity.
+/// Parameters with gravity and a floor.
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
     let gravity = DVec3::Y * -9.81;
     ModelParameters { gravity, obstacles: vec![floor], max_contact_samples, ..ModelParameters::default() }
 }
 
-/// Times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
+/// Compute times of steps in which two fingers press a cube on a floor by 3 mm and push it [ns].
 fn moving_steps(
     recording: &Arc<Recording>,
     max_contact_samples: usize,
@@ -156,7 +156,7 @@ fn moving_steps(
     let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(max_contact_samples) };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
     let mut state = State::new(&model);
-    // It settles, then it is pressed, then it is moved.
+    // Settling, then pressing, then pushing.
     let (settled, moved) = (1000, 1500);
     let mut times = Vec::new();
     for number in 0..moved + steps.min(20_000) {
@@ -178,7 +178,7 @@ fn moving_steps(
     Ok(times)
 }
 
-/// The same body with damping in proportion to stiffness, β = 2 ms; the paper's cube has none.
+/// Copy with stiffness-proportional damping, β = 2 ms.
 fn damped(cube: &Recording) -> Recording {
     let mut cube = cube.clone();
     let modes = &mut cube.modes;
@@ -186,12 +186,12 @@ fn damped(cube: &Recording) -> Recording {
     cube
 }
 
-/// The same body with every surface triangle cut in four: what the modes and the residual compliance say between the
-/// nodes, so a mesh as fine as wished without its finite elements.
+/// Copy with every surface triangle split in four: modes and residual compliance are interpolated linearly, for fine surfaces
+/// without finite elements.
 fn refined(coarse: &Recording) -> Recording {
     let surface = &coarse.surface;
     let m = coarse.modes.len();
-    // For every node the one or two nodes that it stands between.
+    // Nodes at the ends of the edge that a new node halves.
     let mut parents: Vec<[u32; 2]> = (0..surface.positions.len() as u32).map(|n| [n, n]).collect();
     let mut middles = HashMap::new();
     let mut triangles = Vec::with_capacity(4 * surface.triangles.len());
@@ -222,7 +222,7 @@ fn refined(coarse: &Recording) -> Recording {
     Recording { metadata: coarse.metadata.clone(), surface, modes, residual, gravity: None }
 }
 
-/// The residual compliance between the new nodes, within a few edges.
+/// Residual compliance between the new nodes, within a few edges.
 fn near_field(surface: &Surface, parents: &[[u32; 2]], coarse: &ResidualCompliance) -> ResidualCompliance {
     let radius = 3.0 * surface.mean_edge();
     let cell = |p: DVec3| (p / radius).floor().to_array().map(|x| x as i64);
