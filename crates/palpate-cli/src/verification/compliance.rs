@@ -2,7 +2,7 @@
 
 use super::{Check, recorded, undamped};
 use crate::Failure;
-use crate::verbs::demo::paper_cube;
+use crate::commands::demo::paper_cube;
 use faer::Mat;
 use glam::DVec3;
 use palpate::SampledOscillator;

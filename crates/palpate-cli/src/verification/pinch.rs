@@ -2,7 +2,7 @@
 
 use super::{Check, column, recorded, smooth};
 use crate::Failure;
-use crate::verbs::demo::paper_cube;
+use crate::commands::demo::paper_cube;
 use glam::DVec3;
 use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
