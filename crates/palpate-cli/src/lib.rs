@@ -19,7 +19,6 @@ mod selection;
 mod source;
 mod stages;
 mod verbs;
-mod verification;
 mod whole_file;
 
 pub use failure::Failure;

@@ -46,7 +46,20 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
     ("palpate-viewer", &["palpate", "palpate-haptics"]),
-    ("palpate-cli", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-viewer"]),
+    ("palpate-testkit", &["palpate", "palpate-fem"]),
+    ("palpate-verify", &["palpate", "palpate-fem", "palpate-haptics", "palpate-testkit"]),
+    (
+        "palpate-cli",
+        &[
+            "palpate",
+            "palpate-fem",
+            "palpate-store",
+            "palpate-haptics",
+            "palpate-viewer",
+            "palpate-testkit",
+            "palpate-verify",
+        ],
+    ),
     ("xtask", &[]),
 ];
 

@@ -11,9 +11,9 @@ use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Mark, Scale, Section, code, figure, paragraph};
 use crate::scene_file::{self, Pace};
 use crate::verbs::write_whole;
-use crate::verification::{FULL_REBOUND_M, full_fall};
 use palpate::{Damping, State, step};
 use palpate_fem::progress::Progress;
+use palpate_verify::{UNREDUCED_REBOUND_M, UnreducedFallRow, unreduced_fall};
 use palpate_viewer::CameraView;
 
 /// The scene; the paper's step, no friction as in the solution with all modes.
@@ -172,7 +172,7 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
         .fold(0.0, f64::max);
     let is_papers = desk.effort.cells == 12;
     let full = if is_papers {
-        format!(", and with all 6585 modes of the mesh, not reduced, {:.1} mm", 1e3 * FULL_REBOUND_M)
+        format!(", and with all 6585 modes of the mesh, not reduced, {:.1} mm", 1e3 * UNREDUCED_REBOUND_M)
     } else {
         String::new()
     };
@@ -225,7 +225,7 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
                 1e3 * rebound,
                 1e3 * DROP_M,
                 if is_papers {
-                    format!(" ({:.1} mm with all modes of the mesh)", 1e3 * FULL_REBOUND_M)
+                    format!(" ({:.1} mm with all modes of the mesh)", 1e3 * UNREDUCED_REBOUND_M)
                 } else {
                     String::new()
                 },
@@ -282,10 +282,10 @@ fn chart(title: &str, y: &str, series: Vec<Series>, notes: Vec<Mark>) -> Chart {
 }
 
 /// The unreduced solution as a curve: a column of it, scaled.
-fn unreduced(of: impl Fn([f64; 3]) -> f64) -> Series {
+fn unreduced(of: impl Fn(UnreducedFallRow) -> f64) -> Series {
     Series {
         label: "all 6585 modes, every node".into(),
-        points: full_fall().into_iter().map(|row| (row[0], of(row))).collect(),
+        points: unreduced_fall().into_iter().map(|row| (row.time_s, of(row))).collect(),
         style: Style::Dashed,
     }
 }
@@ -294,10 +294,10 @@ fn heights(moments: &[Snapshot], is_papers: bool) -> Chart {
     let mut series = vec![curve(moments, "palpate, in real time", |moment| 1e3 * height(moment))];
     let mut notes = Vec::new();
     if is_papers {
-        series.push(unreduced(|[_, height, _]| 1e3 * height));
+        series.push(unreduced(|row| 1e3 * row.height_m));
         notes.push(Mark::Horizontal {
-            y: 1e3 * FULL_REBOUND_M,
-            label: format!("{:.1} mm", 1e3 * FULL_REBOUND_M),
+            y: 1e3 * UNREDUCED_REBOUND_M,
+            label: format!("{:.1} mm", 1e3 * UNREDUCED_REBOUND_M),
         });
     }
     chart("Height of the centre", "above that of the undeformed cube on the floor [mm]", series, notes)
@@ -306,7 +306,7 @@ fn heights(moments: &[Snapshot], is_papers: bool) -> Chart {
 fn forces(moments: &[Snapshot], is_papers: bool, weight: f64) -> Chart {
     let mut series = vec![curve(moments, "palpate, in real time", |moment| moment.support.y)];
     if is_papers {
-        series.push(unreduced(|[.., force]| force));
+        series.push(unreduced(|row| row.force_n));
     }
     let notes = vec![Mark::Horizontal { y: weight, label: format!("weight: {weight:.2} N") }];
     chart("Force of the floor", "upward [N]", series, notes)

@@ -1,7 +1,7 @@
 //! Scenes at hand, as scene files that need no file but their paths.
 
 use super::recipe::Recipe;
-use crate::verification::smooth;
+use palpate_testkit::smoothstep as smooth;
 use palpate::Damping;
 use palpate_fem::element::Order;
 use palpate_viewer::MaterialDescription;
