@@ -1,90 +1,77 @@
-//! The command `palpate` as a library: one verb, one file under `verbs`.
+//! The command line `palpate` as a library: one command, one file or folder under `commands`.
 //!
 //! Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
 //! input is bad or a check failed; 2: the command line is wrong.
 
-mod dense;
-mod drawing;
+mod commands;
 mod failure;
-mod log_shows;
-mod logged_run;
-mod logs;
-mod outputs;
-mod plot;
+mod interrupt;
 mod progress;
 mod report;
 mod reproduction;
-mod scene_file;
-mod selection;
-mod source;
-mod stages;
-mod verbs;
-mod whole_file;
+mod terminal;
 
 pub use failure::Failure;
 
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
-use std::io::Write;
 use std::process::ExitCode;
+use terminal::notify;
 
 /// Touch elastic objects that are free to move: record a mesh once, then get contact forces at 1 kHz.
 #[derive(Parser)]
 #[command(name = "palpate", version, arg_required_else_help = true)]
-#[command(after_help = "Start with `palpate demo`. `palpate VERB --help` tells more about each verb.")]
+#[command(
+    after_help = "Start with `palpate demo`. `palpate COMMAND --help` has the options of each command."
+)]
 struct Arguments {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Subcommand)]
-enum Verb {
-    Demo(verbs::demo::Arguments),
-    Record(Box<verbs::record::Arguments>),
-    Inspect(verbs::inspect::Arguments),
-    Run(verbs::run::Arguments),
-    Serve(verbs::serve::Arguments),
-    Replay(verbs::replay::Arguments),
-    Render(verbs::render::Arguments),
-    Export(verbs::export::Arguments),
-    Device(Box<verbs::device::Arguments>),
-    Devices(verbs::devices::Arguments),
-    Reproduce(verbs::reproduce::Arguments),
-    Verify(verbs::verify::Arguments),
-    Bench(verbs::bench::Arguments),
+enum Command {
+    Demo(commands::demo::Arguments),
+    Record(Box<commands::record::Arguments>),
+    Inspect(commands::inspect::Arguments),
+    Run(commands::run::Arguments),
+    Serve(commands::serve::Arguments),
+    Replay(commands::replay::Arguments),
+    Render(commands::render::Arguments),
+    Export(commands::export::Arguments),
+    Device(Box<commands::device::Arguments>),
+    Devices(commands::devices::Arguments),
+    Reproduce(commands::reproduce::Arguments),
+    Verify(commands::verify::Arguments),
+    Bench(commands::bench::Arguments),
 }
 
-/// Say something on standard error; a reader that has gone away is no failure.
-fn tell(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
-}
-
-/// Run a command line and print what went wrong.
+/// Runs a command line, and prints its failure.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
-    whole_file::remove_unfinished_on_interrupt();
-    let done = match arguments.verb {
-        Verb::Demo(arguments) => verbs::demo::demo(&arguments),
-        Verb::Record(arguments) => verbs::record::record(&arguments),
-        Verb::Inspect(arguments) => verbs::inspect::inspect(&arguments),
-        Verb::Run(arguments) => verbs::run::run(&arguments),
-        Verb::Serve(arguments) => verbs::serve::serve(&arguments),
-        Verb::Render(arguments) => verbs::render::render(&arguments),
-        Verb::Replay(arguments) => verbs::replay::replay(&arguments),
-        Verb::Export(arguments) => verbs::export::export(&arguments),
-        Verb::Device(arguments) => verbs::device::device(&arguments),
-        Verb::Devices(arguments) => verbs::devices::devices(&arguments),
-        Verb::Reproduce(arguments) => verbs::reproduce::reproduce(&arguments),
-        Verb::Verify(arguments) => verbs::verify::verify(&arguments),
-        Verb::Bench(arguments) => verbs::bench::bench(&arguments),
+    interrupt::install_handler();
+    let done = match arguments.command {
+        Command::Demo(arguments) => commands::demo::demo(&arguments),
+        Command::Record(arguments) => commands::record::record(&arguments),
+        Command::Inspect(arguments) => commands::inspect::inspect(&arguments),
+        Command::Run(arguments) => commands::run::run(&arguments),
+        Command::Serve(arguments) => commands::serve::serve(&arguments),
+        Command::Render(arguments) => commands::render::render(&arguments),
+        Command::Replay(arguments) => commands::replay::replay(&arguments),
+        Command::Export(arguments) => commands::export::export(&arguments),
+        Command::Device(arguments) => commands::device::device(&arguments),
+        Command::Devices(arguments) => commands::devices::devices(&arguments),
+        Command::Reproduce(arguments) => commands::reproduce::reproduce(&arguments),
+        Command::Verify(arguments) => commands::verify::verify(&arguments),
+        Command::Bench(arguments) => commands::bench::bench(&arguments),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            tell(&format!("error: {failure}"));
+            notify(&format!("error: {failure}"));
             ExitCode::FAILURE
         }
     }

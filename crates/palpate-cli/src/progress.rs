@@ -1,11 +1,12 @@
-//! Progress of long work on standard error: a bar per stage on a terminal, a line per stage elsewhere.
+//! Progress on standard error: a bar per stage on a terminal, a line per stage elsewhere.
 
+use crate::terminal::notify;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_fem::progress::Progress;
 use std::io::IsTerminal;
 use std::time::Instant;
 
-/// Bars of offline work.
+/// Progress of recording: a bar per stage, and its time when it is done.
 pub struct Bars {
     bar: Option<ProgressBar>,
     stage: Option<(String, Instant)>,
@@ -13,12 +14,12 @@ pub struct Bars {
 }
 
 impl Bars {
-    /// Nothing is shown until a stage begins.
+    /// Shows nothing until a stage begins.
     pub fn new() -> Self {
         Self { bar: None, stage: None, interactive: std::io::stderr().is_terminal() }
     }
 
-    /// Counts units of the present stage from any thread.
+    /// Counter of the current stage for other threads.
     pub fn counter(&self) -> impl Fn(usize) + Sync + use<> {
         let bar = self.bar.clone();
         move |units| {
@@ -28,13 +29,13 @@ impl Bars {
         }
     }
 
-    /// The last stage is done.
+    /// Ends the last stage.
     pub fn finish(&mut self) {
         if let Some(bar) = self.bar.take() {
             bar.finish_and_clear();
         }
         if let Some((stage, since)) = self.stage.take() {
-            crate::tell(&format!("  {stage:<24} {:>7.2} s", since.elapsed().as_secs_f64()));
+            notify(&format!("  {stage:<24} {:>7.2} s", since.elapsed().as_secs_f64()));
         }
     }
 }
@@ -63,8 +64,8 @@ impl Progress for Bars {
 
     fn remark(&mut self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| crate::tell(&format!("warning: {text}"))),
-            None => crate::tell(&format!("warning: {text}")),
+            Some(bar) => bar.suspend(|| notify(&format!("warning: {text}"))),
+            None => notify(&format!("warning: {text}")),
         }
     }
 }
@@ -77,15 +78,57 @@ impl Drop for Bars {
     }
 }
 
-/// Progress without remarks: where the paper's linear elements are what is wanted.
-pub struct WithoutRemarks<'a>(pub &'a mut dyn Progress);
+/// Bar of a count on a terminal, without a line when it is done.
+pub struct CountBar {
+    bar: ProgressBar,
+    template: &'static str,
+    pending: u64,
+}
 
-impl Progress for WithoutRemarks<'_> {
+/// Units between two updates of a [`CountBar`].
+const UPDATE_INTERVAL: u64 = 256;
+
+impl CountBar {
+    /// Bar of steps.
+    pub fn steps() -> Self {
+        Self::new("{wide_bar} {pos}/{len} steps, {eta} left")
+    }
+
+    /// Bar with a template of [`indicatif`].
+    pub fn new(template: &'static str) -> Self {
+        Self { bar: ProgressBar::hidden(), template, pending: 0 }
+    }
+}
+
+impl Progress for CountBar {
     fn begin(&mut self, stage: &str, total: u64) {
-        self.0.begin(stage, total);
+        self.bar.finish_and_clear();
+        self.pending = 0;
+        if std::io::stderr().is_terminal() {
+            self.bar = ProgressBar::new(total);
+            if let Ok(style) = ProgressStyle::with_template(self.template) {
+                self.bar.set_style(style);
+            }
+            self.bar.set_message(stage.to_string());
+        }
     }
+
     fn advance(&mut self, units: u64) {
-        self.0.advance(units);
+        self.pending += units;
+        let (position, length) = (self.bar.position() + self.pending, self.bar.length().unwrap_or(0));
+        if self.pending >= UPDATE_INTERVAL || length < 10 * UPDATE_INTERVAL {
+            self.bar.set_position(position);
+            self.pending = 0;
+        }
     }
-    fn remark(&mut self, _text: &str) {}
+
+    fn remark(&mut self, text: &str) {
+        self.bar.suspend(|| notify(&format!("warning: {text}")));
+    }
+}
+
+impl Drop for CountBar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
 }

@@ -2,10 +2,10 @@
 
 use super::{Chapter, Effort, Finding, csv, cube, table_in_memory};
 use crate::Failure;
+use crate::commands::run::percentile_us;
 use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Scale, Section, figure, paragraph};
-use crate::verbs::run::percentile_us;
 use glam::DVec3;
 use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,

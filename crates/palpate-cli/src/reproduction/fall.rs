@@ -6,13 +6,13 @@ use super::processes::{number, report, start};
 use super::series::{Artist, Series as Pictures};
 use super::{Chapter, Desk, csv, damped_cube};
 use crate::Failure;
-use crate::progress::{Bars, WithoutRemarks};
+use crate::progress::Bars;
 use crate::report::chart::{Axis, Chart, Series, Style};
 use crate::report::{Mark, Scale, Section, code, figure, paragraph};
-use crate::scene_file::{self, Pace};
-use crate::verbs::write_whole;
 use palpate::{Damping, State, step};
+use palpate_export::write_atomically as write_whole;
 use palpate_fem::progress::Progress;
+use palpate_scene::{RunMode, WithoutRemarks, read_scene};
 use palpate_verify::{UNREDUCED_REBOUND_M, UnreducedFallRow, unreduced_fall};
 use palpate_viewer::CameraView;
 
@@ -118,7 +118,7 @@ fn lies_still(moments: &[Snapshot]) -> bool {
 
 /// The same scene with every node of the face instead of few places: the rebound [m].
 fn rebound_of_every_node(desk: &Desk) -> Result<f64, Failure> {
-    let scene = scene_file::read(&desk.scenes().join(SCENE_NAME), Pace::Offline)?;
+    let scene = read_scene(&desk.scenes().join(SCENE_NAME), RunMode::Offline)?;
     let mut state = State::new(&scene.model);
     let mut moments = Vec::new();
     for number in 1..=(0.5 / STEP_S) as u64 {

@@ -1,9 +1,9 @@
 //! What figures take from a log: it is computed again, step by step, to the bit.
 
 use crate::Failure;
-use crate::logged_run::LoggedRun;
 use glam::DVec3;
 use palpate::{Collider, EnergyLedger, Input, Output, State};
+use palpate_scene::LogReplay;
 use std::path::Path;
 
 /// The end of one step.
@@ -42,10 +42,10 @@ impl Snapshot {
 
 /// Every step of a log.
 pub fn moments(log: &Path) -> Result<Vec<Snapshot>, Failure> {
-    let run = LoggedRun::read(log)?;
+    let run = LogReplay::read(log)?;
     let mut state = State::new(&run.scene.model);
     let mut moments = Vec::new();
-    run.repeat(&mut state, run.steps, |input, state, _| {
+    run.replay::<Failure>(&mut state, run.steps, |input, state, _| {
         moments.push(Snapshot::new(moments.len() as u64 + 1, input, state.output()));
         Ok(())
     })?;

@@ -16,16 +16,17 @@ mod shaken;
 pub use findings::{Finding, findings_table};
 
 use crate::Failure;
-use crate::progress::{Bars, WithoutRemarks};
+use crate::commands::demo::paper_cube;
+use crate::progress::Bars;
 use crate::report::Section;
-use crate::verbs::demo::paper_cube;
-use crate::verbs::write_whole;
 use clap::ValueEnum;
 use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
+use palpate_export::write_atomically as write_whole;
 use palpate_fem::mesh::box_mesh;
 use palpate_fem::progress::Progress;
 use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
 use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_scene::WithoutRemarks;
 use series::Artist;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -98,7 +99,7 @@ impl Desk<'_> {
     fn lay_out(&self, body: &Recorded) -> Result<(), Failure> {
         let folder = self.scenes();
         std::fs::create_dir_all(&folder).map_err(|e| Failure::file("make the folder", &folder, &e))?;
-        write_whole(&folder.join("cube.palp"), &body.recording.to_bytes()?)
+        Ok(write_whole(&folder.join("cube.palp"), &body.recording.to_bytes()?)?)
     }
 }
 

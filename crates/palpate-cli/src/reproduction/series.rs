@@ -1,10 +1,9 @@
 //! Image series: instants of a log, drawn by the viewer's page, as files and in the report.
 
 use crate::Failure;
-use crate::drawing::{draw, find_browser};
-use crate::log_shows::ShownLog;
 use crate::report::{gallery, image, paragraph};
-use crate::verbs::write_whole;
+use palpate_export::write_atomically as write_whole;
+use palpate_render::{LogFramePlayer, find_browser, render_log};
 use palpate_viewer::{CameraView, RenderRequest};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -35,7 +34,7 @@ pub struct Series<'a> {
 impl Artist {
     /// The browser that was named, or the first known one; without one nothing is drawn. One that was named must be there.
     pub fn new(named: Option<&Path>) -> Result<Self, Failure> {
-        let browser = find_browser(named);
+        let browser = find_browser(named).map_err(Failure::from);
         if named.is_some() {
             browser.clone()?;
         }
@@ -53,7 +52,7 @@ impl Artist {
             }
             Err(why) => {
                 let log = series.log.file_name().unwrap_or_default().to_string_lossy();
-                crate::tell(&format!("warning: no pictures of {log}: {why}"));
+                crate::terminal::notify(&format!("warning: no pictures of {log}: {why}"));
                 paragraph(&format!(
                     "Here a series of {} pictures is missing: {why}. The log is there, and shows the same: palpate serve {log}",
                     series.instants.len()
@@ -77,10 +76,11 @@ fn pictures(series: &Series, browser: &Path) -> Result<Vec<Vec<u8>>, Failure> {
         colour: "displacement".into(),
         dark: false,
     };
-    let log = ShownLog::read_at(series.log, steps)?;
+    let log = LogFramePlayer::read_at(series.log, steps)?;
     let mut pictures = Vec::new();
     // An interrupt ends the whole, as it does beside this.
-    draw(log, wish, browser, &AtomicBool::new(false), &mut |number, png| {
+    let progress = &mut palpate_scene::Silent;
+    render_log(log, wish, browser, &AtomicBool::new(false), progress, &mut |number, png| {
         write_whole(&folder.join(format!("picture_{}.png", number + 1)), &png)?;
         pictures.push(png);
         Ok(())

@@ -7,7 +7,7 @@ use super::{Chapter, Desk, shaken};
 use crate::Failure;
 use crate::progress::Bars;
 use crate::report::{Section, code, paragraph, table};
-use crate::verbs::write_whole;
+use palpate_export::write_atomically as write_whole;
 use palpate_fem::progress::Progress;
 use serde_json::Value;
 use std::fmt::Write;

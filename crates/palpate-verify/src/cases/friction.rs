@@ -18,7 +18,7 @@ const RUBBER: ElasticMaterial =
     ElasticMaterial { young_pa: 2e6, poisson: 0.3, density_kg_m3: 1000.0, stiffness_damping_s: 3e-4 };
 
 fn block() -> Result<Arc<Recording>, VerifyError> {
-    RUBBER.free_body(box_mesh(SIZE, [6, 2, 6])?, Order::Linear, 40)
+    Ok(RUBBER.free_body(box_mesh(SIZE, [6, 2, 6])?, Order::Linear, 40)?)
 }
 
 /// A plane through the origin that falls towards +x by an angle.

@@ -1,7 +1,7 @@
 //! The impulse response of the middle of the paper's top face, by time integration, against all 6585 modes.
 
 use crate::check::Check;
-use crate::error::VerifyError;
+use crate::error::{VerifyError, numerics};
 use crate::reference::{IMPULSE_RESPONSE_1_MS, column};
 use faer::Mat;
 use glam::DVec3;

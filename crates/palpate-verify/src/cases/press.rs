@@ -38,7 +38,7 @@ fn place([x, z]: [f64; 2]) -> DVec3 {
 
 fn standing(cells: u32, order: Order) -> Result<Arc<Recording>, VerifyError> {
     let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
-    CALM.fixed_body(mesh, order, 60, |node| node.y < -0.499 * SIZE[1])
+    Ok(CALM.fixed_body(mesh, order, 60, |node| node.y < -0.499 * SIZE[1])?)
 }
 
 /// Weights of the kernel about a point of the upper face, at the nodes of quadratic elements: each face's integral by

@@ -11,7 +11,7 @@ mod spectrum;
 use crate::check::Check;
 use crate::error::VerifyError;
 use glam::DVec3;
-use palpate::{Coupling, Recording, SurfacePoint};
+use palpate::{Recording, SurfacePoint};
 use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
 use palpate_haptics::device::{Hand, Traits};
@@ -78,7 +78,8 @@ fn standing_block(young: f64) -> Result<Arc<Recording>, VerifyError> {
         density_kg_m3: 1000.0,
         stiffness_damping_s: 2.0 * DAMPED / omega,
     };
-    material.fixed_body(box_mesh(SIZE, [4, 2, 4])?, Order::Quadratic, 40, |node| node.y < -0.499 * SIZE[1])
+    Ok(material
+        .fixed_body(box_mesh(SIZE, [4, 2, 4])?, Order::Quadratic, 40, |node| node.y < -0.499 * SIZE[1])?)
 }
 
 impl Cell {

@@ -1,0 +1,176 @@
+//! `palpate bench`: step times with percentiles, and how they grow.
+
+mod pictures;
+mod touch;
+
+use crate::commands::demo::cached_cube;
+use crate::commands::run::percentile_us;
+use crate::failure::Failure;
+use crate::terminal::{print, print_json};
+use clap::Args;
+use glam::DVec3;
+use palpate::{
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, State, Twist, step,
+};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor; and pictures
+///
+/// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
+/// for another machine. Recording the largest cube takes about a minute the first time.
+#[derive(Args)]
+pub struct Arguments {
+    /// Cells along a side of the cubes that are compared
+    #[arg(long, value_delimiter = ',', default_value = "6,12,24")]
+    cells: Vec<u32>,
+    /// Steps that are timed per row
+    #[arg(long, default_value_t = 20_000)]
+    steps: usize,
+    /// Times that each row is run: of every step the least time counts, which leaves out what others took from the machine
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    runs: usize,
+    /// Time only the rows whose name contains this
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
+    /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// One JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Steps with held points that move.
+struct HeldCase {
+    label: String,
+    recording: Arc<Recording>,
+    objects: usize,
+    points: usize,
+}
+
+/// What is timed: a label, and what gives the times [ns] of so many steps, which are the same each time.
+type Case = (String, Box<dyn Fn(usize) -> Result<Vec<u32>, Failure>>);
+
+/// Runs the command.
+pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.steps == 0 {
+        return Err(Failure("--steps is 0, expected 1 or more".into()));
+    }
+    if arguments.runs == 0 {
+        return Err(Failure("--runs is 0, expected 1 or more".into()));
+    }
+    let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
+        Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?))
+    };
+    let mut cases: Vec<HeldCase> = Vec::new();
+    for &cells in &arguments.cells {
+        let recording = cube(cells, 200)?;
+        let nodes = recording.metadata.mesh.nodes;
+        let label = format!("{cells}³ cells, {nodes} nodes, 200 modes, 2 held points");
+        cases.push(HeldCase { label, recording, objects: 1, points: 2 });
+    }
+    let usual = cube(12, 200)?;
+    for modes in [50, 400] {
+        let label = format!("12³ cells, {modes} modes, 2 held points");
+        cases.push(HeldCase { label, recording: cube(12, modes)?, objects: 1, points: 2 });
+    }
+    for points in [1, 4, 8, 16] {
+        let label = format!("12³ cells, 200 modes, {points} held points");
+        cases.push(HeldCase { label, recording: usual.clone(), objects: 1, points });
+    }
+    for objects in [4, 16] {
+        let label = format!("{objects} cubes of 12³ cells, 200 modes, 2 held points each");
+        cases.push(HeldCase { label, recording: usual.clone(), objects, points: 2 });
+    }
+    let held = cases.into_iter().map(|case| -> Case {
+        let label = case.label.clone();
+        (label, Box::new(move |steps| held_steps(&case, steps)))
+    });
+    let mut rows = Vec::new();
+    if !arguments.json {
+        print(&format!("{:<70}{:>8}{:>8}{:>8}{:>9}\n", "step time [µs]", "p50", "p99", "p99.9", "max"))?;
+    }
+    let wanted = |label: &str| arguments.only.as_deref().is_none_or(|text| label.contains(text));
+    for (label, measure) in held.chain(touch::cases(usual, cube(16, 200)?)).filter(|(label, _)| wanted(label))
+    {
+        let mut times = measure(arguments.steps)?;
+        for _ in 1..arguments.runs {
+            times
+                .iter_mut()
+                .zip(measure(arguments.steps)?)
+                .for_each(|(least, time)| *least = time.min(*least));
+        }
+        times.sort_unstable();
+        let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));
+        rows.push(json!({ "case": label, "p50": p50, "p99": p99, "p999": p999, "max": max }));
+        if !arguments.json {
+            print(&format!("{:<70}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n", label))?;
+        }
+    }
+    if rows.is_empty() {
+        let text = arguments.only.as_deref().unwrap_or_default();
+        return Err(Failure(format!(
+            "no row's name contains '{text}'; palpate bench --steps 1 shows them all"
+        )));
+    }
+    if arguments.json { print_json(&json!({ "step_time_us": Value::Array(rows) })) } else { Ok(()) }
+}
+
+/// Times [ns] of steps in which every held point moves.
+fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
+    let surface = &case.recording.surface;
+    let held: Vec<Grasp> = (0..case.objects)
+        .flat_map(|object| {
+            (0..case.points).filter_map(move |at| {
+                // Points all over the surface, none twice: a spiral on the sphere about the body.
+                let share = (at as f64 + 0.5) / case.points as f64;
+                let height = 1.0 - 2.0 * share;
+                let angle = at as f64 * 2.4;
+                let around = (1.0 - height * height).sqrt();
+                let towards =
+                    DVec3::new(around * angle.cos(), around * angle.sin(), height) * surface.radius();
+                surface.nearest(towards).map(|(point, _)| Grasp { object, point })
+            })
+        })
+        .collect();
+    // Side by side, far enough not to meet.
+    let spacing = 5.0 * surface.radius();
+    let centre = |object: usize| DVec3::Z * (spacing * object as f64);
+    let start = |object| ObjectStart {
+        pose: Pose { position: centre(object), ..Pose::IDENTITY },
+        twist: Twist::ZERO,
+    };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); held.len()],
+        ..ModelParameters::default()
+    };
+    let objects = (0..case.objects).map(|object| ModelObject::new(case.recording.clone(), start(object)));
+    let model = Model::new(parameters, objects.collect())?;
+    let mut state = State::new(&model);
+    let rest: Vec<DVec3> = held.iter().map(|grasp| surface.rest_position(&grasp.point)).collect();
+    let mut input = Input { devices: Vec::new(), ..Input::default() };
+    let mut times = Vec::with_capacity(steps);
+    for number in 0..steps {
+        let t = number as f64 * 1e-3;
+        // Gently: nothing damps the paper's cube, and shaken hard for long it swings to several times its size.
+        let sway = DVec3::new(0.006 * (12.0 * t).sin(), 0.004 * (5.0 * t).sin(), 0.002 * (7.0 * t).sin());
+        input.devices = held
+            .iter()
+            .zip(&rest)
+            .map(|(grasp, rest)| DeviceInput::held(centre(grasp.object) + *rest * 0.98 + sway, *grasp))
+            .collect();
+        times.push(timed_step(&model, &mut state, &input));
+    }
+    Ok(times)
+}
+
+/// Compute time [ns] of a step.
+fn timed_step(model: &Model, state: &mut State, input: &Input) -> u32 {
+    let before = Instant::now();
+    step(model, state, input);
+    before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32
+}

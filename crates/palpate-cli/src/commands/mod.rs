@@ -1,0 +1,15 @@
+//! Commands: one command, one file or folder.
+
+pub mod bench;
+pub mod demo;
+pub mod device;
+pub mod devices;
+pub mod export;
+pub mod inspect;
+pub mod record;
+pub mod render;
+pub mod replay;
+pub mod reproduce;
+pub mod run;
+pub mod serve;
+pub mod verify;

@@ -1,0 +1,83 @@
+//! `palpate replay`: a log of a run in real time, computed again and compared.
+
+use crate::commands::run::{OutputArguments, Outputs};
+use crate::failure::Failure;
+use crate::progress::CountBar;
+use crate::terminal::{print, print_json};
+use clap::Args;
+use palpate_scene::{LogReplay, Progress};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Repeat a log step by step, and check that every number comes out again, bit for bit
+///
+/// The log carries the scene and its recordings. Forces, proxies, poses, velocities and energies of every step are compared
+/// with those that were logged; the first that differs ends the replay. The same build on the same kind of machine gives
+/// the same bits. Steps can be written as in `palpate run`.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = "For example:
+  palpate run scene.toml --realtime --log run.mcap
+  palpate replay run.mcap --csv steps.csv --contacts contacts.csv --vtu frames
+  palpate replay run.mcap --runs 5        # what steps take by themselves")]
+pub struct Arguments {
+    /// The log
+    pub log: PathBuf,
+    /// Times that it is repeated: of every step the least time counts, which is what the step itself took, without what
+    /// others took from the machine
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub runs: usize,
+    /// What it should leave
+    #[command(flatten)]
+    pub outputs: OutputArguments,
+}
+
+/// Runs the command.
+pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.runs == 0 {
+        return Err(Failure("--runs is 0, expected 1 or more".into()));
+    }
+    let log = LogReplay::read(&arguments.log)?;
+    let scene = &log.scene;
+    let mut least: Vec<Duration> = Vec::new();
+    for _ in 1..arguments.runs {
+        let mut at = 0;
+        let mut bar = step_bar(&log);
+        log.replay::<Failure>(&mut log.initial_state()?, log.steps, |_, _, took| {
+            bar.advance(1);
+            match least.get_mut(at) {
+                Some(least) => *least = took.min(*least),
+                None => least.push(took),
+            }
+            at += 1;
+            Ok(())
+        })?;
+    }
+    let mut state = log.initial_state()?;
+    let start = log.initial_input()?;
+    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, &start, log.steps as usize)?;
+    let mut least = least.into_iter();
+    let mut bar = step_bar(&log);
+    let done = log.replay::<Failure>(&mut state, log.steps, |input, state, took| {
+        bar.advance(1);
+        let took = least.next().map_or(took, |least| took.min(least));
+        outputs.take(scene, input, state, took)
+    })?;
+    drop(bar);
+    let summary = outputs.finish(&state)?;
+    if arguments.outputs.json {
+        let mut json = summary.json(scene);
+        json["replayed"] = json!({ "steps": done, "identical": true });
+        return print_json(&json);
+    }
+    print(&format!(
+        "{done} steps replayed: every number came out again, bit for bit\n\n{}",
+        summary.text(scene)
+    ))
+}
+
+fn step_bar(log: &LogReplay) -> CountBar {
+    let mut bar = CountBar::steps();
+    bar.begin("steps", log.steps);
+    bar
+}

@@ -1,0 +1,99 @@
+//! Outputs of a run: files, and a summary.
+
+use super::summary::Summary;
+use crate::failure::Failure;
+use clap::Args;
+use palpate::{Input, State};
+use palpate_export::{ExportOptions, SceneExporter, TimeWindow};
+use palpate_scene::Scene;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Outputs of a run.
+#[derive(Args, Debug, Clone)]
+pub struct OutputArguments {
+    /// Write every step: device positions, forces and proxies, object poses and velocities, energies
+    #[arg(long, value_name = "OUT.csv")]
+    pub csv: Option<PathBuf>,
+    /// Write every contact of every step: what touches what, where, with which force, gap and slip
+    #[arg(long, value_name = "OUT.csv")]
+    pub contacts: Option<PathBuf>,
+    /// Write objects, obstacles, contacts and devices for ParaView (VTU files and scene.pvd)
+    #[arg(long, value_name = "DIR")]
+    pub vtu: Option<PathBuf>,
+    /// Frames of --vtu per second of simulated time
+    #[arg(long, default_value_t = 50.0, value_name = "FPS", allow_negative_numbers = true)]
+    pub fps: f64,
+    /// One JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Number of samples of the deformation in a run: few enough to cost nothing beside the steps.
+const SAMPLES: usize = 100;
+
+/// Writer of the files and the summary of a run.
+pub struct Outputs {
+    files: SceneExporter,
+    summary: Summary,
+    steps: usize,
+    sample_every: usize,
+}
+
+impl OutputArguments {
+    /// Whether a file is asked for.
+    pub fn writes_files(&self) -> bool {
+        self.csv.is_some() || self.contacts.is_some() || self.vtu.is_some()
+    }
+
+    fn options(&self) -> ExportOptions<'_> {
+        ExportOptions {
+            csv: self.csv.as_deref(),
+            contacts: self.contacts.as_deref(),
+            vtu: self.vtu.as_deref(),
+            gltf: None,
+            window: TimeWindow { fps: self.fps, ..TimeWindow::default() },
+        }
+    }
+}
+
+impl Outputs {
+    /// Creates the files, for `steps` steps from an initial state and input.
+    pub fn new(
+        arguments: &OutputArguments,
+        scene: &Scene,
+        state: &State,
+        input: &Input,
+        steps: usize,
+    ) -> Result<Self, Failure> {
+        let files =
+            SceneExporter::new(&arguments.options(), &scene.model, scene.labels(), state, input, steps)?;
+        let summary = Summary::new(scene, steps, state.output());
+        let sample_every = (steps / SAMPLES).max(1);
+        Ok(Self { files, summary, steps: 0, sample_every })
+    }
+
+    /// Adds a step and its compute time.
+    pub fn take(
+        &mut self,
+        scene: &Scene,
+        input: &Input,
+        state: &State,
+        took: Duration,
+    ) -> Result<(), Failure> {
+        self.steps += 1;
+        self.summary.take(state.output(), took);
+        if self.steps.is_multiple_of(self.sample_every) {
+            self.summary.sample_deformation(scene, state);
+        }
+        Ok(self.files.write(&scene.model, input, state)?)
+    }
+
+    /// Completes all files.
+    pub fn finish(mut self, state: &State) -> Result<Summary, Failure> {
+        let written = self.files.finish()?;
+        let index = written.into_iter().find(|file| file.kind == "vtu").map(|file| file.path);
+        self.summary.finish(state.output(), index);
+        Ok(self.summary)
+    }
+}

@@ -1,0 +1,227 @@
+//! A scene in real time: the processes of `palpate-haptics`, with devices that follow paths or are held by simulated or real
+//! hands.
+
+use super::realtime_report::{json, text};
+use super::{Arguments, count_steps};
+use crate::commands::serve::warn_of_stores;
+use crate::failure::Failure;
+use crate::interrupt::stop_on_interrupt;
+use crate::terminal::{notify, print, print_json};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use palpate::{Pose, State};
+use palpate_export::AtomicFile;
+use palpate_haptics::link::{LinkServer, Secret};
+use palpate_haptics::log::{LogSender, LogWriter};
+use palpate_haptics::{
+    DeformationProcess, DevicePort, ObstacleTrajectory, Report, Scheduling, Session, SessionDevice, port,
+};
+use palpate_scene::{Scene, SceneDevice, SceneLog, SceneObstacle, attach_path, attach_real};
+use std::io::IsTerminal;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Options of a run in real time.
+#[derive(Args, Debug, Clone, Default)]
+pub struct RealtimeArguments {
+    /// Run by the clock, with a force process, a deformation process and a haptic update for each device
+    #[arg(long)]
+    pub realtime: bool,
+    /// Write a log (MCAP) that `palpate replay` repeats bit for bit, and that Foxglove opens
+    #[arg(long, value_name = "OUT.mcap")]
+    pub log: Option<PathBuf>,
+    /// Updates of each device per second [Hz]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
+    pub device_rate: f64,
+    /// Pictures per second that the deformation process makes; 0 for none
+    #[arg(long, value_name = "HZ", default_value_t = 60.0, allow_negative_numbers = true)]
+    pub pictures: f64,
+    /// The core that the force process stays on, counted from 0; by default the last one
+    #[arg(long, value_name = "CORE")]
+    pub core: Option<usize>,
+    /// Where devices with `linked = true` are waited for, which `palpate device` brings
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
+    pub listen: Option<SocketAddr>,
+    /// A file with the secret that both ends of a link know; needed between machines
+    #[arg(long, value_name = "FILE")]
+    pub secret: Option<PathBuf>,
+    /// Leave the passivity controllers out
+    #[arg(long)]
+    pub not_passive: bool,
+}
+
+/// Real-time priority of the force process; the haptic updates have 10 less.
+const PRIORITY: u8 = 80;
+
+/// Time without a motion after which a device is inactive [s].
+const DEVICE_TIMEOUT_S: f64 = 0.1;
+
+/// Interval of updates of the progress bar.
+const UPDATE_INTERVAL: Duration = Duration::from_millis(200);
+
+impl RealtimeArguments {
+    /// Refuses options that need `--realtime`.
+    pub(super) fn refuse(&self) -> Result<(), Failure> {
+        let option = if self.log.is_some() {
+            "--log"
+        } else if self.core.is_some() {
+            "--core"
+        } else if self.secret.is_some() {
+            "--secret"
+        } else if self.not_passive {
+            "--not-passive"
+        } else {
+            return Ok(());
+        };
+        Err(Failure(format!("{option} is of a run in real time: add --realtime")))
+    }
+}
+
+/// Runs a scene in real time.
+pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
+    let options = &arguments.realtime;
+    if arguments.outputs.writes_files() {
+        return Err(Failure(
+            "--csv, --contacts and --vtu take time that a run in real time does not have: write a log with --log, and \
+             get them from that with palpate replay"
+                .to_string(),
+        ));
+    }
+    if !(options.pictures >= 0.0 && options.pictures <= 1000.0) {
+        return Err(Failure(format!("--pictures is {}, expected 0 to 1000", options.pictures)));
+    }
+    if let Some(device) = scene.devices.iter().find(|device| device.pointer) {
+        return Err(super::pointer_without_page(&device.name));
+    }
+    // Hands without a path have no end but Ctrl-C.
+    let endless = arguments.duration.is_none() && scene.devices.iter().any(|device| device.path.is_none());
+    let steps = if endless { None } else { Some(count_steps(scene, arguments)? as u64) };
+    let log = options.log.as_deref().map(|path| begin_log(scene, path)).transpose()?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let start = Instant::now();
+    let mut linked = Vec::new();
+    let (rate, passivity) = (options.device_rate, !options.not_passive);
+    let attach = |device: &SceneDevice| match (&device.real, &device.path) {
+        (Some(real), _) => {
+            let (attached, line) = attach_real(real, device.mode, rate, passivity)?;
+            notify(&line);
+            Ok(SessionDevice::Here(attached))
+        }
+        (None, Some(path)) => {
+            let attached = attach_path(path.clone(), device.simulated, device.mode, rate, passivity);
+            Ok(SessionDevice::Here(attached))
+        }
+        (None, None) => {
+            let (device_port, force_port) = port();
+            linked.push((device.name.clone(), device_port));
+            Ok(SessionDevice::Linked(force_port, device.mode))
+        }
+    };
+    let devices: Result<Vec<_>, Failure> = scene.devices.iter().map(attach).collect();
+    let devices = devices?;
+    let server = listen(options, linked, (start, scene.model.parameters().step_s))?;
+    let session = Session {
+        model: scene.model.clone(),
+        start,
+        devices,
+        movers: movers(scene),
+        steps,
+        pictures_hz: options.pictures,
+        scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
+        patience_s: DEVICE_TIMEOUT_S,
+        state: None,
+        playback: Arc::default(),
+        cycles: None,
+    };
+    let (report, file) = watch(session, log, steps)?;
+    let links = server.map(|server| server.counts());
+    if let Some(file) = file {
+        file.finish()?;
+    }
+    if arguments.outputs.json {
+        print_json(&json(scene, &report, links))
+    } else {
+        print(&text(scene, &report, links, options.log.as_deref()))
+    }
+}
+
+/// Begins a log in an atomic file.
+fn begin_log(scene: &Scene, path: &Path) -> Result<(LogSender, LogWriter<AtomicFile>), Failure> {
+    let content = SceneLog::new(scene, None);
+    let file = AtomicFile::create(path, &content.inputs())?;
+    warn_of_stores(&content);
+    Ok(content.begin(file, &State::new(&scene.model))?)
+}
+
+/// Runs a session with a bar on a terminal, until it is done or interrupted.
+fn watch(
+    session: Session,
+    log: Option<(LogSender, LogWriter<AtomicFile>)>,
+    steps: Option<u64>,
+) -> Result<(Report, Option<AtomicFile>), Failure> {
+    let (stop, done) = (stop_on_interrupt(), AtomicU64::new(0));
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        if std::io::stderr().is_terminal() {
+            scope.spawn(|| {
+                let (bar, style) = match steps {
+                    Some(steps) => {
+                        (ProgressBar::new(steps), "{wide_bar} {pos}/{len} steps, {eta} left (Ctrl-C ends it)")
+                    }
+                    None => (ProgressBar::new_spinner(), "{spinner} {pos} steps (Ctrl-C ends it)"),
+                };
+                bar.set_style(
+                    ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()),
+                );
+                while !over.load(Ordering::Relaxed) {
+                    bar.set_position(done.load(Ordering::Relaxed));
+                    std::thread::sleep(UPDATE_INTERVAL);
+                }
+                bar.finish_and_clear();
+            });
+        }
+        let mut pictures = DeformationProcess::new(session.model.clone());
+        let ran = session.run(log, stop, &done, |moment| {
+            pictures.cycle(moment);
+        });
+        over.store(true, Ordering::Relaxed);
+        let (report, out) = ran?;
+        Ok((report, out.transpose()?))
+    })
+}
+
+/// Listens for linked devices, if there are any.
+fn listen(
+    options: &RealtimeArguments,
+    ports: Vec<(String, DevicePort)>,
+    clock: (Instant, f64),
+) -> Result<Option<LinkServer>, Failure> {
+    let Some(address) = options.listen.filter(|_| !ports.is_empty()) else { return Ok(None) };
+    let names: Vec<&str> = ports.iter().map(|(name, _)| name.as_str()).collect();
+    let text = format!(
+        "waiting at {address} for {}: palpate device {} --connect {address} …",
+        names.join(", "),
+        names[0]
+    );
+    let server = LinkServer::new(address, &read_secret(options.secret.as_deref())?, ports, clock)?;
+    notify(&text);
+    Ok(Some(server))
+}
+
+/// Secret of a file; none without one.
+pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
+    let Some(file) = file else { return Ok(Secret::none()) };
+    let text = std::fs::read_to_string(file).map_err(|e| Failure::file("read the secret", file, &e))?;
+    Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
+}
+
+fn movers(scene: &Scene) -> Vec<ObstacleTrajectory> {
+    let one = |obstacle: &SceneObstacle| -> ObstacleTrajectory {
+        let obstacle = obstacle.clone();
+        Box::new(move |t: f64| -> Pose { obstacle.pose_at(t) })
+    };
+    scene.obstacles.iter().map(one).collect()
+}

@@ -1,0 +1,196 @@
+//! Report of a run in real time, as text and as JSON.
+
+use palpate_haptics::link::LinkCounts;
+use palpate_haptics::{DeviceReport, Percentiles, Report, Timing};
+use palpate_scene::Scene;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Percentiles as JSON [µs].
+pub fn percentiles(of: Percentiles) -> Value {
+    json!({ "p50": of.p50, "p99": of.p99, "p999": of.p999, "max": of.max })
+}
+
+/// Timing of a process as JSON.
+pub fn timing(of: &Timing) -> Value {
+    json!({
+        "cycles": of.cycles(),
+        "compute_us": percentiles(of.compute_us()),
+        "lateness_us": percentiles(of.lateness_us()),
+        "overruns": of.overruns,
+        "own_overruns": of.own_overruns,
+        "skipped": of.skipped,
+    })
+}
+
+/// Report as JSON.
+pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) -> Value {
+    let devices = scene.devices.iter().zip(&report.devices).map(|(device, own)| {
+        let Some(own) = own else { return json!({ "name": device.name, "kind": "link" }) };
+        let (counts, safety) = (own.counts, own.counts.safety);
+        json!({
+            "name": device.name,
+            "kind": own.traits.kind,
+            "force_max_n": counts.force_max_n,
+            "given_j": counts.given_j,
+            "updates": counts.updates,
+            "failed": counts.failed,
+            "failure": own.failure.as_ref().map(ToString::to_string),
+            "timing": timing(&own.timing),
+            "answer_us": percentiles(own.answers.percentiles_us()),
+            "passivity": { "acted": counts.passivity_acted, "missing_max_j": counts.passivity_worst_j },
+            "safety": {
+                "clamped": safety.clamped,
+                "slewed": safety.slewed,
+                "stale": safety.stale,
+                "too_fast": safety.too_fast,
+                "not_finite": safety.not_finite,
+                "trips": safety.trips,
+            },
+        })
+    });
+    let objects = scene.object_names.iter().zip(&report.state.output().objects);
+    let objects =
+        objects.map(|(name, object)| json!({ "name": name, "position_m": object.pose.position.to_array() }));
+    json!({
+        "steps": report.steps,
+        "step_s": scene.model.parameters().step_s,
+        "wall_s": report.wall_s,
+        "steal_time_s": report.steal_time_s,
+        "granted": report.granted.to_string(),
+        "force_process": timing(&report.force),
+        "deformation_process": timing(&report.pictures),
+        "unsolved_steps": report.unsolved,
+        "max_contact_samples": scene.model.parameters().max_contact_samples,
+        "devices": devices.collect::<Vec<_>>(),
+        "objects": objects.collect::<Vec<_>>(),
+        "links": links.map(|links| json!({
+            "connected": links.connected,
+            "refused": links.refused,
+            "motions": links.motions,
+            "old": links.old,
+            "garbage": links.garbage,
+        })),
+        "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed })),
+    })
+}
+
+/// Report as text.
+pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, log: Option<&Path>) -> String {
+    let step_s = scene.model.parameters().step_s;
+    let line = |name: &str, of: Percentiles| {
+        format!("  {name:<22} {:>9.1} {:>9.1} {:>9.1} {:>9.1}\n", of.p50, of.p99, of.p999, of.max)
+    };
+    let mut out = format!(
+        "{} steps at {:.0} Hz in {:.3} s; force process: {}\n\n  {:<22} {:>9} {:>9} {:>9} {:>9}\n",
+        report.steps,
+        1.0 / step_s,
+        report.wall_s,
+        report.granted,
+        "µs",
+        "median",
+        "99 %",
+        "99.9 %",
+        "most"
+    );
+    out += &line("force: compute", report.force.compute_us());
+    out += &line("force: lateness", report.force.lateness_us());
+    if report.pictures.cycles() > 0 {
+        out += &line("deformation: compute", report.pictures.compute_us());
+    }
+    let here = || {
+        scene.devices.iter().zip(&report.devices).filter_map(|(device, own)| Some((device, own.as_ref()?)))
+    };
+    for (device, own) in here() {
+        out += &line(&format!("{}: motion to force", device.name), own.answers.percentiles_us());
+    }
+    out += "\n";
+    out += &overruns(report, step_s);
+    if let Some(steal_time_s) = report.steal_time_s.filter(|steal_time_s| *steal_time_s > 0.0) {
+        let share = 100.0 * steal_time_s / report.wall_s;
+        out += &format!(
+            "  stolen       {steal_time_s:.2} s of its core ({share:.2} %) went to something else on the machine below this one\n"
+        );
+    }
+    for (device, own) in here() {
+        out += &format!("  {:<12} {}\n", device.name, device_line(own));
+    }
+    if let Some(LinkCounts { connected, refused, motions, old, garbage }) = links {
+        out += &format!(
+            "  links        {connected} devices came, {refused} were refused; {motions} motions, {old} late or doubled, \
+             {garbage} no motions\n"
+        );
+    }
+    let parameters = scene.model.parameters();
+    if !parameters.obstacles.is_empty() {
+        out += &format!(
+            "  contacts     objects meet obstacles at {} places at most (max_contact_samples)\n",
+            parameters.max_contact_samples
+        );
+    }
+    if report.unsolved > 0 {
+        out += &format!(
+            "  warning      in {} steps contacts could not be solved, or were left out\n",
+            report.unsolved
+        );
+    }
+    if let (Some(summary), Some(path)) = (report.log, log) {
+        out += &format!("  log          {} steps in {}", summary.steps, path.display());
+        if summary.missed > 0 {
+            out += &format!(
+                ", {} MISSED: the disk was too slow, a replay ends where they begin",
+                summary.missed
+            );
+        }
+        out += "\n";
+    }
+    out
+}
+
+/// Forces, passivity and safety of a device, in a line.
+pub fn device_line(own: &DeviceReport) -> String {
+    let (counts, safety) = (own.counts, own.counts.safety);
+    let mut out = format!("{}, {:.4} N at most", own.traits.kind, counts.force_max_n);
+    if own.traits.force_n.is_infinite() {
+        return out;
+    }
+    out += &format!(
+        "; gave the hand {:+.3e} J; passivity acted in {} of {} updates",
+        counts.given_j, counts.passivity_acted, counts.updates
+    );
+    let faults = [
+        (safety.clamped, "clamped"),
+        (safety.slewed, "slewed"),
+        (safety.stale, "stale"),
+        (safety.too_fast, "too fast"),
+        (safety.not_finite, "no number"),
+        (safety.trips, "trips"),
+        (counts.failed, "failed"),
+    ];
+    let met = faults.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    let met: Vec<String> = met.collect();
+    out += &if met.is_empty() {
+        "; safety met nothing".to_string()
+    } else {
+        format!("; safety: {}", met.join(", "))
+    };
+    match &own.failure {
+        Some(failure) => out + &format!("; the first that failed: {failure}"),
+        None => out,
+    }
+}
+
+/// Overruns of the force process, in a line.
+fn overruns(report: &Report, step_s: f64) -> String {
+    let Timing { overruns, own_overruns, skipped, .. } = report.force;
+    if overruns == 0 {
+        return "  overruns     none: every cycle was done before the next was due\n".to_string();
+    }
+    format!(
+        "  overruns     {overruns} of {} cycles: {own_overruns} took longer than {:.3} ms by themselves, {} woke up late; \
+         {skipped} ticks were passed over to be on the grid again\n",
+        report.force.cycles(),
+        1e3 * step_s,
+        overruns - own_overruns
+    )
+}

@@ -1,0 +1,274 @@
+//! Summary of a run, as text and as JSON.
+
+use glam::DVec3;
+use palpate::{Output, State, StepStatus};
+use palpate_scene::Scene;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Displacement, as a share of the object's diagonal, above which linear elasticity is inaccurate.
+const LARGE_DEFORMATION: f64 = 0.1;
+
+/// Summary of a run.
+pub struct Summary {
+    steps: usize,
+    /// Force on the hand by device and step [N].
+    pub forces: Vec<Vec<DVec3>>,
+    last: Output,
+    /// Maxima over all steps.
+    status: StepStatus,
+    /// Steps with unsolved islands, and steps with dropped contacts.
+    unsolved_steps: usize,
+    dropping_steps: usize,
+    /// Largest number of contacts in a step, and largest contact force [N].
+    most_contacts: usize,
+    most_contact_force: f64,
+    start_energy: f64,
+    /// Compute time of each step [ns], sorted.
+    times_ns: Vec<u32>,
+    index: Option<PathBuf>,
+    /// Largest sampled displacement of the surface, by object [m].
+    deformation: Vec<f64>,
+}
+
+impl Summary {
+    /// Summary before the first step.
+    pub(super) fn new(scene: &Scene, steps: usize, start: &Output) -> Self {
+        Self {
+            steps,
+            forces: vec![Vec::with_capacity(steps); scene.devices.len()],
+            last: start.clone(),
+            status: StepStatus::default(),
+            unsolved_steps: 0,
+            dropping_steps: 0,
+            most_contacts: 0,
+            most_contact_force: 0.0,
+            start_energy: start.energy.stored(),
+            times_ns: Vec::with_capacity(steps),
+            index: None,
+            deformation: vec![0.0; scene.object_names.len()],
+        }
+    }
+
+    /// Adds a step and its compute time.
+    pub(super) fn take(&mut self, output: &Output, took: Duration) {
+        self.times_ns.push(took.as_nanos().min(u128::from(u32::MAX)) as u32);
+        for (forces, device) in self.forces.iter_mut().zip(&output.devices) {
+            forces.push(device.force_on_hand);
+        }
+        let (all, now) = (&mut self.status, &output.status);
+        all.solver_residual_m = all.solver_residual_m.max(now.solver_residual_m);
+        all.iterations = all.iterations.max(now.iterations);
+        all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
+        all.dropped_contacts = all.dropped_contacts.max(now.dropped_contacts);
+        self.unsolved_steps += usize::from(now.unsolved_islands > 0);
+        self.dropping_steps += usize::from(now.dropped_contacts > 0);
+        self.most_contacts = self.most_contacts.max(output.contacts.len());
+        let forces = output.contacts.iter().map(|contact| contact.force.length());
+        self.most_contact_force = forces.fold(self.most_contact_force, f64::max);
+    }
+
+    /// Completes the summary after the last step.
+    pub(super) fn finish(&mut self, last: &Output, index: Option<PathBuf>) {
+        self.times_ns.sort_unstable();
+        self.last = last.clone();
+        self.index = index;
+    }
+
+    /// Samples the deformation.
+    pub(super) fn sample_deformation(&mut self, scene: &Scene, state: &State) {
+        for (object, (recording, largest)) in scene.model.recordings().zip(&mut self.deformation).enumerate()
+        {
+            let mut displacement = vec![DVec3::ZERO; recording.surface.positions.len()];
+            state.surface_displacement(&scene.model, object, &mut displacement);
+            *largest = displacement.iter().map(|u| u.length()).fold(*largest, f64::max);
+        }
+    }
+
+    /// Quantile of the compute times [µs].
+    pub fn time_us(&self, share: f64) -> f64 {
+        percentile_us(&self.times_ns, share)
+    }
+
+    /// Summary as JSON.
+    pub fn json(&self, scene: &Scene) -> Value {
+        let last_force = |forces: &Vec<DVec3>| forces.last().copied().unwrap_or_default();
+        let devices: Vec<Value> = scene
+            .devices
+            .iter()
+            .zip(&self.forces)
+            .map(|(device, forces)| {
+                json!({
+                    "name": device.name,
+                    "force_last_n": last_force(forces).length(),
+                    "force_max_n": largest(forces),
+                    "force_last_xyz_n": last_force(forces).to_array(),
+                })
+            })
+            .collect();
+        let objects: Vec<Value> = scene
+            .object_names
+            .iter()
+            .zip(&self.last.objects)
+            .zip(&self.deformation)
+            .map(|((name, object), deformation)| {
+                let q = object.pose.orientation;
+                json!({
+                    "name": name,
+                    "position_m": object.pose.position.to_array(),
+                    "orientation": [q.w, q.x, q.y, q.z],
+                    "velocity_m_s": object.twist.linear.to_array(),
+                    "angular_velocity_rad_s": object.twist.angular.to_array(),
+                    "displacement_max_m": deformation,
+                })
+            })
+            .collect();
+        let energy = &self.last.energy;
+        json!({
+            "steps": self.steps,
+            "step_s": scene.model.parameters().step_s,
+            "devices": devices,
+            "objects": objects,
+            "contacts": { "most": self.most_contacts, "most_force_n": self.most_contact_force },
+            "energy_j": {
+                "kinetic": energy.kinetic,
+                "elastic": energy.elastic,
+                "residual": energy.residual,
+                "potential": energy.potential,
+                "coupling": energy.coupling,
+                "input": energy.input,
+                "dissipated": energy.dissipated,
+                "friction": energy.friction,
+                "impact": energy.impact,
+                "defect": energy.defect,
+                "stored_at_start": self.start_energy,
+            },
+            "timing_us": {
+                "p50": self.time_us(0.5),
+                "p99": self.time_us(0.99),
+                "p999": self.time_us(0.999),
+                "max": self.time_us(1.0),
+            },
+            "solver": {
+                "held_point_miss_max_m": self.status.solver_residual_m,
+                "iterations_max": self.status.iterations,
+                "dependent_rows": self.status.dependent_rows,
+                "dropped_contacts": self.status.dropped_contacts,
+                "unsolved_steps": self.unsolved_steps,
+            },
+        })
+    }
+
+    /// Summary as text.
+    pub fn text(&self, scene: &Scene) -> String {
+        let step_s = scene.model.parameters().step_s;
+        let mut out = format!("{} steps of {} ms = {:.4} s\n", self.steps, 1000.0 * step_s, self.last.time_s);
+        for (device, forces) in scene.devices.iter().zip(&self.forces) {
+            let last = forces.last().copied().unwrap_or_default();
+            out += &format!(
+                "  {:<12} force on the hand {:.5} N at the end, {:.5} N at most\n",
+                device.name,
+                last.length(),
+                largest(forces)
+            );
+        }
+        for ((name, object), deformation) in
+            scene.object_names.iter().zip(&self.last.objects).zip(&self.deformation)
+        {
+            // Adding 0 turns −0 into 0.
+            let (p, v) = (object.pose.position + DVec3::ZERO, object.twist.linear + DVec3::ZERO);
+            out += &format!(
+                "  {name:<12} centre ({:.5}, {:.5}, {:.5}) m, velocity ({:.4}, {:.4}, {:.4}) m/s, deformed by up to {:.2} mm\n",
+                p.x,
+                p.y,
+                p.z,
+                v.x,
+                v.y,
+                v.z,
+                1000.0 * deformation
+            );
+        }
+        if self.most_contacts > 0 {
+            out += &format!(
+                "  contacts     {} at once at most, {:.5} N in one at most\n",
+                self.most_contacts, self.most_contact_force
+            );
+        }
+        out += &self.energy_line(scene);
+        out += &format!(
+            "  step time    {:.1} µs median; 99 % below {:.1}, 99.9 % below {:.1}, all below {:.1}\n",
+            self.time_us(0.5),
+            self.time_us(0.99),
+            self.time_us(0.999),
+            self.time_us(1.0)
+        );
+        let recordings = scene.model.recordings().zip(&scene.object_names).zip(&self.deformation);
+        for ((recording, name), deformation) in recordings {
+            let share = deformation / recording.surface.diagonal();
+            if share > LARGE_DEFORMATION {
+                out += &format!(
+                    "  warning      {name} deforms by {:.0} % of its size; linear elasticity is meant for small strain\n",
+                    100.0 * share
+                );
+            }
+        }
+        if self.unsolved_steps > 0 {
+            out += &format!(
+                "  warning      in {} steps contacts could not be solved, and gave a part of their force or none: use a shorter step\n",
+                self.unsolved_steps
+            );
+        }
+        if self.dropping_steps > 0 {
+            out += &format!(
+                "  warning      in {} steps contacts were left out, up to {} at once: raise max_contact_points above {}\n",
+                self.dropping_steps,
+                self.status.dropped_contacts,
+                scene.model.parameters().max_contact_points
+            );
+        }
+        if self.status.dependent_rows > 0 {
+            out += &format!(
+                "  warning      {} held directions repeat others and were given no force\n",
+                self.status.dependent_rows
+            );
+        }
+        if let Some(index) = &self.index {
+            out += &format!("  surfaces     {} (open it in ParaView)\n", index.display());
+        }
+        out
+    }
+
+    /// Energy balance as a line.
+    fn energy_line(&self, scene: &Scene) -> String {
+        let energy = &self.last.energy;
+        let moving = scene.obstacles.iter().any(|obstacle| obstacle.path.is_some());
+        let movers = if moving { "hands and obstacles" } else { "the hands" };
+        let mut lost = format!("{:.3e} J dissipated", energy.dissipated);
+        if energy.friction != 0.0 || energy.impact != 0.0 {
+            // Pushing out what penetrates gives energy back.
+            let sign = if energy.impact < 0.0 { '+' } else { '-' };
+            lost += &format!(
+                " - {:.3e} J in friction {sign} {:.3e} J in impacts",
+                energy.friction,
+                energy.impact.abs()
+            );
+        }
+        format!(
+            "  energy       {:+.3e} J stored since the start = {:+.3e} J from {movers} - {lost}, to {:.0e} J\n",
+            energy.stored() - self.start_energy,
+            energy.input,
+            energy.defect.abs()
+        )
+    }
+}
+
+/// Quantile [µs] of sorted times [ns].
+pub fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
+    let at = (share * sorted_ns.len() as f64).ceil() as usize;
+    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
+}
+
+fn largest(forces: &[DVec3]) -> f64 {
+    forces.iter().map(|force| force.length()).fold(0.0, f64::max)
+}

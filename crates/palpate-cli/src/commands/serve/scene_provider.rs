@@ -1,0 +1,140 @@
+//! Scenes for the viewer's server, from a library of scenes, with their logs.
+
+use super::log_series::LogSeries;
+use crate::failure::Failure;
+use crate::terminal::notify;
+use palpate::{DeviceMode, Material};
+use palpate_render::describe_scene;
+use palpate_scene::{
+    BUILT_IN_SCENES, MeshUpload, OpenedScene, ProgressFn, RealDevice, SceneDevice, SceneLibrary, SceneLog,
+    SettingsChange, attach_path, attach_real,
+};
+use palpate_viewer::{
+    MaterialDescription, PhysicsSettings, ProgressCallback, SceneProvider, SceneSummary, SharedTrajectory,
+    Upload, ViewerDevice, ViewerScene,
+};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Update rate of devices on this machine [Hz].
+const DEVICE_HZ: f64 = 1000.0;
+
+/// Scene library behind the interface of the viewer's server.
+pub struct LibraryProvider {
+    library: SceneLibrary,
+    logs: Option<Arc<LogSeries>>,
+}
+
+impl LibraryProvider {
+    /// Provider with a cache folder of recordings, or the user's; and with a series of logs.
+    pub fn new(cache: Option<&Path>, logs: Option<Arc<LogSeries>>) -> Result<Self, Failure> {
+        Ok(Self { library: SceneLibrary::new(cache)?, logs })
+    }
+
+    /// Opens a scene file, and prints its remarks.
+    pub fn open_file(&self, path: &Path) -> Result<ViewerScene, Failure> {
+        let opened = self.library.open_file(path)?;
+        let remarks = opened.remarks.iter().map(|remark| format!("warning: {remark}"));
+        let messages: Vec<String> = remarks.chain(opened.scene.choices.iter().cloned()).collect();
+        let scene = self.viewer_scene(opened)?;
+        messages.iter().for_each(|line| notify(line));
+        Ok(scene)
+    }
+
+    fn viewer_scene(&self, opened: OpenedScene) -> Result<ViewerScene, Failure> {
+        let OpenedScene { scene, text, id, title, about, recordable, .. } = opened;
+        let description = describe_scene(&scene, (id, title, about), &recordable);
+        let content = SceneLog::new(&scene, Some(text));
+        let log = self.logs.as_ref().map(|logs| logs.opener(content)).transpose()?;
+        let movers = scene.obstacles.iter().map(|obstacle| {
+            let obstacle = obstacle.clone();
+            Arc::new(move |t: f64| obstacle.pose_at(t)) as SharedTrajectory
+        });
+        Ok(ViewerScene {
+            description,
+            model: scene.model.clone(),
+            devices: scene.devices.iter().map(viewer_device).collect(),
+            movers: movers.collect(),
+            log,
+        })
+    }
+
+    /// Scene of a result, with errors as text.
+    fn provided<E: Into<Failure>>(&self, opened: Result<OpenedScene, E>) -> Result<ViewerScene, String> {
+        opened.map_err(Into::into).and_then(|opened| self.viewer_scene(opened)).map_err(|failure| failure.0)
+    }
+}
+
+impl SceneProvider for LibraryProvider {
+    fn titles(&self) -> Vec<SceneSummary> {
+        let summary = |scene: &palpate_scene::BuiltInScene| SceneSummary {
+            id: scene.id.into(),
+            title: scene.title.into(),
+            about: scene.about.into(),
+        };
+        BUILT_IN_SCENES.iter().map(summary).collect()
+    }
+
+    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, String> {
+        self.provided(self.library.open_built_in(id, &mut ProgressFn::new(tell)))
+    }
+
+    fn change(&self, settings: &PhysicsSettings) -> Result<ViewerScene, String> {
+        let coupling = settings
+            .coupling
+            .map(|coupling| palpate::Coupling { stiffness: coupling.stiffness, damping: coupling.damping });
+        let PhysicsSettings { gravity, step, friction, .. } = *settings;
+        self.provided(self.library.change_settings(&SettingsChange {
+            gravity,
+            step_s: step,
+            friction,
+            coupling,
+        }))
+    }
+
+    fn change_material(
+        &self,
+        object: usize,
+        material: MaterialDescription,
+        tell: ProgressCallback,
+    ) -> Result<ViewerScene, String> {
+        let progress = &mut ProgressFn::new(tell);
+        self.provided(self.library.change_material(object, uniform(material), progress))
+    }
+
+    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, String> {
+        let Upload { name, bytes, scale, material, modes } = upload;
+        let upload = MeshUpload { name, bytes, scale, material: uniform(material), modes };
+        self.provided(self.library.record_upload(upload, &mut ProgressFn::new(tell)))
+    }
+}
+
+/// Material of all regions.
+fn uniform(material: MaterialDescription) -> Material {
+    let MaterialDescription { young, poisson, density } = material;
+    Material { region: String::new(), young_pa: young, poisson, density_kg_m3: density }
+}
+
+fn viewer_device(device: &SceneDevice) -> ViewerDevice {
+    match (&device.real, &device.path) {
+        (Some(real), _) => {
+            let (real, mode): (RealDevice, DeviceMode) = (real.clone(), device.mode);
+            ViewerDevice::Here(Arc::new(move || {
+                let (attached, line) =
+                    attach_real(&real, mode, DEVICE_HZ, true).map_err(|error| error.to_string())?;
+                notify(&line);
+                Ok(attached)
+            }))
+        }
+        (None, Some(path)) => match device.simulated {
+            None => ViewerDevice::Following(path.clone(), device.mode),
+            simulated => {
+                let (path, mode) = (path.clone(), device.mode);
+                ViewerDevice::Here(Arc::new(move || {
+                    Ok(attach_path(path.clone(), simulated, mode, DEVICE_HZ, true))
+                }))
+            }
+        },
+        (None, None) => ViewerDevice::Pointer,
+    }
+}

@@ -1,0 +1,115 @@
+//! CSV files: a row per step, and a row per contact and step.
+
+use crate::atomic_file::AtomicFile;
+use crate::error::ExportError;
+use crate::labels::SceneLabels;
+use palpate::{Collider, Input, Output};
+use std::path::{Path, PathBuf};
+
+/// Rows of numbers, written so that they parse to the same bits.
+struct Rows {
+    file: AtomicFile,
+}
+
+impl Rows {
+    fn new(path: &Path, labels: &SceneLabels, header: &str) -> Result<Self, ExportError> {
+        let mut rows = Self { file: AtomicFile::create(path, &labels.input_paths())? };
+        rows.line(header)?;
+        Ok(rows)
+    }
+
+    fn line(&mut self, text: &str) -> Result<(), ExportError> {
+        self.file.write(format!("{text}\n").as_bytes())
+    }
+}
+
+fn joined(numbers: impl IntoIterator<Item = f64>) -> String {
+    let cells: Vec<String> = numbers.into_iter().map(|number| format!("{number:?}")).collect();
+    cells.join(",")
+}
+
+/// Writer of one row per step: poses, forces, velocities and energies.
+pub struct StepsCsv {
+    rows: Rows,
+}
+
+impl StepsCsv {
+    /// Creates the file and writes its header.
+    pub fn new(path: &Path, labels: &SceneLabels) -> Result<Self, ExportError> {
+        let mut columns = vec!["t".to_string()];
+        for device in &labels.devices {
+            let parts = ["x", "y", "z", "fx", "fy", "fz", "proxy_x", "proxy_y", "proxy_z"];
+            columns.extend(parts.map(|c| format!("{}.{c}", device.name)));
+        }
+        for name in &labels.objects {
+            let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
+            columns.extend(parts.map(|c| format!("{name}.{c}")));
+        }
+        let stored = ["kinetic", "elastic", "residual", "potential", "coupling"];
+        let passed = ["input", "dissipated", "friction", "impact", "defect"];
+        columns.extend(stored.into_iter().chain(passed).map(|c| format!("energy.{c}")));
+        Ok(Self { rows: Rows::new(path, labels, &columns.join(","))? })
+    }
+
+    /// Writes the row of a step.
+    pub fn write(&mut self, input: &Input, output: &Output) -> Result<(), ExportError> {
+        let mut numbers = vec![output.time_s];
+        for (device, out) in input.devices.iter().zip(&output.devices) {
+            numbers.extend(device.position.to_array());
+            numbers.extend(out.force_on_hand.to_array());
+            numbers.extend(out.proxy.to_array());
+        }
+        for object in &output.objects {
+            let q = object.pose.orientation;
+            numbers.extend(object.pose.position.to_array());
+            numbers.extend([q.w, q.x, q.y, q.z]);
+            numbers.extend(object.twist.linear.to_array());
+            numbers.extend(object.twist.angular.to_array());
+        }
+        let e = &output.energy;
+        numbers.extend([e.kinetic, e.elastic, e.residual, e.potential, e.coupling]);
+        numbers.extend([e.input, e.dissipated, e.friction, e.impact, e.defect]);
+        self.rows.line(&joined(numbers))
+    }
+
+    /// Renames the file to its final path; returns it.
+    pub fn finish(self) -> Result<PathBuf, ExportError> {
+        self.rows.file.finish()
+    }
+}
+
+/// Writer of one row per contact and step.
+pub struct ContactsCsv {
+    rows: Rows,
+}
+
+impl ContactsCsv {
+    /// Creates the file and writes its header.
+    pub fn new(path: &Path, labels: &SceneLabels) -> Result<Self, ExportError> {
+        let header = "t,object,against,px,py,pz,nx,ny,nz,fx,fy,fz,gap,slip_speed";
+        Ok(Self { rows: Rows::new(path, labels, header)? })
+    }
+
+    /// Writes the contacts of a step.
+    pub fn write(&mut self, labels: &SceneLabels, output: &Output) -> Result<(), ExportError> {
+        for contact in &output.contacts {
+            let against = match contact.against {
+                Collider::Device(at) => &labels.devices[at].name,
+                Collider::Obstacle(at) => &labels.obstacles[at],
+                Collider::Object(at) => &labels.objects[at],
+            };
+            let vectors = [contact.point, contact.normal, contact.force].into_iter();
+            let numbers = vectors.flat_map(|v| v.to_array()).chain([contact.gap, contact.slip_speed]);
+            // −0 + 0 = 0.
+            let numbers = numbers.map(|number| number + 0.0);
+            let object = &labels.objects[contact.object];
+            self.rows.line(&format!("{:?},{object},{against},{}", output.time_s, joined(numbers)))?;
+        }
+        Ok(())
+    }
+
+    /// Renames the file to its final path; returns it.
+    pub fn finish(self) -> Result<PathBuf, ExportError> {
+        self.rows.file.finish()
+    }
+}

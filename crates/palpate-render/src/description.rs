@@ -1,0 +1,20 @@
+//! Description of a scene for the viewer's pages.
+
+use palpate_scene::{Scene, certificate_lines};
+use palpate_viewer::{ObjectDescription, SceneDescription};
+
+/// Description of a scene, with its identifier, title and description, and whether its objects can be recorded again.
+pub fn describe_scene(
+    scene: &Scene,
+    titles: (Option<String>, String, String),
+    recordable: &[bool],
+) -> SceneDescription {
+    let recordings = scene.model.recordings().zip(&scene.object_names).enumerate();
+    let objects = recordings.map(|(at, (recording, name))| {
+        let again = recordable.get(at).copied().unwrap_or(false);
+        ObjectDescription::new(name, recording, certificate_lines(recording), again)
+    });
+    let devices: Vec<(String, bool)> =
+        scene.devices.iter().map(|device| (device.name.clone(), device.pointer)).collect();
+    SceneDescription::new(titles, &scene.model, objects.collect(), &scene.names().obstacles, &devices)
+}

@@ -1,0 +1,25 @@
+//! Images of a log: its frames are computed again, and drawn by the viewer's page in a headless browser.
+//!
+//! ```text
+//! log → LogReplay → LogFramePlayer → LogFrames → viewer's server ⇄ page in a browser → PNG → GIF
+//! ```
+//!
+//! The same frames are what the viewer shows of a log; [`describe_scene`] is the description that its pages get.
+
+#![deny(missing_docs)]
+
+mod browser;
+mod description;
+mod error;
+mod gif;
+mod log_frames;
+
+pub use browser::{ImageSink, find_browser, program_runs, render_log};
+pub use description::describe_scene;
+pub use error::RenderError;
+pub use gif::write_gif;
+pub use log_frames::{FrameSpacing, LogFramePlayer};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

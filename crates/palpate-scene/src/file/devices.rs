@@ -1,0 +1,312 @@
+//! `[[device]]`: devices that hold a point, and tips that touch.
+
+use super::coupling;
+use super::drivers::read_real;
+use super::keys::{AttachEntry, DeviceEntry, SimulatedEntry};
+use super::source::{Quantity, Source};
+use crate::error::{SceneError, SceneErrorKind};
+use crate::scene::SceneDevice;
+use glam::DVec3;
+use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
+use palpate_haptics::Columns;
+use palpate_haptics::device::{Hand, Traits};
+use toml::Spanned;
+
+/// Allowed distance of a held point from the surface, as a share of the object's diagonal.
+const OFF_SURFACE: f64 = 0.05;
+
+/// Distance of a device's start from its held point that gets a remark, as a share of the diagonal.
+const FAR_START: f64 = 0.01;
+
+/// Patch radii, in mean edges, below which quadratic and linear elements are too stiff by more than 2 to 3 % (measured,
+/// docs/contact.md).
+const SMOOTH_PATCH: f64 = 3.0;
+const SMOOTH_PATCH_LINEAR: f64 = 6.0;
+
+/// Parameters of a device for the model, with a check of keys that exclude one another.
+pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParameters, SceneError> {
+    let coupling = match device.coupling.as_ref() {
+        Some(choice) => coupling::read_gains(source, choice)?,
+        None => None,
+    };
+    match (device.mode.get_ref().as_str(), &device.attach) {
+        ("held", Some(_)) => {
+            refuse_touch_keys(source, device)?;
+            Ok(DeviceParameters { coupling, ..DeviceParameters::default() })
+        }
+        ("held", None) => source.fail(
+            device.mode.span(),
+            SceneErrorKind::Missing,
+            "attach",
+            "mode = \"held\" needs attach = { object = \"…\", point = [x, y, z] }, the point that the device holds",
+        ),
+        ("touch", None) => touch_parameters(source, device, coupling),
+        ("touch", Some(attach)) => source.fail(
+            attach.span(),
+            SceneErrorKind::Conflict,
+            "attach",
+            "attach is of a device that holds a point; with mode = \"touch\" leave it out",
+        ),
+        (other, _) => {
+            let message = format!("mode is {other:?}, expected \"held\" or \"touch\"");
+            source.fail(device.mode.span(), SceneErrorKind::UnknownValue, "mode", message)
+        }
+    }
+}
+
+/// Device with its held point and its path.
+pub(super) fn read_device(
+    source: &Source,
+    device: &DeviceEntry,
+    parameters: DeviceParameters,
+    objects: &[ModelObject],
+    object_names: &[String],
+    remarks: &mut Vec<String>,
+) -> Result<SceneDevice, SceneError> {
+    let mode = match &device.attach {
+        Some(attach) => {
+            DeviceMode::Held(read_grasp(source, device, attach.get_ref(), objects, object_names)?)
+        }
+        None => DeviceMode::Touch,
+    };
+    let linked = device.linked.as_ref().filter(|linked| *linked.get_ref());
+    if let (Some(linked), true) = (linked, device.path.is_some() || device.simulated.is_some()) {
+        return source.fail(
+            linked.span(),
+            SceneErrorKind::Conflict,
+            "linked",
+            "a linked device has its path, or its hand, in the process that it is in: leave path and simulated out",
+        );
+    }
+    let pointer = device.pointer.as_ref().filter(|pointer| *pointer.get_ref());
+    if let Some(pointer) = pointer {
+        refuse_other_hands(source, device, pointer)?;
+    }
+    let real = read_real(source, device)?;
+    let path = match (&device.path, linked.or(pointer)) {
+        (None, None) if real.is_none() => {
+            return source.fail(
+                device.name.span(),
+                SceneErrorKind::Missing,
+                "path",
+                "the device needs path = { file = \"…\" }, driver = { kind = \"…\" } if it is a real one, linked = true if it is \
+                 in another process, or pointer = true if it is a pointer of the viewer",
+            );
+        }
+        (entry, _) => entry.as_ref().map(|entry| source.motion_path(entry, Columns::Position)).transpose()?,
+    };
+    let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
+    let pointer = pointer.is_some();
+    let device =
+        SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real, pointer };
+    remarks.extend(far_start(&device, objects));
+    remarks.extend(small_patches(&device, objects, object_names));
+    Ok(device)
+}
+
+/// Checks that a pointer has no other source of motion and no held point.
+fn refuse_other_hands(
+    source: &Source,
+    device: &DeviceEntry,
+    pointer: &Spanned<bool>,
+) -> Result<(), SceneError> {
+    let other = device.path.is_some() || device.simulated.is_some() || device.driver.is_some();
+    if other || device.linked.is_some() {
+        return source.fail(
+            pointer.span(),
+            SceneErrorKind::Conflict,
+            "pointer",
+            "a pointer is where the viewer's page says: leave path, simulated, driver and linked out",
+        );
+    }
+    match &device.attach {
+        Some(attach) => source.fail(
+            attach.span(),
+            SceneErrorKind::Conflict,
+            "attach",
+            "a pointer holds what it is pressed on: leave attach out, and say mode = \"touch\"",
+        ),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), SceneError> {
+    let traits = find_device_traits(entry.device.get_ref());
+    let traits = traits
+        .or_else(|what| source.fail(entry.device.span(), SceneErrorKind::UnknownValue, "device", what))?;
+    let hand = match &entry.grip {
+        None => Hand::FIRM,
+        Some(grip) => {
+            let hand = find_grip(grip.get_ref());
+            hand.or_else(|what| source.fail(grip.span(), SceneErrorKind::UnknownValue, "grip", what))?
+        }
+    };
+    Ok((traits, hand))
+}
+
+/// Device traits by name.
+///
+/// # Errors
+/// A message with the known names.
+pub fn find_device_traits(name: &str) -> Result<Traits, String> {
+    let known = || Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
+    Traits::named(name).ok_or_else(|| format!("device is {name:?}, expected one of {}", known()))
+}
+
+/// Hand by the name of its grip.
+///
+/// # Errors
+/// A message with the known names.
+pub fn find_grip(name: &str) -> Result<Hand, String> {
+    match name {
+        "firm" => Ok(Hand::FIRM),
+        "light" => Ok(Hand::LIGHT),
+        "fingertip" => Ok(Hand::FINGERTIP),
+        other => Err(format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\"")),
+    }
+}
+
+fn touch_parameters(
+    source: &Source,
+    device: &DeviceEntry,
+    coupling: Option<Coupling>,
+) -> Result<DeviceParameters, SceneError> {
+    let length = |key, number| source.not_negative(number, Quantity::length(key));
+    let tip_radius = device.tip_radius.as_ref().map_or(Ok(0.0), |number| length("tip_radius", number))?;
+    let patch_radius =
+        device.patch_radius.as_ref().map_or(Ok(tip_radius), |number| length("patch_radius", number))?;
+    let friction = source.friction(device.friction.as_ref())?;
+    Ok(DeviceParameters { tip_radius, patch_radius, friction, coupling })
+}
+
+/// Checks that a held point has no keys of a tip.
+fn refuse_touch_keys(source: &Source, device: &DeviceEntry) -> Result<(), SceneError> {
+    let keys = [
+        ("tip_radius", &device.tip_radius),
+        ("patch_radius", &device.patch_radius),
+        ("friction", &device.friction),
+    ];
+    for (key, number) in keys {
+        if let Some(number) = number {
+            return source.fail(
+                number.span(),
+                SceneErrorKind::Conflict,
+                key,
+                format!("{key} is of a device that touches; with mode = \"held\" leave it out"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Material point that a device holds.
+fn read_grasp(
+    source: &Source,
+    device: &DeviceEntry,
+    attach: &AttachEntry,
+    objects: &[ModelObject],
+    object_names: &[String],
+) -> Result<Grasp, SceneError> {
+    let name = device.name.get_ref();
+    let wanted = attach.object.get_ref();
+    let Some(object) = object_names.iter().position(|name| name == wanted) else {
+        let known = object_names.join(", ");
+        let message = format!("there is no object {wanted:?}; the scene has {known}");
+        return source.fail(attach.object.span(), SceneErrorKind::UnknownValue, "object", message);
+    };
+    let ModelObject { recording, response, .. } = &objects[object];
+    let point_span = attach.point.span();
+    let point = DVec3::from_array(attach.point.get_ref().0);
+    let allowed = OFF_SURFACE * recording.surface.diagonal();
+    let grasp = match recording.surface.nearest(point) {
+        Some((point, distance)) if distance <= allowed => Grasp { object, point },
+        Some((_, distance)) => {
+            return source.fail(
+                point_span,
+                SceneErrorKind::Grasp,
+                "point",
+                format!(
+                    "the point {point} is {distance:.4} m from the surface of {wanted:?}, at most {allowed:.4} m are \
+                     allowed; it is given in the body frame, whose origin is the centre of mass"
+                ),
+            );
+        }
+        None => {
+            let message = format!("the object {wanted:?} has no surface");
+            return source.fail(point_span, SceneErrorKind::Grasp, "point", message);
+        }
+    };
+    match response {
+        ResponseForm::Modal if !recording.is_movable(&grasp.point) => {
+            return source.fail(
+                point_span,
+                SceneErrorKind::Grasp,
+                "point",
+                format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
+            );
+        }
+        ResponseForm::Modal => {}
+        ResponseForm::Fir(table) => {
+            if let Err(error) = table.prepare(&recording.surface, &grasp.point) {
+                let message = format!("device {name:?} on {wanted:?}: {error}");
+                return source.fail(point_span, SceneErrorKind::Table, "point", message);
+            }
+        }
+    }
+    Ok(grasp)
+}
+
+/// Checks that no two devices hold the same point: no force could satisfy both.
+pub(super) fn check_grasps(
+    source: &Source,
+    entries: &[DeviceEntry],
+    devices: &[SceneDevice],
+) -> Result<(), SceneError> {
+    for (at, (device, entry)) in devices.iter().zip(entries).enumerate() {
+        let holds = |other: &&SceneDevice| other.mode == device.mode && device.mode != DeviceMode::Touch;
+        if let (Some(other), Some(attach)) = (devices[..at].iter().find(holds), &entry.attach) {
+            return source.fail(
+                attach.get_ref().point.span(),
+                SceneErrorKind::Grasp,
+                "point",
+                format!("device {:?} holds the same point as {:?}", device.name, other.name),
+            );
+        }
+    }
+    Ok(())
+}
+
+fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<String> {
+    let DeviceMode::Held(grasp) = device.mode else { return None };
+    let ModelObject { recording, start, .. } = &objects[grasp.object];
+    let held = start.pose.world_from_body(recording.surface.rest_position(&grasp.point));
+    let distance = (device.path.as_ref()?.at(0.0).position - held).length();
+    let pulled = match device.parameters.coupling {
+        None => "the point is pulled there in the first step",
+        Some(_) => "the coupling pulls it there from the first step on",
+    };
+    (distance > FAR_START * recording.surface.diagonal()).then(|| {
+        format!("device {:?} starts {distance:.4} m from the point that it holds: {pulled}", device.name)
+    })
+}
+
+fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]) -> Vec<String> {
+    let radius = device.parameters.patch_radius;
+    let touched =
+        objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Modal));
+    touched
+        .filter_map(|(object, name)| {
+            let edges =
+                if object.recording.metadata.mesh.order == 2 { SMOOTH_PATCH } else { SMOOTH_PATCH_LINEAR };
+            let smooth = edges * object.recording.surface.mean_edge();
+            (radius > 0.0 && radius < smooth).then(|| {
+                format!(
+                    "device {:?} touches with a patch of {radius:.2e} m, less than {edges} mean edges of {name:?}: its finite \
+                     elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
+                     {smooth:.2e} it does not",
+                    device.name
+                )
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,295 @@
+//! Scene files: TOML in, model, devices and obstacles out. Every error has the file and the line.
+
+mod coupling;
+mod devices;
+mod drivers;
+mod keys;
+mod objects;
+mod obstacles;
+mod source;
+
+use crate::error::{SceneError, SceneErrorKind};
+use crate::scene::Scene;
+pub use coupling::ANY_HAND;
+pub use devices::{find_device_traits, find_grip};
+pub use drivers::{MAX_FORCE_N, RealDevice, find_driver};
+use glam::DVec3;
+use keys::SceneFile;
+use palpate::{Model, ModelObject, ModelParameters, RigidCompliance, RigidIntegrator};
+use source::Source;
+pub use source::{Relocated, read_path};
+use std::collections::HashSet;
+use std::ops::{Range, RangeInclusive};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use toml::Spanned;
+
+/// Upper bound of lengths [m], velocities and accelerations.
+const LARGEST: f64 = 1e6;
+
+/// Upper bound of contact points of an object: their coupling takes 9·n² numbers, a gigabyte here.
+const MAX_CONTACT_POINTS: i64 = 4096;
+
+/// Range of the contact samples of an object on an obstacle; and their number where steps have a deadline.
+const CONTACT_SAMPLES: RangeInclusive<i64> = 8..=1_000_000;
+const REALTIME_CONTACT_SAMPLES: usize = 48;
+
+/// Purpose of a scene, which decides defaults.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunMode {
+    /// Most accurate: contact samples at all nodes.
+    Offline,
+    /// Steps with a deadline: fewer contact samples.
+    RealTime,
+}
+
+/// Reads a scene file with its recordings, meshes and paths.
+///
+/// # Errors
+/// When a file cannot be read, or a value is refused; with the line in the scene file.
+pub fn read_scene(path: &Path, mode: RunMode) -> Result<Scene, SceneError> {
+    read_relocated_scene(path, &Relocated::new(), mode)
+}
+
+/// Reads a scene some of whose files have other paths than the scene says, as those unpacked from a log.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -> Result<Scene, SceneError> {
+    let place = relocated.get(path).map_or(path, PathBuf::as_path);
+    let text = read_text(path, place)?;
+    let source = Source { path, text: &text, relocated };
+    let file = parse(&source)?;
+    let objects = read_objects(&source, &file)?;
+    assemble(&source, &file, objects, mode)
+}
+
+/// Reads the text of a scene file that is stored at `place`.
+pub(crate) fn read_text(path: &Path, place: &Path) -> Result<String, SceneError> {
+    let bytes = std::fs::read(place).map_err(|error| SceneError::io("read the scene", path, &error))?;
+    String::from_utf8(bytes).map_err(|_| {
+        let message = "it is not a text file; a scene is TOML (docs/scene.md)";
+        SceneError::of_file(SceneErrorKind::Syntax, path, message)
+    })
+}
+
+/// Reads a scene from a text, which `change` may replace when the objects are known; returns the scene and its text.
+///
+/// `change` must leave the objects as they are: recordings take long to read, and are read once.
+pub(crate) fn read_edited_scene(
+    path: &Path,
+    text: String,
+    mode: RunMode,
+    change: impl FnOnce(&str, &[ModelObject]) -> Option<String>,
+) -> Result<(Scene, String), SceneError> {
+    let relocated = Relocated::new();
+    let source = Source { path, text: &text, relocated: &relocated };
+    let file = parse(&source)?;
+    let objects = read_objects(&source, &file)?;
+    let Some(changed) = change(&text, &objects) else {
+        return Ok((assemble(&source, &file, objects, mode)?, text));
+    };
+    let source = Source { text: &changed, ..source };
+    Ok((assemble(&source, &parse(&source)?, objects, mode)?, changed))
+}
+
+fn parse(source: &Source) -> Result<SceneFile, SceneError> {
+    let file: SceneFile = toml::from_str(source.text).map_err(|error| syntax_error(source, &error))?;
+    if file.object.is_empty() {
+        return source.fail(0..0, SceneErrorKind::Missing, "object", "the scene has no [[object]]");
+    }
+    check_names(source, &file)?;
+    Ok(file)
+}
+
+/// Error of the parser, with types in the user's words.
+fn syntax_error(source: &Source, error: &toml::de::Error) -> SceneError {
+    let text = error.to_string();
+    let text =
+        text.replace("expected f64", "expected a number").replace("expected i64", "expected a whole number");
+    // As in: unknown field `colour`, expected one of …
+    let key = error.message().split_once(" field `").and_then(|(_, rest)| rest.split_once('`'));
+    let line = error.span().map(|span| source.line_of(&span));
+    SceneError {
+        line,
+        key: key.map(|(key, _)| key.to_string()),
+        ..SceneError::of_file(SceneErrorKind::Syntax, source.path, text.trim_end())
+    }
+}
+
+fn read_objects(source: &Source, file: &SceneFile) -> Result<Vec<ModelObject>, SceneError> {
+    file.object.iter().map(|entry| objects::read_object(source, entry)).collect()
+}
+
+/// Scene of a file whose objects are read.
+fn assemble(
+    source: &Source,
+    file: &SceneFile,
+    objects: Vec<ModelObject>,
+    mode: RunMode,
+) -> Result<Scene, SceneError> {
+    let (mut remarks, mut choices) = (Vec::new(), Vec::new());
+    let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
+    let mut parameters = read_parameters(source, file, mode)?;
+    for entry in &file.device {
+        let mut device = devices::read_parameters(source, entry)?;
+        let step_s = parameters.step_s;
+        if let Some((coupling, line)) =
+            coupling::choose_default(source, entry, &device, step_s, &objects, &object_names)?
+        {
+            device.coupling = Some(coupling);
+            choices.push(line);
+        }
+        parameters.devices.push(device);
+    }
+    let mut obstacles = Vec::new();
+    for (number, entry) in file.plane.iter().enumerate() {
+        let (obstacle, placed) = obstacles::read_plane(source, entry.get_ref(), number)?;
+        parameters.obstacles.push(obstacle);
+        obstacles.push(placed);
+    }
+    for (number, entry) in file.obstacle.iter().enumerate() {
+        let (obstacle, placed) = obstacles::read_obstacle(source, entry, number, &mut remarks)?;
+        parameters.obstacles.push(obstacle);
+        obstacles.push(placed);
+    }
+    let model = build(source, file, parameters, objects.clone())?;
+    let mut devices = Vec::new();
+    for (entry, parameters) in file.device.iter().zip(&model.parameters().devices) {
+        let read = devices::read_device(source, entry, *parameters, &objects, &object_names, &mut remarks);
+        devices.push(read?);
+    }
+    devices::check_grasps(source, &file.device, &devices)?;
+    remarks.extend(objects::doubtful_recordings(&objects, &object_names));
+    let held_only: Vec<String> = objects::objects_with_tables(&objects, &object_names).collect();
+    let inputs = inputs(source, file);
+    let mut scene =
+        Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, choices, inputs };
+    if scene.can_touch() {
+        scene.remarks.extend(held_only);
+    }
+    Ok(scene)
+}
+
+/// Checks names: unique, and without the separators of CSV files.
+fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
+    let own = |name: &Spanned<String>| (name.get_ref().clone(), name.span());
+    // Without a name: the line of its table.
+    let or = |name: &Option<Spanned<String>>, kind: &str, number: usize, entry: Range<usize>| {
+        let place = name.as_ref().map_or(entry, Spanned::span);
+        (obstacles::name_or(name.as_ref(), kind, number), place)
+    };
+    let objects = file.object.iter().map(|entry| own(&entry.name));
+    let devices = file.device.iter().map(|entry| own(&entry.name));
+    let planes = file.plane.iter().enumerate();
+    let planes = planes.map(|(number, entry)| or(&entry.get_ref().name, "plane", number, entry.span()));
+    let others = file.obstacle.iter().enumerate();
+    let others = others.map(|(number, entry)| or(&entry.get_ref().name, "obstacle", number, entry.span()));
+    let mut seen = HashSet::new();
+    for (name, place) in objects.chain(devices).chain(planes).chain(others) {
+        let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || !name.chars().all(plain) {
+            return source.fail(
+                place,
+                SceneErrorKind::Name,
+                "name",
+                format!("name is {name:?}, expected letters, digits, - and _"),
+            );
+        }
+        if name == "energy" || name == "t" || !seen.insert(name.clone()) {
+            return source.fail(
+                place,
+                SceneErrorKind::Name,
+                "name",
+                format!("the name {name:?} is taken already"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Parameters of the whole scene, without devices and obstacles.
+fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<ModelParameters, SceneError> {
+    let usual = ModelParameters::default();
+    let motion = match file.integrator.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
+        None | Some(("exact", _)) => RigidIntegrator::ExactHold,
+        Some(("paper", _)) => RigidIntegrator::Paper,
+        Some((other, span)) => {
+            let message = format!("integrator is {other:?}, expected \"exact\" or \"paper\"");
+            return source.fail(span, SceneErrorKind::UnknownValue, "integrator", message);
+        }
+    };
+    let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
+        RigidCompliance::Included
+    } else {
+        RigidCompliance::Dropped
+    };
+    let count = |key: &str, given: &Option<Spanned<i64>>, usual: usize, allowed: RangeInclusive<i64>| {
+        let Some(given) = given else { return Ok(usual) };
+        let (count, span) = (*given.get_ref(), given.span());
+        if allowed.contains(&count) {
+            return Ok(count as usize);
+        }
+        let (least, most) = (allowed.start(), allowed.end());
+        source.fail(
+            span,
+            SceneErrorKind::OutOfRange,
+            key,
+            format!("{key} is {count}, expected {least} to {most}"),
+        )
+    };
+    let usual_samples = match mode {
+        RunMode::Offline => usual.max_contact_samples,
+        RunMode::RealTime => REALTIME_CONTACT_SAMPLES,
+    };
+    let allowed = 1..=MAX_CONTACT_POINTS;
+    let max_contact_points =
+        count("max_contact_points", &file.max_contact_points, usual.max_contact_points, allowed)?;
+    let max_contact_samples =
+        count("max_contact_samples", &file.max_contact_samples, usual_samples, CONTACT_SAMPLES)?;
+    let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
+    let gravity = DVec3::from_array(file.gravity.0);
+    Ok(ModelParameters {
+        step_s,
+        gravity,
+        motion,
+        rigid_compliance,
+        max_contact_points,
+        max_contact_samples,
+        ..usual
+    })
+}
+
+/// Builds the model; an error gets the line of the object that it names.
+fn build(
+    source: &Source,
+    file: &SceneFile,
+    parameters: ModelParameters,
+    objects: Vec<ModelObject>,
+) -> Result<Model, SceneError> {
+    Model::new(parameters, objects).or_else(|error| {
+        let text = error.to_string();
+        for (at, object) in file.object.iter().enumerate() {
+            // The runtime numbers objects, the scene names them.
+            if let Some(what) = text.strip_prefix(&format!("object {at}: ")) {
+                let message = format!("object {:?}: {what}", object.name.get_ref());
+                return source.fail(object.name.span(), SceneErrorKind::Model, "object", message);
+            }
+        }
+        // Devices, obstacles and gravity are checked with their lines: what is left is the step.
+        source.fail(file.step.as_ref().map_or(0..0, Spanned::span), SceneErrorKind::Model, "step", text)
+    })
+}
+
+/// Files that a scene is read from.
+fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
+    let recordings = file.object.iter().map(|object| &object.recording);
+    let paths = file.device.iter().filter_map(|device| Some(&device.path.as_ref()?.file));
+    let obstacles = file.obstacle.iter().map(Spanned::get_ref);
+    let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
+    let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
+    let files = recordings.chain(paths).chain(meshes).chain(moves);
+    let mut inputs = vec![source.path.to_path_buf()];
+    inputs.extend(files.map(|file| source.named_path(file.get_ref())));
+    inputs
+}

@@ -1,0 +1,133 @@
+//! `[[object]]`: elastic bodies.
+
+use super::keys::ObjectEntry;
+use super::source::Source;
+use crate::error::{SceneError, SceneErrorKind};
+use crate::recording_file::read_recording;
+use glam::{DQuat, DVec3};
+use palpate::{ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
+use palpate_fem::certificate::DOUBTFUL;
+use palpate_store::{Location, TableStore};
+use std::sync::Arc;
+
+pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<ModelObject, SceneError> {
+    let (recording, response) = read_responses(source, object)?;
+    let [w, x, y, z] = object.orientation.0;
+    let start = ObjectStart {
+        pose: Pose {
+            position: DVec3::from_array(object.position.0),
+            orientation: DQuat::from_xyzw(x, y, z, w),
+        },
+        twist: Twist {
+            linear: DVec3::from_array(object.velocity.0),
+            angular: DVec3::from_array(object.angular_velocity.0),
+        },
+    };
+    let friction = source.friction(object.friction.as_ref())?;
+    Ok(ModelObject { recording, response, start, friction })
+}
+
+/// Recording and form of the response: from a recording file, a store of impulse responses, or both.
+fn read_responses(
+    source: &Source,
+    object: &ObjectEntry,
+) -> Result<(Arc<Recording>, ResponseForm), SceneError> {
+    let path = source.stored_path(object.recording.get_ref());
+    let place = object.recording.span();
+    let form = object.response.as_ref().map(|form| (form.get_ref().as_str(), form.span()));
+    let fir = match form {
+        None => path.is_dir(),
+        Some(("modal", _)) if path.is_dir() => {
+            return source.fail(
+                place,
+                SceneErrorKind::Recording,
+                "response",
+                "response = \"modal\" needs a recording file (.palp); this is a store of impulse responses",
+            );
+        }
+        Some(("modal", _)) => false,
+        Some(("fir", _)) => true,
+        Some((other, span)) => {
+            let message = format!("response is {other:?}, expected \"modal\" or \"fir\"");
+            return source.fail(span, SceneErrorKind::UnknownValue, "response", message);
+        }
+    };
+    if let (Some(table), false) = (&object.table, fir) {
+        let message = "a table is used with response = \"fir\" only";
+        return source.fail(table.span(), SceneErrorKind::Conflict, "table", message);
+    }
+    if !fir {
+        let recording = read_recording(&path)
+            .or_else(|error| source.fail(place, SceneErrorKind::Recording, "recording", error))?;
+        return Ok((Arc::new(recording), ResponseForm::Modal));
+    }
+    let (table, table_place) = match &object.table {
+        Some(table) => (source.stored_path(table.get_ref()), table.span()),
+        None if path.is_dir() => (path.clone(), place.clone()),
+        None => (path.with_extension("zarr"), place.clone()),
+    };
+    if !table.exists() {
+        return source.fail(
+            table_place,
+            SceneErrorKind::Table,
+            "table",
+            format!(
+                "response = \"fir\" needs a store of impulse responses, and there is no {}: make one with `palpate record … \
+                 --dense`, and name it with table = \"…\"",
+                table.display()
+            ),
+        );
+    }
+    let loaded = TableStore::open(&Location::Folder(table)).and_then(TableStore::load);
+    let (body, table) =
+        loaded.or_else(|error| source.fail(table_place.clone(), SceneErrorKind::Table, "table", error))?;
+    let recording = if path.is_dir() {
+        body
+    } else {
+        let recording = read_recording(&path)
+            .or_else(|error| source.fail(place, SceneErrorKind::Recording, "recording", error))?;
+        if recording.metadata.provenance.mesh_hash != body.metadata.provenance.mesh_hash {
+            return source.fail(
+                table_place,
+                SceneErrorKind::Table,
+                "table",
+                format!(
+                    "the store is of another mesh ({}) than the recording ({})",
+                    body.metadata.provenance.source, recording.metadata.provenance.source
+                ),
+            );
+        }
+        recording
+    };
+    Ok((Arc::new(recording), ResponseForm::Fir(Arc::new(table))))
+}
+
+/// Remarks on recordings whose certificates state a large force error.
+pub(super) fn doubtful_recordings<'a>(
+    objects: &'a [ModelObject],
+    names: &'a [String],
+) -> impl Iterator<Item = String> + 'a {
+    objects.iter().zip(names).filter_map(move |(object, name)| {
+        let certificate = object.recording.metadata.certificate.as_ref()?;
+        let error = certificate.force_error_max;
+        (error > DOUBTFUL).then(|| {
+            format!(
+                "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
+                 recording): record it with more modes",
+                100.0 * error
+            )
+        })
+    })
+}
+
+/// Remarks on objects with recorded tables, which have no contacts, for scenes that could have some.
+pub(super) fn objects_with_tables<'a>(
+    objects: &'a [ModelObject],
+    names: &'a [String],
+) -> impl Iterator<Item = String> + 'a {
+    let tables =
+        objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Fir(_)));
+    tables.map(|(_, name)| {
+        format!("the object {name:?} uses a recorded table: it can be held, but nothing else touches it")
+    })
+}

@@ -1,0 +1,124 @@
+//! Text of a scene file: errors with their line, numbers within their range, paths of its files.
+
+use super::LARGEST;
+use super::keys::PathEntry;
+use crate::error::{SceneError, SceneErrorKind};
+use palpate_haptics::{Columns, MotionPath};
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// Paths of files that are not where the scene says, by the path in the scene: those unpacked from a log.
+pub type Relocated = HashMap<PathBuf, PathBuf>;
+
+/// Text of a scene file.
+pub(super) struct Source<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+    pub relocated: &'a Relocated,
+}
+
+/// Quantity of a scene file.
+#[derive(Clone, Copy)]
+pub(super) struct Quantity {
+    /// Key.
+    pub key: &'static str,
+    /// Unit with a leading blank, or nothing.
+    pub unit: &'static str,
+    /// Exclusive upper bound.
+    pub below: f64,
+}
+
+impl Quantity {
+    /// Length [m].
+    pub fn length(key: &'static str) -> Self {
+        Self { key, unit: " m", below: LARGEST }
+    }
+
+    /// Coefficient of friction.
+    pub fn friction() -> Self {
+        Self { key: "friction", unit: "", below: LARGEST }
+    }
+}
+
+impl Source<'_> {
+    /// Line of a place in the text, from 1.
+    pub fn line_of(&self, span: &Range<usize>) -> usize {
+        1 + self.text[..span.start.min(self.text.len())].matches('\n').count()
+    }
+
+    /// Error of a key at a place.
+    pub fn fail<T>(
+        &self,
+        span: Range<usize>,
+        kind: SceneErrorKind,
+        key: &str,
+        message: impl Display,
+    ) -> Result<T, SceneError> {
+        let line = Some(self.line_of(&span));
+        Err(SceneError { line, key: Some(key.to_string()), ..SceneError::of_file(kind, self.path, message) })
+    }
+
+    /// Path of a file as the scene names it, relative to the scene file.
+    pub fn named_path(&self, file: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+
+    /// Path that a file is stored at.
+    pub fn stored_path(&self, file: &Path) -> PathBuf {
+        let named = self.named_path(file);
+        self.relocated.get(&named).cloned().unwrap_or(named)
+    }
+
+    /// Motion path of an entry.
+    pub fn motion_path(&self, entry: &PathEntry, columns: Columns) -> Result<MotionPath, SceneError> {
+        let PathEntry { file, repeat } = entry;
+        let path = read_path(&self.stored_path(file.get_ref()), columns);
+        let path = path.or_else(|error| self.fail(file.span(), SceneErrorKind::Path, "path", error))?;
+        Ok(if *repeat { path.repeating() } else { path })
+    }
+
+    /// Positive number.
+    pub fn positive(&self, number: &Spanned<f64>, of: Quantity) -> Result<f64, SceneError> {
+        let value = *number.get_ref();
+        if value > 0.0 && value < of.below {
+            return Ok(value);
+        }
+        let Quantity { key, unit, below } = of;
+        let message = format!("{key} is {value}{unit}, expected above 0 and below {below:e}");
+        self.fail(number.span(), SceneErrorKind::OutOfRange, key, message)
+    }
+
+    /// Number that is not negative.
+    pub fn not_negative(&self, number: &Spanned<f64>, of: Quantity) -> Result<f64, SceneError> {
+        let value = *number.get_ref();
+        if value >= 0.0 && value < of.below {
+            return Ok(value);
+        }
+        let Quantity { key, unit, below } = of;
+        let message = format!("{key} is {value}{unit}, expected at least 0 and below {below:e}");
+        self.fail(number.span(), SceneErrorKind::OutOfRange, key, message)
+    }
+
+    /// Coefficient of friction, or its default.
+    pub fn friction(&self, number: Option<&Spanned<f64>>) -> Result<f64, SceneError> {
+        number.map_or(Ok(FRICTION), |number| self.not_negative(number, Quantity::friction()))
+    }
+}
+
+/// Default coefficient of friction: rubber on wood.
+const FRICTION: f64 = 0.5;
+
+/// Reads a motion path from a CSV file.
+///
+/// # Errors
+/// When the file cannot be read, or is no path.
+pub fn read_path(path: &Path, columns: Columns) -> Result<MotionPath, SceneError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|error| SceneError::io("read the path", path, &error))?;
+    MotionPath::parse(&text, columns).map_err(|what| {
+        SceneError::of_file(SceneErrorKind::Path, path, format!("path {}: {what}", path.display()))
+    })
+}

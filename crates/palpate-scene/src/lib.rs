@@ -1,0 +1,44 @@
+//! Scenes for palpate: files, logs and libraries of scenes, for programs of every kind.
+//!
+//! ```text
+//! scene file (TOML) → read_scene → Scene { model, names, devices, obstacles } → State, Input, step
+//! log (MCAP)        → LogReplay  → the same scene, its steps computed again and compared bit for bit
+//! SceneLibrary      → built-in scenes, scene files and uploaded meshes, with changes of their settings
+//! ```
+//!
+//! Errors are values: a [`SceneError`] has its kind, file, line, key and message. Nothing here prints or ends the process.
+
+#![deny(missing_docs)]
+
+mod attach;
+mod error;
+mod file;
+mod library;
+mod mesh_source;
+mod progress;
+mod recipe;
+mod recording_file;
+mod replay;
+mod scene;
+mod scene_log;
+
+pub use attach::{attach_path, attach_real};
+pub use error::{SceneError, SceneErrorKind};
+pub use file::{
+    ANY_HAND, MAX_FORCE_N, RealDevice, Relocated, RunMode, find_device_traits, find_driver, find_grip,
+    read_path, read_relocated_scene, read_scene,
+};
+pub use library::{
+    BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube,
+};
+pub use mesh_source::{read_mesh, read_surface, source_name};
+pub use progress::{Progress, ProgressFn, Silent, WithoutRemarks};
+pub use recipe::{RecordingRecipe, cache_folder};
+pub use recording_file::{certificate_lines, certificate_table, read_recording};
+pub use replay::{LogReplay, ReplayError};
+pub use scene::{Scene, SceneDevice, SceneObstacle};
+pub use scene_log::SceneLog;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,261 @@
+//! Built-in scenes, as scene files with recipes for their recordings and functions for their paths.
+
+use crate::recipe::RecordingRecipe;
+use palpate::{Damping, Material};
+use palpate_fem::element::Order;
+use std::f64::consts::TAU;
+
+/// Built-in scene.
+pub struct BuiltInScene {
+    /// Identifier.
+    pub id: &'static str,
+    /// Title.
+    pub title: &'static str,
+    /// Description, with what one can do.
+    pub about: &'static str,
+    /// Scene file; a recording that begins with `@` names a recipe.
+    pub(super) text: &'static str,
+    /// Path files and their functions, over one period.
+    pub(super) paths: &'static [(&'static str, Path)],
+    /// Period of the paths [s].
+    pub(super) period_s: f64,
+}
+
+/// Position at a time [s] [m, world].
+type Path = fn(f64) -> [f64; 3];
+
+/// Interval of the rows of paths [s].
+const ROW_INTERVAL_S: f64 = 0.002;
+
+/// All built-in scenes; the first is the default.
+pub const BUILT_IN_SCENES: [BuiltInScene; 6] = [
+    BuiltInScene {
+        id: "bounce",
+        title: "A soft cube falls and bounces",
+        about: "The paper's cube falls from 5 cm (figure 5a). Poke it, squeeze it with two fingers, throw it.",
+        text: r#"
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "cube"
+recording = "@cube"
+position = [0.0, 0.1, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+friction = 1.0
+"#,
+        paths: &[],
+        period_s: 0.0,
+    },
+    BuiltInScene {
+        id: "shake",
+        title: "Two hands shake a cube",
+        about: "Two hands hold the middles of two faces and shake it at 2 Hz, free of gravity (figure 5b). Touch it meanwhile.",
+        text: r#"
+[[object]]
+name = "cube"
+recording = "@cube"
+[[device]]
+name = "left"
+mode = "held"
+attach = { object = "cube", point = [-0.05, 0.0, 0.0] }
+path = { file = "left.csv", repeat = true }
+[[device]]
+name = "right"
+mode = "held"
+attach = { object = "cube", point = [0.05, 0.0, 0.0] }
+path = { file = "right.csv", repeat = true }
+"#,
+        paths: &[("left.csv", |t| shaking(-1.0, t)), ("right.csv", |t| shaking(1.0, t))],
+        period_s: 10.0,
+    },
+    BuiltInScene {
+        id: "pinch",
+        title: "Two fingers pinch and lift",
+        about: "Two fingers squeeze the cube, lift it by friction alone, shake it and put it down, again and again.",
+        text: r#"
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "cube"
+recording = "@jelly"
+position = [0.0, 0.05, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+friction = 1.0
+[[device]]
+name = "left"
+mode = "touch"
+tip_radius = 0.005
+patch_radius = 0.03
+friction = 0.8
+coupling = { stiffness = 500.0, damping = 1.0 }
+path = { file = "left.csv", repeat = true }
+[[device]]
+name = "right"
+mode = "touch"
+tip_radius = 0.005
+patch_radius = 0.03
+friction = 0.8
+coupling = { stiffness = 500.0, damping = 1.0 }
+path = { file = "right.csv", repeat = true }
+"#,
+        paths: &[("left.csv", |t| pinching(-1.0, t)), ("right.csv", |t| pinching(1.0, t))],
+        period_s: 8.0,
+    },
+    BuiltInScene {
+        id: "stack",
+        title: "A stack of two",
+        about: "A soft cube lands on a larger, firmer block. Push the tower over, or pull the block away.",
+        text: r#"
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "block"
+recording = "@block"
+position = [0.0, 0.04, 0.0]
+[[object]]
+name = "cube"
+recording = "@small"
+position = [0.0, 0.14, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+friction = 1.0
+"#,
+        paths: &[],
+        period_s: 0.0,
+    },
+    BuiltInScene {
+        id: "ball",
+        title: "A soft ball among obstacles",
+        about: "A ball rolls down a ramp into a tray with a post and a rail. Catch it, press it through, send it back.",
+        text: r#"
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "ball"
+recording = "@ball"
+position = [-0.16, 0.19, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+[[obstacle]]
+name = "ramp"
+box = { half_extents = [0.12, 0.01, 0.08] }
+position = [-0.12, 0.07, 0.0]
+orientation = [0.9781476007338057, 0.0, 0.0, -0.20791169081775934]
+[[obstacle]]
+name = "post"
+sphere = { radius = 0.03 }
+position = [0.13, 0.03, 0.03]
+[[obstacle]]
+name = "rail"
+capsule = { radius = 0.012, half_length = 0.12 }
+position = [0.22, 0.02, 0.0]
+orientation = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
+[[obstacle]]
+name = "left"
+box = { half_extents = [0.006, 0.025, 0.17] }
+position = [-0.26, 0.025, 0.0]
+[[obstacle]]
+name = "right"
+box = { half_extents = [0.006, 0.025, 0.17] }
+position = [0.32, 0.025, 0.0]
+[[obstacle]]
+name = "front"
+box = { half_extents = [0.284, 0.025, 0.006] }
+position = [0.03, 0.025, 0.164]
+[[obstacle]]
+name = "back"
+box = { half_extents = [0.284, 0.025, 0.006] }
+position = [0.03, 0.025, -0.164]
+"#,
+        paths: &[],
+        period_s: 0.0,
+    },
+    BuiltInScene {
+        id: "slab",
+        title: "A slab in weightlessness",
+        about: "A thin slab that floats: flick its edge and watch the waves run through it. Nothing holds it but your fingers.",
+        text: r#"
+[[object]]
+name = "slab"
+recording = "@slab"
+angular_velocity = [0.0, 0.4, 0.0]
+"#,
+        paths: &[],
+        period_s: 0.0,
+    },
+];
+
+/// The paper's cube (section 3.1), with the damping of the reference series in `data/reference`.
+pub fn paper_cube() -> RecordingRecipe {
+    RecordingRecipe {
+        source: "box:0.1x0.1x0.1/12x12x12".into(),
+        scale: 1.0,
+        material: material(2000.0, 0.49, 110.0),
+        order: Order::Linear,
+        modes: 200,
+        damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
+    }
+}
+
+fn material(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
+    Material { region: String::new(), young_pa, poisson, density_kg_m3 }
+}
+
+/// Recipe by its name in a built-in scene.
+pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
+    let of =
+        |source: &str, young: f64, poisson: f64, density: f64, modes: usize, beta: f64| RecordingRecipe {
+            source: source.into(),
+            material: material(young, poisson, density),
+            modes,
+            damping: Damping::Rayleigh { alpha: 2.0, beta },
+            ..paper_cube()
+        };
+    Some(match name {
+        "cube" => paper_cube(),
+        "jelly" => of("box:0.1x0.1x0.1/12x12x12", 2000.0, 0.49, 110.0, 100, 1e-3),
+        "block" => of("box:0.14x0.08x0.14/12x7x12", 6000.0, 0.45, 200.0, 120, 5e-4),
+        "small" => of("box:0.08x0.08x0.08/8x8x8", 2500.0, 0.45, 110.0, 120, 1e-3),
+        "ball" => of("sphere:0.05/8", 4000.0, 0.45, 150.0, 150, 5e-4),
+        "slab" => of("box:0.24x0.02x0.12/24x2x12", 8000.0, 0.4, 150.0, 150, 2e-4),
+        _ => return None,
+    })
+}
+
+/// Path over one period as CSV.
+pub(super) fn path_text(at: Path, period_s: f64) -> String {
+    let mut text = String::from("t,x,y,z\n");
+    for row in 0..=(period_s / ROW_INTERVAL_S).round() as u32 {
+        let t = f64::from(row) * ROW_INTERVAL_S;
+        let [x, y, z] = at(t);
+        text += &format!("{t:.3},{x:.7},{y:.7},{z:.7}\n");
+    }
+    text
+}
+
+/// The hand on one side (−1 left, 1 right): 3 mm in, 1 cm to either side at 2 Hz, and a rest in which the cube can be looked at.
+fn shaking(side: f64, t: f64) -> [f64; 3] {
+    let squeeze = 0.003 * between(t, 0.0, 0.2) * between(t, 10.0, 9.6);
+    let swing = 0.01 * between(t, 0.2, 0.5) * between(t, 7.5, 7.0) * (TAU * 2.0 * (t - 0.2)).sin();
+    [side * (0.05 - squeeze) + swing, 0.0, 0.0]
+}
+
+/// The finger on one side: closes, lifts, shakes, puts down and opens.
+fn pinching(side: f64, t: f64) -> [f64; 3] {
+    let squeeze = 0.015 * between(t, 0.6, 1.2) * between(t, 7.2, 6.6);
+    let height = 0.05 * between(t, 1.4, 2.4) * between(t, 6.4, 5.4);
+    let swing = 0.01 * between(t, 2.6, 3.0) * between(t, 5.2, 4.8) * (TAU * 2.0 * (t - 2.6)).sin();
+    [side * (0.05 + 0.005 + 0.004 - squeeze), 0.05 + height + swing, 0.0]
+}
+
+/// Smooth ramp from 0 at `from` to 1 at `to`, in either order.
+fn between(t: f64, from: f64, to: f64) -> f64 {
+    let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
+}

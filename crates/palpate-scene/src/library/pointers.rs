@@ -1,0 +1,84 @@
+//! Pointer devices for scenes that have none.
+
+use palpate::{ModelObject, Recording};
+use toml::{Table, Value};
+
+/// Number of added pointers.
+const POINTERS: usize = 4;
+
+/// Text of a scene with added pointers; none if it has some. They are appended, so that line numbers stay.
+pub(super) fn with_pointers(text: &str, objects: &[ModelObject]) -> Option<String> {
+    let mut scene: Table = text.parse().ok()?;
+    let entries = |kind: &str| scene.get(kind).and_then(Value::as_array).into_iter().flatten();
+    if entries("device").any(|device| device.get("pointer").and_then(Value::as_bool) == Some(true)) {
+        return None;
+    }
+    let named = ["object", "device", "plane", "obstacle"].into_iter().flat_map(entries);
+    let taken: Vec<&str> = named.filter_map(|entry| entry.get("name")?.as_str()).collect();
+    let names = (1..).map(|number| format!("finger{number}")).filter(|name| !taken.contains(&name.as_str()));
+    let names: Vec<String> = names.take(POINTERS).collect();
+    let fingers = fingers(names, objects)?;
+    let added = Table::from_iter([("device".to_string(), Value::Array(fingers.clone()))]);
+    let longer = format!("{}\n\n{added}", text.trim_end());
+    if longer.parse::<Table>().is_ok() {
+        return Some(longer);
+    }
+    // An inline array of devices cannot be continued further down.
+    scene.entry("device").or_insert_with(|| Value::Array(Vec::new())).as_array_mut()?.extend(fingers);
+    Some(scene.to_string())
+}
+
+/// Pointer devices of a size and stiffness for the smallest object.
+fn fingers(names: Vec<String>, objects: &[ModelObject]) -> Option<Vec<Value>> {
+    let size = |recording: &Recording| recording.surface.radius();
+    let recordings = objects.iter().map(|object| &*object.recording);
+    let recording = recordings.min_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let radius = size(recording);
+    // Stiffness m·ω² of the lowest mode: about that of the whole object. Damping ratio 0.1.
+    let omega = recording.modes.angular_frequencies.first().copied().unwrap_or(50.0);
+    let coupling = Table::from_iter([
+        ("stiffness".to_string(), Value::Float(recording.mass() * omega * omega)),
+        ("damping".to_string(), Value::Float(0.2 * recording.mass() * omega)),
+    ]);
+    let finger = |name: String| {
+        Value::Table(Table::from_iter([
+            ("name".to_string(), Value::String(name)),
+            ("mode".to_string(), Value::String("touch".into())),
+            ("pointer".to_string(), Value::Boolean(true)),
+            ("tip_radius".to_string(), Value::Float(0.08 * radius)),
+            ("patch_radius".to_string(), Value::Float(0.15 * radius)),
+            ("friction".to_string(), Value::Float(0.8)),
+            ("coupling".to_string(), Value::Table(coupling.clone())),
+        ]))
+    };
+    Some(names.into_iter().map(finger).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::{ObjectStart, Pose, Twist};
+    use std::sync::Arc;
+
+    #[test]
+    fn fingers_stand_below_what_is_there_and_have_names_of_their_own() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+        let objects = [ModelObject::new(recording, start)];
+        let names = |text: &str| -> Vec<String> {
+            let scene: Table = text.parse().expect("TOML");
+            let devices = scene["device"].as_array().expect("devices");
+            devices.iter().map(|device| device["name"].as_str().expect("a name").to_string()).collect()
+        };
+        let text =
+            "# mine\n[[object]]\nname = \"finger2\"\n[[device]]\nname = \"left\"\n[[plane]]\nname = \"a\"\n";
+        let longer = with_pointers(text, &objects).expect("fingers");
+        assert!(longer.starts_with(text), "{longer}");
+        assert_eq!(names(&longer), ["left", "finger1", "finger3", "finger4", "finger5"]);
+        assert_eq!(with_pointers(&longer, &objects), None, "there are some");
+        let list = "device = [{ name = \"left\" }]\n";
+        let longer = with_pointers(list, &objects).expect("fingers");
+        assert_eq!(names(&longer), ["left", "finger1", "finger2", "finger3", "finger4"]);
+    }
+}

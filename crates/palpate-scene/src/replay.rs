@@ -1,0 +1,216 @@
+//! Replay of a log: its steps are computed again from the scene that it carries, and compared bit for bit.
+
+use crate::error::SceneError;
+use crate::file::{Relocated, RunMode, read_relocated_scene};
+use crate::scene::Scene;
+use palpate::{DeviceMode, Input, State, step};
+use palpate_haptics::log::{Names, Reader};
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Reason that a log cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// The operating system refused to read the log, or to unpack its files.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// Action that failed.
+        action: &'static str,
+        /// File.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The file is no log, or damaged.
+    #[error("{}: {error}", path.display())]
+    Log {
+        /// Log.
+        path: PathBuf,
+        /// Error of the reader.
+        error: palpate_haptics::Error,
+    },
+    /// There is no temporary folder for the log's files.
+    #[error("cannot make a folder for the log's files: {0}")]
+    TemporaryFolder(io::Error),
+    /// The log does not name its scene.
+    #[error("the log does not tell which scene it is of")]
+    NoScene,
+    /// The scene in the log is refused.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Steps are missing.
+    #[error("{}: step {step} comes after step {previous}: the log missed steps, and can't be replayed beyond", path.display())]
+    MissedSteps {
+        /// Log.
+        path: PathBuf,
+        /// Step after the gap.
+        step: u64,
+        /// Step before the gap.
+        previous: u64,
+    },
+    /// A computed number differs from the logged one.
+    #[error(
+        "{}: step {step} differs: {quantity} was {logged:?}, now it is {computed:?}. The log is of palpate {version}, this is {}; \
+         only the same build on the same kind of machine gives the same bits",
+        path.display(), env!("CARGO_PKG_VERSION")
+    )]
+    Differs {
+        /// Log.
+        path: PathBuf,
+        /// Step.
+        step: u64,
+        /// Name of the number.
+        quantity: String,
+        /// Value in the log.
+        logged: f64,
+        /// Value now.
+        computed: f64,
+        /// Version that wrote the log.
+        version: String,
+    },
+    /// The log is empty.
+    #[error("{}: the log holds no steps", .0.display())]
+    NoSteps(PathBuf),
+}
+
+/// Log with the scene that it carries.
+pub struct LogReplay {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    facts: BTreeMap<String, String>,
+    /// Scene; the log is one of its inputs.
+    pub scene: Scene,
+    /// Number of steps.
+    pub steps: u64,
+    names: Names,
+    modes: Vec<DeviceMode>,
+    // The unpacked files must outlive the scene: tables are mapped into memory.
+    _folder: TempDir,
+}
+
+impl LogReplay {
+    /// Reads a log.
+    ///
+    /// # Errors
+    /// When it cannot be read, or its scene is refused.
+    pub fn read(path: &Path) -> Result<Self, ReplayError> {
+        let bytes = std::fs::read(path).map_err(|source| ReplayError::Io {
+            action: "read the log",
+            path: path.to_path_buf(),
+            source,
+        })?;
+        let named = |error| ReplayError::Log { path: path.to_path_buf(), error };
+        let reader = Reader::new(&bytes).map_err(named)?;
+        let facts = reader.facts().map_err(named)?;
+        let files = reader.files().map_err(named)?;
+        let steps = reader.steps();
+        let (mut scene, folder) = unpack(files, facts.get("scene").map(Path::new))?;
+        scene.inputs.push(path.to_path_buf());
+        let names = scene.names();
+        let modes = scene.devices.iter().map(|device| device.mode).collect();
+        Ok(Self { path: path.to_path_buf(), bytes, facts, scene, steps, names, modes, _folder: folder })
+    }
+
+    /// State before the first step: that of the scene, or the one that the log resumes from.
+    ///
+    /// # Errors
+    /// [`ReplayError::Log`].
+    pub fn initial_state(&self) -> Result<State, ReplayError> {
+        let model = &self.scene.model;
+        let motions = self.reader()?.start(&self.names).map_err(|error| self.named(error))?;
+        Ok(motions.map_or_else(|| State::new(model), |motions| State::resume(model, &motions)))
+    }
+
+    /// Input before the first step; for devices without a path that of the first step.
+    ///
+    /// # Errors
+    /// [`ReplayError::Log`].
+    pub fn initial_input(&self) -> Result<Input, ReplayError> {
+        let mut input = self.scene.input_at(0.0);
+        if let Some(logged) = self.reader()?.each_step().next() {
+            let first = logged.and_then(|logged| logged.input(&self.names, &self.modes));
+            let first = first.map_err(|error| self.named(error))?;
+            for ((device, at_start), first) in
+                self.scene.devices.iter().zip(&mut input.devices).zip(first.devices)
+            {
+                if device.path.is_none() {
+                    *at_start = first;
+                }
+            }
+        }
+        Ok(input)
+    }
+
+    /// Computes up to `max_steps` steps, compares each with the log, and calls `visit` with its input, state and compute time;
+    /// returns their number.
+    ///
+    /// # Errors
+    /// When steps are missing, a number differs, or `visit` fails.
+    pub fn replay<E: From<ReplayError>>(
+        &self,
+        state: &mut State,
+        max_steps: u64,
+        mut visit: impl FnMut(&Input, &State, Duration) -> Result<(), E>,
+    ) -> Result<u64, E> {
+        let path = || self.path.clone();
+        let mut done = 0;
+        for logged in self.reader()?.each_step().take(max_steps.try_into().unwrap_or(usize::MAX)) {
+            let logged = logged.map_err(|error| self.named(error))?;
+            if logged.step != done + 1 {
+                let gap = ReplayError::MissedSteps { path: path(), step: logged.step, previous: done };
+                return Err(gap.into());
+            }
+            let input = logged.input(&self.names, &self.modes).map_err(|error| self.named(error))?;
+            let before = Instant::now();
+            step(&self.scene.model, state, &input);
+            let took = before.elapsed();
+            if let Some((quantity, then, now)) = logged.difference(&self.names, state.output()) {
+                let differs = ReplayError::Differs {
+                    path: path(),
+                    step: logged.step,
+                    quantity,
+                    logged: then,
+                    computed: now,
+                    version: self.facts.get("version").map_or("?", String::as_str).to_string(),
+                };
+                return Err(differs.into());
+            }
+            done = logged.step;
+            visit(&input, state, took)?;
+        }
+        if done == 0 {
+            return Err(ReplayError::NoSteps(path()).into());
+        }
+        Ok(done)
+    }
+
+    fn named(&self, error: palpate_haptics::Error) -> ReplayError {
+        ReplayError::Log { path: self.path.clone(), error }
+    }
+
+    fn reader(&self) -> Result<Reader<'_>, ReplayError> {
+        Reader::new(&self.bytes).map_err(|error| self.named(error))
+    }
+}
+
+/// Scene of a log, and the temporary folder with its files.
+fn unpack(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Result<(Scene, TempDir), ReplayError> {
+    let scene = scene.ok_or(ReplayError::NoScene)?;
+    let folder = TempDir::new().map_err(ReplayError::TemporaryFolder)?;
+    let mut relocated = Relocated::new();
+    for (at, (name, data)) in files.into_iter().enumerate() {
+        let name = PathBuf::from(name);
+        // Only the file name is used: nothing is written outside of the folder.
+        let file = name.file_name().map_or_else(|| "file".into(), |name| name.to_os_string());
+        let own = folder.path().join(at.to_string());
+        let place = own.join(file);
+        let written = std::fs::create_dir(&own).and_then(|()| std::fs::write(&place, data));
+        written.map_err(|source| ReplayError::Io { action: "unpack", path: place.clone(), source })?;
+        relocated.insert(name, place);
+    }
+    Ok((read_relocated_scene(scene, &relocated, RunMode::RealTime)?, folder))
+}

@@ -1,0 +1,116 @@
+//! Scene: a model with the names of its parts, and the paths of its devices and obstacles.
+
+use crate::file::RealDevice;
+use glam::DVec3;
+use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
+use palpate_export::{DeviceLabel, SceneLabels};
+use palpate_haptics::MotionPath;
+use palpate_haptics::device::{Hand, Traits};
+use palpate_haptics::log::Names;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Scene that is ready to run.
+pub struct Scene {
+    /// Objects, devices, obstacles and parameters.
+    pub model: Arc<Model>,
+    /// Names of the objects, in the model's order.
+    pub object_names: Vec<String>,
+    /// Devices, in the model's order.
+    pub devices: Vec<SceneDevice>,
+    /// Planes and obstacles, in the model's order.
+    pub obstacles: Vec<SceneObstacle>,
+    /// Warnings for the author of the scene.
+    pub remarks: Vec<String>,
+    /// Values that were chosen automatically, a line each.
+    pub choices: Vec<String>,
+    /// Files that the scene was read from, the scene file first.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// Device of a scene: one that follows a path, a real one, one in another process, or a pointer of the viewer.
+pub struct SceneDevice {
+    /// Name.
+    pub name: String,
+    /// Initial mode: held point or touch.
+    pub mode: DeviceMode,
+    /// Parameters of the model.
+    pub parameters: DeviceParameters,
+    /// Path of its position, or of the simulated hand; none for real and linked devices and for pointers.
+    pub path: Option<MotionPath>,
+    /// Simulated device and hand, which follow the path as far as forces allow.
+    pub simulated: Option<(Traits, Hand)>,
+    /// Real device.
+    pub real: Option<RealDevice>,
+    /// Whether it is a pointer of the viewer's page.
+    pub pointer: bool,
+}
+
+/// Plane or obstacle of a scene.
+#[derive(Clone)]
+pub struct SceneObstacle {
+    /// Name.
+    pub name: String,
+    /// Path, if it moves.
+    pub path: Option<MotionPath>,
+    /// Initial pose; its orientation also holds for a path of positions.
+    pub start: Pose,
+}
+
+impl SceneDevice {
+    /// Position of its path at a time [s]; the origin without a path [m, world].
+    pub fn position_at(&self, time_s: f64) -> DVec3 {
+        self.path.as_ref().map_or(DVec3::ZERO, |path| path.at(time_s).position)
+    }
+}
+
+impl SceneObstacle {
+    /// Pose at a time [s].
+    pub fn pose_at(&self, time_s: f64) -> Pose {
+        match &self.path {
+            None => self.start,
+            Some(path) if path.turns() => path.at(time_s),
+            Some(path) => Pose { position: path.at(time_s).position, ..self.start },
+        }
+    }
+}
+
+impl Scene {
+    /// Names of all parts, as logs have them.
+    pub fn names(&self) -> Names {
+        Names {
+            objects: self.object_names.clone(),
+            devices: self.devices.iter().map(|device| device.name.clone()).collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+        }
+    }
+
+    /// Names of all parts, as exports have them.
+    pub fn labels(&self) -> SceneLabels {
+        let label =
+            |device: &SceneDevice| DeviceLabel { name: device.name.clone(), transient: device.pointer };
+        SceneLabels {
+            objects: self.object_names.clone(),
+            devices: self.devices.iter().map(label).collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            can_touch: self.can_touch(),
+            inputs: self.inputs.clone(),
+        }
+    }
+
+    /// Input at a time of all paths [s].
+    pub fn input_at(&self, time_s: f64) -> Input {
+        let device =
+            |device: &SceneDevice| DeviceInput { position: device.position_at(time_s), mode: device.mode };
+        Input {
+            devices: self.devices.iter().map(device).collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
+        }
+    }
+
+    /// Whether anything but held points can act on the objects.
+    pub fn can_touch(&self) -> bool {
+        let touching = self.devices.iter().any(|device| device.mode == DeviceMode::Touch);
+        touching || !self.obstacles.is_empty() || self.object_names.len() > 1
+    }
+}
