@@ -7,8 +7,6 @@ mod commands;
 mod failure;
 mod interrupt;
 mod progress;
-mod report;
-mod reproduction;
 mod terminal;
 
 pub use failure::Failure;

@@ -52,6 +52,18 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-scene", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-export"]),
     ("palpate-render", &["palpate", "palpate-haptics", "palpate-viewer", "palpate-export", "palpate-scene"]),
     (
+        "palpate-reproduce",
+        &[
+            "palpate",
+            "palpate-fem",
+            "palpate-viewer",
+            "palpate-export",
+            "palpate-scene",
+            "palpate-render",
+            "palpate-verify",
+        ],
+    ),
+    (
         "palpate-cli",
         &[
             "palpate",
@@ -61,6 +73,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-viewer",
             "palpate-testkit",
             "palpate-verify",
+            "palpate-reproduce",
             "palpate-export",
             "palpate-scene",
             "palpate-render",

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
 use clap::Args;
-use palpate_verify::{CaseResult, Check, Event, UnknownCase, VerifyError, run, select};
+use palpate_verify::{CaseResult, Check, Event, run, select};
 use serde_json::{Value, json};
 
 /// Compute cases with known answers and show the errors and orders of convergence
@@ -77,16 +77,4 @@ fn check_to_json(check: &Check) -> Value {
         "order_expected": check.order.map(|[_, expected]| expected),
         "passed": check.passed(),
     })
-}
-
-impl From<VerifyError> for Failure {
-    fn from(error: VerifyError) -> Self {
-        Self(error.to_string())
-    }
-}
-
-impl From<UnknownCase> for Failure {
-    fn from(error: UnknownCase) -> Self {
-        Self(error.to_string())
-    }
 }

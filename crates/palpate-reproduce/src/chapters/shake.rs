@@ -1,14 +1,15 @@
 //! Figure 5(b), live: two devices in processes of their own hold the cube's sides over links and shake it at 2 Hz, free of gravity.
 
-use super::findings::Finding;
-use super::processes::{number, report, start};
-use super::series::Artist;
-use super::{Chapter, Desk, shaken};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::{Section, code, paragraph, table};
-use palpate_export::write_atomically as write_whole;
-use palpate_fem::progress::Progress;
+use super::shake_figure;
+use crate::chapter::Chapter;
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::image_series::ImageRenderer;
+use crate::options::Options;
+use crate::page::{Section, code, paragraph, table};
+use crate::processes::{number, report, start};
+use crate::progress::StageProgress;
+use palpate_export::write_atomically;
 use serde_json::Value;
 use std::fmt::Write;
 use std::net::{SocketAddr, UdpSocket};
@@ -35,11 +36,15 @@ struct Ran {
 }
 
 /// Runs at both rates, and the figure from the log of the faster one.
-pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(
+    options: &Options,
+    renderer: &ImageRenderer,
+    progress: &mut dyn StageProgress,
+) -> Result<Chapter, ReproduceError> {
     progress.begin("two devices, live", STEPS_S.len() as u64);
-    let folder = desk.scenes();
+    let folder = options.scenes();
     for (name, side) in SIDES {
-        write_whole(&folder.join(format!("{name}.csv")), path(side).as_bytes())?;
+        write_atomically(&folder.join(format!("{name}.csv")), path(side).as_bytes())?;
     }
     let mut rows = vec![vec![
         "the paper, 500 Hz".into(),
@@ -50,8 +55,8 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
     ]];
     let mut findings = Vec::new();
     for (at, step_s) in STEPS_S.into_iter().enumerate() {
-        write_whole(&folder.join(scene_name(step_s)), scene(step_s).as_bytes())?;
-        let ran = run(&folder, step_s)?;
+        write_atomically(&folder.join(scene_name(step_s)), scene(step_s).as_bytes())?;
+        let ran = run(&options.program, &folder, step_s)?;
         rows.push(row(step_s, &ran)?);
         findings.extend(found(step_s, &ran)?);
         progress.advance(at as u64 + 1);
@@ -67,7 +72,7 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
     ));
     let head = ["", "step: median / 99.9 %", "motion to force: median / 99 %", "overruns", "force at most"];
     html += &table("The force process with two devices over links", &head, &rows);
-    let figure = shaken::figure(desk, artist, progress)?;
+    let figure = shake_figure::figure(options, renderer, progress)?;
     html += &figure.html;
     html += &code(&format!(
         "palpate run scenes/{} --realtime --duration {SECONDS} --log {LOG_NAME}\npalpate device left --path scenes/left.csv\n\
@@ -90,7 +95,7 @@ fn finding(what: &str, place: &'static str, paper: &str, ours: String) -> Findin
 }
 
 /// What the paper says of its force process, of ours.
-fn found(step_s: f64, ran: &Ran) -> Result<Vec<Finding>, Failure> {
+fn found(step_s: f64, ran: &Ran) -> Result<Vec<Finding>, ReproduceError> {
     let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
     let hertz = 1.0 / step_s;
     let is_papers = step_s == STEPS_S[0];
@@ -152,8 +157,9 @@ fn scene(step_s: f64) -> String {
 }
 
 /// Three processes: the scene, and a device each.
-fn run(folder: &Path, step_s: f64) -> Result<Ran, Failure> {
-    let failed = |e: std::io::Error| Failure(format!("two devices, live: no port is free: {e}"));
+fn run(program: &Path, folder: &Path, step_s: f64) -> Result<Ran, ReproduceError> {
+    let failed =
+        |e: std::io::Error| ReproduceError::Process(format!("two devices, live: no port is free: {e}"));
     let address = free_port().map_err(failed)?.to_string();
     let (duration, log) = (SECONDS.to_string(), format!("../{LOG_NAME}"));
     let mut scene_arguments =
@@ -164,13 +170,13 @@ fn run(folder: &Path, step_s: f64) -> Result<Ran, Failure> {
     let name = scene_name(step_s);
     scene_arguments.push(&name);
     let files = SIDES.map(|(name, _)| (name, format!("{name}.csv")));
-    let mut children = vec![start(folder, &scene_arguments)?];
+    let mut children = vec![start(program, folder, &scene_arguments)?];
     // They leave a second before the scene does.
     let short = (SECONDS - 1.0).to_string();
     for (name, file) in &files {
         let arguments =
             ["device", name, "--path", file, "--connect", &address, "--duration", &short, "--wait", "10"];
-        match start(folder, &arguments) {
+        match start(program, folder, &arguments) {
             Ok(device) => children.push(device),
             Err(failure) => {
                 children.iter_mut().for_each(|child| drop(child.kill()));
@@ -178,8 +184,9 @@ fn run(folder: &Path, step_s: f64) -> Result<Ran, Failure> {
             }
         }
     }
-    let reports: Result<Vec<Value>, Failure> = children.into_iter().map(report).collect();
-    let mut reports = reports.map_err(|failure| Failure(format!("two devices, live: {failure}")))?;
+    let reports: Result<Vec<Value>, ReproduceError> = children.into_iter().map(report).collect();
+    let mut reports =
+        reports.map_err(|failure| ReproduceError::Process(format!("two devices, live: {failure}")))?;
     Ok(Ran { scene: reports.remove(0), devices: reports })
 }
 
@@ -188,9 +195,9 @@ fn free_port() -> std::io::Result<SocketAddr> {
     UdpSocket::bind("127.0.0.1:0")?.local_addr()
 }
 
-fn row(step_s: f64, ran: &Ran) -> Result<Vec<String>, Failure> {
+fn row(step_s: f64, ran: &Ran) -> Result<Vec<String>, ReproduceError> {
     let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
-    let worst = |key: &str| -> Result<f64, Failure> {
+    let worst = |key: &str| -> Result<f64, ReproduceError> {
         ran.devices.iter().map(|device| number(device, key)).try_fold(0.0, |most, own| Ok(own?.max(most)))
     };
     Ok(vec![

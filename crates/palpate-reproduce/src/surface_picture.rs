@@ -5,8 +5,8 @@
 //! ambient share a. Orthographic, y up. Right where triangles do not pass through each other, as on the
 //! surface of a solid.
 
-use super::escape;
-use super::ticks::{Scale, Span};
+use crate::chart::{Range, Scale};
+use crate::page::escape;
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 
@@ -21,9 +21,9 @@ pub struct Picture<'a> {
     pub values: &'a [f64],
     /// Values at the two ends of the colours.
     pub range: (f64, f64),
-    /// Where it is seen from.
+    /// Direction of view.
     pub view: View,
-    /// What is shown: the same in pictures to be compared.
+    /// Visible rectangle; the same in pictures that are compared.
     pub frame: Frame,
     /// Short text below: "t = 16 ms".
     pub caption: String,
@@ -47,7 +47,7 @@ pub struct Frame {
     pub high: DVec2,
 }
 
-/// What the page's style sheet needs for pictures.
+/// Style sheet of pictures.
 pub const PICTURE_STYLE: &str = "\
 .picture,.colours{display:block;width:100%;height:auto}
 .picture{max-width:15rem}
@@ -94,7 +94,7 @@ impl View {
 }
 
 impl Frame {
-    /// What holds all of some positions [m], and a little more.
+    /// The rectangle that holds all of some positions [m], with a margin.
     pub fn around<'a>(positions: impl IntoIterator<Item = &'a DVec3>, view: View) -> Self {
         let seen =
             positions.into_iter().map(|&p| view.view_from_world(p).truncate()).filter(|p| p.is_finite());
@@ -257,12 +257,10 @@ pub fn colour_bar(range: (f64, f64), label: &str) -> String {
             "<rect fill=\"#{r:02x}{g:02x}{b:02x}\" x=\"{x:.2}\" width=\"{width:.2}\" height=\"12\"/>\n"
         ));
     }
-    if let Some(span) = Span::around([range.0, range.1].into_iter(), Scale::Linear) {
-        for tick in span.ticks_that_fit(6, BAR) {
-            let (x, number) = (LEFT + BAR * tick.share, tick.label.unwrap_or_default());
-            out.push_str(&format!("<path d=\"M{x:.1} 12v5\"/>\n"));
-            out.push_str(&format!("<text text-anchor=\"middle\" x=\"{x:.1}\" y=\"30\">{number}</text>\n"));
-        }
+    for tick in Range::of([range.0, range.1].into_iter(), Scale::Linear).ticks(5) {
+        let (x, number) = (LEFT + BAR * tick.position, tick.label.unwrap_or_default());
+        out.push_str(&format!("<path d=\"M{x:.1} 12v5\"/>\n"));
+        out.push_str(&format!("<text text-anchor=\"middle\" x=\"{x:.1}\" y=\"30\">{number}</text>\n"));
     }
     out.push_str(&format!(
         "<text text-anchor=\"middle\" x=\"160\" y=\"47\">{}</text>\n</svg>\n",
@@ -273,8 +271,8 @@ pub fn colour_bar(range: (f64, f64), label: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::assert_well_formed;
     use super::*;
+    use crate::page::tests::assert_well_formed;
 
     const VIEW: View = View { azimuth_deg: 30.0, elevation_deg: 25.0 };
 

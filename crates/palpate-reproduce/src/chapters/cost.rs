@@ -1,17 +1,19 @@
 //! The cost of direct convolution against what section 2.5 of the paper says of it.
 
-use super::{Chapter, Effort, Finding, csv, cube, table_in_memory};
-use crate::Failure;
-use crate::commands::run::percentile_us;
-use crate::progress::Bars;
-use crate::report::chart::{Axis, Chart, Series, Style};
-use crate::report::{Scale, Section, figure, paragraph};
+use crate::bodies::{cube, table_in_memory};
+use crate::chapter::{Chapter, csv};
+use crate::chart::{Axis, Chart, Scale, Series, Style};
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::options::Effort;
+use crate::page::{Section, figure, paragraph};
+use crate::progress::StageProgress;
 use glam::DVec3;
 use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Pose, Recording, ResponseForm, State, SurfacePoint, Twist, step,
 };
-use palpate_fem::progress::{Progress, Silent};
+use palpate_fem::progress::Silent;
 use palpate_fem::record::Recorded;
 use std::sync::Arc;
 use std::time::Instant;
@@ -55,7 +57,7 @@ fn points(recording: &Recording, count: usize) -> Vec<SurfacePoint> {
 }
 
 /// Measure one configuration: all hands move, and the history is full.
-fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result<Cost, Failure> {
+fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result<Cost, ReproduceError> {
     let recording = Arc::new(body.recording.clone());
     let surface_nodes = body.system.discretisation.surface_nodes();
     let held = points(&recording, held);
@@ -96,7 +98,9 @@ fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
         }
         if status.unsolved_islands + status.rejected_inputs > 0 {
-            return Err(Failure(format!("the cost of a step can't be measured: {status:?}")));
+            return Err(ReproduceError::Measurement(format!(
+                "the cost of a step can't be measured: {status:?}"
+            )));
         }
     }
     times.sort_unstable();
@@ -120,6 +124,12 @@ fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result
     })
 }
 
+/// Time [µs] at a share of sorted times [ns].
+fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
+    let at = (share * sorted_ns.len() as f64).ceil() as usize;
+    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
+}
+
 /// Slope of a line through points on logarithmic axes: the power that y grows with.
 fn power(points: &[(f64, f64)]) -> f64 {
     let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
@@ -135,12 +145,12 @@ fn power(points: &[(f64, f64)]) -> f64 {
 }
 
 /// The curves of the report.
-pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(effort: Effort, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     let cells = [4, 6, 8, 12, 16];
     let (contacts, windows) = ([1, 2, 4, 8, 16], [125, 250, 500, 1000, 2000]);
     progress.begin("cost of direct convolution", (cells.len() + contacts.len() + windows.len()) as u64);
     let mut all = Vec::new();
-    let mut over = |body: &Recorded, points: usize, samples: usize| -> Result<Cost, Failure> {
+    let mut over = |body: &Recorded, points: usize, samples: usize| -> Result<Cost, ReproduceError> {
         let cost = measure(body, points, samples, effort.steps)?;
         progress.advance(1);
         all.push(cost);
@@ -173,7 +183,7 @@ pub fn chapter(effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> 
             x: Axis { label: x.into(), scale: Scale::Log },
             y: Axis { label: "time [µs]".into(), scale: Scale::Log },
             series,
-            notes: Vec::new(),
+            reference_lines: Vec::new(),
         }
         .svg()
     };

@@ -1,6 +1,6 @@
-//! What figures take from a log: it is computed again, step by step, to the bit.
+//! Steps of a log, replayed to the bit, as the figures need them.
 
-use crate::Failure;
+use crate::error::ReproduceError;
 use glam::DVec3;
 use palpate::{Collider, EnergyLedger, Input, Output, State};
 use palpate_scene::LogReplay;
@@ -8,14 +8,14 @@ use std::path::Path;
 
 /// The end of one step.
 #[derive(Debug, Clone)]
-pub struct Snapshot {
+pub struct LoggedStep {
     /// Steps since the start.
     pub step: u64,
     /// Simulated time [s].
     pub time_s: f64,
     /// Centre of mass of the first object [m, world].
     pub centre: DVec3,
-    /// Where the devices are [m, world], and the forces on their hands [N].
+    /// Interface point [m, world] of each device, and the force on its hand [N].
     pub hands: Vec<(DVec3, DVec3)>,
     /// Force of all obstacles on the objects [N].
     pub support: DVec3,
@@ -23,8 +23,8 @@ pub struct Snapshot {
     pub energy: EnergyLedger,
 }
 
-impl Snapshot {
-    /// What a step has left.
+impl LoggedStep {
+    /// A step from its input and output.
     pub fn new(step: u64, input: &Input, output: &Output) -> Self {
         let hands = input.devices.iter().zip(&output.devices);
         let supports =
@@ -41,21 +41,21 @@ impl Snapshot {
 }
 
 /// Every step of a log.
-pub fn moments(log: &Path) -> Result<Vec<Snapshot>, Failure> {
+pub fn logged_steps(log: &Path) -> Result<Vec<LoggedStep>, ReproduceError> {
     let run = LogReplay::read(log)?;
     let mut state = State::new(&run.scene.model);
-    let mut moments = Vec::new();
-    run.replay::<Failure>(&mut state, run.steps, |input, state, _| {
-        moments.push(Snapshot::new(moments.len() as u64 + 1, input, state.output()));
+    let mut steps = Vec::new();
+    run.replay::<ReproduceError>(&mut state, run.steps, |input, state, _| {
+        steps.push(LoggedStep::new(steps.len() as u64 + 1, input, state.output()));
         Ok(())
     })?;
-    Ok(moments)
+    Ok(steps)
 }
 
-/// Largest energy [J] that the ledger has lost track of: stored + lost − input, against that at the start of the run.
-pub fn missing(moments: &[Snapshot], at_start_j: f64) -> f64 {
+/// Largest |stored + lost − input − energy at the start| [J]: energy that the ledger does not account for.
+pub fn unaccounted_energy(steps: &[LoggedStep], at_start_j: f64) -> f64 {
     let sum = |energy: &EnergyLedger| energy.stored() + energy.lost() - energy.input;
-    moments.iter().map(|moment| (sum(&moment.energy) - at_start_j).abs()).fold(0.0, f64::max)
+    steps.iter().map(|logged| (sum(&logged.energy) - at_start_j).abs()).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn energy_that_goes_from_one_form_to_another_is_not_missing_and_energy_that_goes_nowhere_is() {
-        let moment = |kinetic, dissipated, input| Snapshot {
+        let logged = |kinetic, dissipated, input| LoggedStep {
             step: 1,
             time_s: 0.0,
             centre: DVec3::ZERO,
@@ -72,7 +72,7 @@ mod tests {
             support: DVec3::ZERO,
             energy: EnergyLedger { kinetic, dissipated, input, ..EnergyLedger::default() },
         };
-        assert_eq!(missing(&[moment(1.0, 0.0, 0.0), moment(0.5, 0.75, 0.25)], 1.0), 0.0);
-        assert_eq!(missing(&[moment(1.0, 0.0, 0.0), moment(0.5, 0.25, 0.0)], 1.0), 0.25);
+        assert_eq!(unaccounted_energy(&[logged(1.0, 0.0, 0.0), logged(0.5, 0.75, 0.25)], 1.0), 0.0);
+        assert_eq!(unaccounted_energy(&[logged(1.0, 0.0, 0.0), logged(0.5, 0.25, 0.0)], 1.0), 0.25);
     }
 }

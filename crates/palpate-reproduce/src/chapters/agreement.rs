@@ -1,16 +1,17 @@
 //! The two forms of the response against each other, and the two ways of recording.
 
-use super::{Chapter, csv, cube, table_in_memory};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::chart::{Axis, Chart, Series, Style};
-use crate::report::{Scale, Section, figure, paragraph, table};
+use crate::bodies::{cube, table_in_memory};
+use crate::chapter::{Chapter, csv};
+use crate::chart::{Axis, Chart, Scale, Series, Style};
+use crate::error::ReproduceError;
+use crate::page::{Section, figure, paragraph, table};
+use crate::progress::StageProgress;
 use glam::DVec3;
 use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
     ResponseForm, Sampling, State, Twist, step,
 };
-use palpate_fem::progress::{Progress, Silent};
+use palpate_fem::progress::Silent;
 use palpate_fem::record::Recorded;
 use palpate_fem::table::{Method, TableParameters, TableRecorder};
 use std::sync::Arc;
@@ -21,7 +22,7 @@ const SAMPLES: usize = 500;
 const STEP_S: f64 = 1e-3;
 
 /// fir against modal, and time integration against the closed form of all modes.
-pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     progress.begin("agreement", 1);
     let body = cube(CELLS, usize::MAX, &mut Silent)?;
     let mut rows = Vec::new();
@@ -49,9 +50,9 @@ pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
         touchable_nodes: vec![surface[0]],
         observed_nodes: surface.clone(),
     };
-    let columns = |method| -> Result<Vec<f64>, Failure> {
+    let columns = |method| -> Result<Vec<f64>, ReproduceError> {
         let parameters = of(method);
-        let recorder = TableRecorder::new(&body, &parameters).map_err(|e| Failure(e.to_string()))?;
+        let recorder = TableRecorder::new(&body, &parameters)?;
         Ok(recorder.columns(0..3, 3, &|_| {}).concat())
     };
     let exact = columns(Method::ClosedForm)?;
@@ -74,7 +75,7 @@ pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
             Series { label: "measured".into(), points: points.clone(), style: Style::LineAndMarkers },
             Series { label: "order 5".into(), points: guide, style: Style::Dashed },
         ],
-        notes: Vec::new(),
+        reference_lines: Vec::new(),
     };
     html += &figure(
         &chart.svg(),
@@ -88,7 +89,7 @@ pub fn chapter(progress: &mut Bars) -> Result<Chapter, Failure> {
 }
 
 /// Largest difference of forces between both forms, as a share of the largest force.
-fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, Failure> {
+fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, ReproduceError> {
     let rounded = |value: f64| if narrow { f64::from(value as f32) } else { value };
     let surface = body.system.discretisation.surface_nodes();
     let table = table_in_memory(body, STEP_S, SAMPLES, surface, rounded)?;

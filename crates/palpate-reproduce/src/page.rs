@@ -1,17 +1,9 @@
 //! A report as one web page: text, tables and drawings, no script and nothing from elsewhere.
 //!
-//! Whoever calls numbers the figures and tables. Texts are escaped here; what has to be html says so.
+//! Callers number the figures and tables. Texts are escaped here, except where a parameter says that it is html.
 
-pub mod chart;
-mod look;
-mod marks;
-pub mod picture;
-mod text;
-mod ticks;
-
-pub use marks::Mark;
-pub use ticks::Scale;
-
+use crate::chart::CHART_STYLE;
+use crate::surface_picture::PICTURE_STYLE;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
@@ -22,7 +14,7 @@ pub struct Page {
     pub title: String,
     /// Html between the heading and the contents.
     pub intro: String,
-    /// What follows, in order.
+    /// Sections, in order.
     pub sections: Vec<Section>,
 }
 
@@ -98,7 +90,7 @@ impl Page {
                 format!("<section id=\"{id}\">\n<h2>{heading}</h2>\n{body}</section>\n")
             })
             .collect();
-        let (intro, chart, picture) = (&self.intro, chart::CHART_STYLE, picture::PICTURE_STYLE);
+        let (intro, chart, picture) = (&self.intro, CHART_STYLE, PICTURE_STYLE);
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -108,7 +100,7 @@ impl Page {
     }
 }
 
-/// A text with the characters replaced that mean something in html; what no xml may hold is dropped.
+/// A text with the characters escaped that mean something in html, and without control characters.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -149,7 +141,7 @@ pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
-/// A table of texts to be read: the first column links to an anchor for each row, the last is to be typed.
+/// A table of texts: the first column links to an anchor for each row, the last is a command.
 pub fn listing(caption: &str, head: [&str; 4], rows: &[[String; 4]], anchors: &[&str]) -> String {
     let head = head.map(|cell| format!("<th scope=\"col\">{}</th>", escape(cell))).concat();
     let mut body = String::new();
@@ -204,11 +196,11 @@ pub fn code(text: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// Every element that opens also closes, in order; attributes hold no stray quotes.
-    pub(super) fn assert_well_formed(html: &str) {
+    pub(crate) fn assert_well_formed(html: &str) {
         let mut open: Vec<&str> = Vec::new();
         for piece in html.split('<').skip(1) {
             let (tag, text) = piece.split_once('>').expect("a tag ends");

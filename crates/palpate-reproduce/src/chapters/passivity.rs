@@ -8,15 +8,15 @@
 //!
 //! Where Re Y is negative the discrete port generates energy; its least value is given as a share of the largest.
 
-use super::{Chapter, Finding, csv};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::chart::{Axis, Chart, Series, Style};
-use crate::report::{Mark, Scale, Section, figure, paragraph, table};
+use crate::chapter::{Chapter, csv};
+use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::page::{Section, figure, paragraph, table};
+use crate::progress::StageProgress;
 use faer::Mat;
 use glam::DVec3;
 use palpate::{Damping, OscillatorState, SampledOscillator};
-use palpate_fem::progress::Progress;
 use palpate_fem::record::Recorded;
 use palpate_fem::reference::{LoadedMode, Reference};
 use std::f64::consts::TAU;
@@ -73,8 +73,8 @@ impl Port {
 }
 
 /// The port of one node and direction: the kept modes and what stands for the others.
-fn port(body: &Recorded, node: usize, axis: usize, damping: Damping) -> Result<Port, Failure> {
-    let failed = |e: &dyn std::fmt::Display| Failure(format!("passivity: {e}"));
+fn port(body: &Recorded, node: usize, axis: usize, damping: Damping) -> Result<Port, ReproduceError> {
+    let failed = |e: &dyn std::fmt::Display| ReproduceError::Measurement(format!("passivity: {e}"));
     let mut loads = Mat::zeros(body.system.discretisation.dofs(), 3);
     (0..3).for_each(|a| loads[(3 * node + a, a)] = 1.0);
     let mut silent = palpate_fem::progress::Silent;
@@ -163,7 +163,7 @@ impl Tested {
 }
 
 /// The test over single modes, and over the middle of the top face.
-pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     progress.begin("passivity", 1);
     let light = Damping::Rayleigh { alpha: 2.0, beta: 0.0 };
     let usual = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
@@ -192,7 +192,7 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
         x: Axis { label: "frequency [Hz]".into(), scale: Scale::Linear },
         y: Axis { label: "Re Y [% of its largest]".into(), scale: Scale::Linear },
         series,
-        notes: vec![Mark::Horizontal { y: 0.0, label: "passive above".into() }],
+        reference_lines: vec![ReferenceLine::Horizontal { y: 0.0, label: "passive above".into() }],
     };
     let html = table(
         "Largest generation of energy by ways of sampling, as a share of the largest Re Y; step 2 ms",

@@ -1,15 +1,15 @@
 //! Figures 2 and 3: an impulse by a point and by a plane on the top face, and how the wave arrives.
 
-use super::{Chapter, DataFile, Finding, csv};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::chart::{Axis, Chart, Series, Style};
-use crate::report::picture::{Frame, Picture, View, colour_bar};
-use crate::report::{Mark, Scale, Section, figure, gallery, paragraph};
+use crate::chapter::{Chapter, DataFile, csv};
+use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::page::{Section, figure, gallery, paragraph};
+use crate::progress::StageProgress;
+use crate::surface_picture::{Frame, Picture, View, colour_bar};
 use faer::Mat;
 use glam::{DMat3, DVec3};
 use palpate::Sampling;
-use palpate_fem::progress::Progress;
 use palpate_fem::record::Recorded;
 use palpate_fem::table::{Method, TableParameters, TableRecorder};
 
@@ -81,7 +81,7 @@ impl Wave {
 }
 
 /// The two figures and the arrival curve.
-pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     let discretisation = &body.system.discretisation;
     let surface = discretisation.surface_nodes();
     let top = |p: &DVec3| p.y > 0.05 - 1e-9;
@@ -103,7 +103,7 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
         observed_nodes: surface.clone(),
     };
     progress.begin("impulses (figures 2 and 3)", 1);
-    let recorder = TableRecorder::new(body, &parameters).map_err(|e| Failure(e.to_string()))?;
+    let recorder = TableRecorder::new(body, &parameters)?;
     let responses = recorder.responses(loads);
     progress.finish();
     let waves: Vec<Wave> = responses.iter().map(|column| Wave::new(column, surface.len())).collect();
@@ -160,10 +160,13 @@ pub fn chapter(body: &Recorded, progress: &mut Bars) -> Result<Chapter, Failure>
                 style: Style::LineAndMarkers,
             },
         ],
-        notes: vec![
-            Mark::Horizontal { y: 16.0, label: "paper: 16 ms".into() },
-            Mark::Horizontal { y: pressure_ms, label: format!("pressure wave: {pressure_ms:.1} ms") },
-            Mark::Vertical { x: 1.0, label: "1 %".into() },
+        reference_lines: vec![
+            ReferenceLine::Horizontal { y: 16.0, label: "paper: 16 ms".into() },
+            ReferenceLine::Horizontal {
+                y: pressure_ms,
+                label: format!("pressure wave: {pressure_ms:.1} ms"),
+            },
+            ReferenceLine::Vertical { x: 1.0, label: "1 %".into() },
         ],
     };
     let at = |points: &[(f64, f64)], percent: f64| {

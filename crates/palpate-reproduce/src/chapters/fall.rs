@@ -1,17 +1,18 @@
 //! Figure 5(a): the cube falls on a floor and bounces.
 
-use super::findings::Finding;
-use super::logged::{Snapshot, missing, moments};
-use super::processes::{number, report, start};
-use super::series::{Artist, Series as Pictures};
-use super::{Chapter, Desk, csv, damped_cube};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::chart::{Axis, Chart, Series, Style};
-use crate::report::{Mark, Scale, Section, code, figure, paragraph};
+use crate::bodies::damped_cube;
+use crate::chapter::{Chapter, csv};
+use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::image_series::{ImageRenderer, ImageSeries};
+use crate::log_steps::{LoggedStep, logged_steps, unaccounted_energy};
+use crate::options::Options;
+use crate::page::{Section, code, figure, paragraph};
+use crate::processes::{number, report, start};
+use crate::progress::StageProgress;
 use palpate::{Damping, State, step};
-use palpate_export::write_atomically as write_whole;
-use palpate_fem::progress::Progress;
+use palpate_export::write_atomically;
 use palpate_scene::{RunMode, WithoutRemarks, read_scene};
 use palpate_verify::{UNREDUCED_REBOUND_M, UnreducedFallRow, unreduced_fall};
 use palpate_viewer::CameraView;
@@ -59,36 +60,36 @@ struct Story {
 }
 
 /// Height of the centre above that of the cube standing undeformed [m].
-fn height(moment: &Snapshot) -> f64 {
-    moment.centre.y - HALF_M
+fn height(logged: &LoggedStep) -> f64 {
+    logged.centre.y - HALF_M
 }
 
 impl Story {
-    fn find(moments: &[Snapshot]) -> Option<Self> {
-        let after = |from: usize, is: &dyn Fn(&Snapshot) -> bool| {
-            moments[from..].iter().position(is).map(|found| from + found)
+    fn find(steps: &[LoggedStep]) -> Option<Self> {
+        let after = |from: usize, is: &dyn Fn(&LoggedStep) -> bool| {
+            steps[from..].iter().position(is).map(|found| from + found)
         };
         let lowest = |from: usize, to: usize| {
-            (from..to).min_by(|&a, &b| height(&moments[a]).total_cmp(&height(&moments[b])))
+            (from..to).min_by(|&a, &b| height(&steps[a]).total_cmp(&height(&steps[b])))
         };
-        let touch = after(0, &|moment| moment.support.y > 0.0)?;
-        let up = after(touch + 1, &|moment| height(moment) > JUMP_M)?;
+        let touch = after(0, &|logged| logged.support.y > 0.0)?;
+        let up = after(touch + 1, &|logged| height(logged) > JUMP_M)?;
         let deepest = lowest(touch, up)?;
-        let down = after(up, &|moment| height(moment) < 0.0)?;
-        let top = (up..down).max_by(|&a, &b| height(&moments[a]).total_cmp(&height(&moments[b])))?;
-        let leaves = (deepest..top).rev().find(|&at| moments[at].support.y > 0.0)?;
-        let up_again = after(down, &|moment| height(moment) > JUMP_M).unwrap_or(moments.len());
+        let down = after(up, &|logged| height(logged) < 0.0)?;
+        let top = (up..down).max_by(|&a, &b| height(&steps[a]).total_cmp(&height(&steps[b])))?;
+        let leaves = (deepest..top).rev().find(|&at| steps[at].support.y > 0.0)?;
+        let up_again = after(down, &|logged| height(logged) > JUMP_M).unwrap_or(steps.len());
         Some(Self { touch, deepest, leaves, top, second: lowest(down, up_again)? })
     }
 
     /// Steps since the start, and what is to be seen.
-    fn instants(&self, moments: &[Snapshot]) -> Vec<(u64, String)> {
+    fn instants(&self, steps: &[LoggedStep]) -> Vec<(u64, String)> {
         let bends = (self.touch..=self.deepest)
-            .find(|&at| height(&moments[at]) < 0.5 * height(&moments[self.deepest]))
+            .find(|&at| height(&steps[at]) < 0.5 * height(&steps[self.deepest]))
             .unwrap_or(self.deepest);
         let of = |at: usize, what: &str| {
-            let moment = &moments[at];
-            (moment.step, format!("{:.3} s: {what}", moment.time_s))
+            let logged = &steps[at];
+            (logged.step, format!("{:.3} s: {what}", logged.time_s))
         };
         vec![
             (0, "0 s: let go, 5 cm above the floor".into()),
@@ -96,11 +97,11 @@ impl Story {
             of(bends, "the lower face lies, the rest falls on"),
             of(self.deepest, "deepest"),
             of((self.leaves + 1).min(self.top), "leaves the floor"),
-            of(self.top, &format!("top of the rebound, {:.1} mm", 1e3 * height(&moments[self.top]))),
+            of(self.top, &format!("top of the rebound, {:.1} mm", 1e3 * height(&steps[self.top]))),
             of(self.second, "deepest of the second contact"),
             of(
-                moments.len() - 1,
-                if lies_still(moments) {
+                steps.len() - 1,
+                if lies_still(steps) {
                     "lies still, sagging under its weight"
                 } else {
                     "on the floor, still trembling"
@@ -110,67 +111,71 @@ impl Story {
     }
 }
 
-fn lies_still(moments: &[Snapshot]) -> bool {
-    let late = &moments[moments.len().saturating_sub((STILL_S / STEP_S) as usize)..];
-    let mean = late.iter().map(|moment| moment.support.y).sum::<f64>() / late.len() as f64;
-    late.iter().all(|moment| (moment.support.y - mean).abs() <= STILL * mean)
+fn lies_still(steps: &[LoggedStep]) -> bool {
+    let late = &steps[steps.len().saturating_sub((STILL_S / STEP_S) as usize)..];
+    let mean = late.iter().map(|logged| logged.support.y).sum::<f64>() / late.len() as f64;
+    late.iter().all(|logged| (logged.support.y - mean).abs() <= STILL * mean)
 }
 
 /// The same scene with every node of the face instead of few places: the rebound [m].
-fn rebound_of_every_node(desk: &Desk) -> Result<f64, Failure> {
-    let scene = read_scene(&desk.scenes().join(SCENE_NAME), RunMode::Offline)?;
+fn rebound_of_every_node(options: &Options) -> Result<f64, ReproduceError> {
+    let scene = read_scene(&options.scenes().join(SCENE_NAME), RunMode::Offline)?;
     let mut state = State::new(&scene.model);
-    let mut moments = Vec::new();
+    let mut steps = Vec::new();
     for number in 1..=(0.5 / STEP_S) as u64 {
         let input = scene.input_at(number as f64 * STEP_S);
         let output = step(&scene.model, &mut state, &input);
-        moments.push(Snapshot::new(number, &input, output));
+        steps.push(LoggedStep::new(number, &input, output));
     }
-    Ok(Story::find(&moments).map_or(f64::NAN, |story| height(&moments[story.top])))
+    Ok(Story::find(&steps).map_or(f64::NAN, |story| height(&steps[story.top])))
 }
 
 /// The run, its pictures and its curves.
-pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chapter, Failure> {
-    let body = damped_cube(desk.effort.cells, 200, DAMPING, &mut WithoutRemarks(progress))?;
+pub fn chapter(
+    options: &Options,
+    renderer: &ImageRenderer,
+    progress: &mut dyn StageProgress,
+) -> Result<Chapter, ReproduceError> {
+    let body = damped_cube(options.effort.cells, 200, DAMPING, &mut WithoutRemarks(progress))?;
     progress.begin("a fall, live (figure 5a)", 1);
-    write_whole(&desk.scenes().join("falling.palp"), &body.recording.to_bytes()?)?;
-    write_whole(&desk.scenes().join(SCENE_NAME), SCENE.as_bytes())?;
+    write_atomically(&options.scenes().join("falling.palp"), &body.recording.to_bytes()?)?;
+    write_atomically(&options.scenes().join(SCENE_NAME), SCENE.as_bytes())?;
     let duration = SECONDS.to_string();
-    let log = desk.output.join(LOG_NAME);
+    let log = options.output.join(LOG_NAME);
     let log_from_there = format!("../{LOG_NAME}");
     let run = ["run", SCENE_NAME, "--realtime", "--duration", &duration, "--log", &log_from_there];
-    let ran = report(start(&desk.scenes(), &run)?)?;
-    let every_node_m = rebound_of_every_node(desk)?;
+    let ran = report(start(&options.program, &options.scenes(), &run)?)?;
+    let every_node_m = rebound_of_every_node(options)?;
     progress.finish();
-    let moments = moments(&log)?;
-    let story = Story::find(&moments)
-        .ok_or_else(|| Failure(format!("{}: the cube does not bounce", log.display())))?;
+    let steps = logged_steps(&log)?;
+    let story = Story::find(&steps)
+        .ok_or_else(|| ReproduceError::Measurement(format!("{}: the cube does not bounce", log.display())))?;
     progress.begin("pictures of figure 5a", 1);
-    let pictures = artist.series(&Pictures {
+    let pictures = renderer.images(&ImageSeries {
         log: &log,
-        folder: &desk.output.join("figure5a"),
+        folder: &options.output.join("figure5a"),
         camera: CAMERA,
-        instants: &story.instants(&moments),
+        instants: &story.instants(&steps),
         caption: "Figure 5(a), from the log of the run: colours tell how far the surface is from its place in the undeformed cube, \
                   arrows are the forces of the floor.",
-    });
+    }, progress);
     progress.finish();
 
     let mass = body.recording.mass();
     let at_start = mass * G * (HALF_M + DROP_M);
-    let missing = missing(&moments, at_start) / (mass * G * DROP_M);
-    let rebound = height(&moments[story.top]);
+    let missing = unaccounted_energy(&steps, at_start) / (mass * G * DROP_M);
+    let rebound = height(&steps[story.top]);
     // A flat face that meets a floor at once is stopped within a step, whatever that is: the largest force of the first
     // steps grows with the rate.
-    let blow = moments[story.touch..(story.touch + 2).min(moments.len())]
+    let blow = steps[story.touch..(story.touch + 2).min(steps.len())]
         .iter()
         .map(|m| m.support.y)
         .fold(0.0, f64::max);
-    let push = moments[(story.touch + 2).min(story.leaves)..=story.leaves]
+    let push = steps[(story.touch + 2).min(story.leaves)..=story.leaves]
         .iter()
         .map(|m| m.support.y)
         .fold(0.0, f64::max);
-    let is_papers = desk.effort.cells == 12;
+    let is_papers = options.effort.cells == 12;
     let full = if is_papers {
         format!(", and with all 6585 modes of the mesh, not reduced, {:.1} mm", 1e3 * UNREDUCED_REBOUND_M)
     } else {
@@ -188,11 +193,11 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
     ));
     html += &pictures;
     html += &figure(
-        &heights(&moments, is_papers).svg(),
+        &heights(&steps, is_papers).svg(),
         "Zero is the height of the centre when the cube stands undeformed. What it sinks below is deformation.",
     );
     html += &figure(
-        &forces(&moments, is_papers, mass * G).svg(),
+        &forces(&steps, is_papers, mass * G).svg(),
         &format!(
             "The flat face is stopped within one step, by {blow:.1} N here; that is a blow, and half as large at half the rate. What the rest of the cube \
              then pushes with is {push:.1} N at most, {:.1} times the weight.",
@@ -200,10 +205,10 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
         ),
     );
     html += &figure(
-        &energies(&moments, mass).svg(),
+        &energies(&steps, mass).svg(),
         &format!(
             "Nothing is missing: stored energy and losses add up to what the cube had at the start, to {missing:.0e} of the fall's energy over all {} steps.",
-            moments.len()
+            steps.len()
         ),
     );
     html += &code(&format!(
@@ -241,7 +246,7 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
             ),
         ),
     ];
-    let rows = moments.iter().map(|m| {
+    let rows = steps.iter().map(|m| {
         let e = &m.energy;
         vec![
             m.time_s,
@@ -262,22 +267,22 @@ pub fn chapter(desk: &Desk, artist: &Artist, progress: &mut Bars) -> Result<Chap
 }
 
 /// One curve over what is drawn.
-fn curve(moments: &[Snapshot], label: &str, of: impl Fn(&Snapshot) -> f64) -> Series {
-    let shown = moments.iter().take_while(|moment| moment.time_s <= DRAWN_S);
+fn curve(steps: &[LoggedStep], label: &str, of: impl Fn(&LoggedStep) -> f64) -> Series {
+    let shown = steps.iter().take_while(|logged| logged.time_s <= DRAWN_S);
     Series {
         label: label.into(),
-        points: shown.map(|moment| (moment.time_s, of(moment))).collect(),
+        points: shown.map(|logged| (logged.time_s, of(logged))).collect(),
         style: Style::Line,
     }
 }
 
-fn chart(title: &str, y: &str, series: Vec<Series>, notes: Vec<Mark>) -> Chart {
+fn chart(title: &str, y: &str, series: Vec<Series>, reference_lines: Vec<ReferenceLine>) -> Chart {
     Chart {
         title: title.into(),
         x: Axis { label: "time [s]".into(), scale: Scale::Linear },
         y: Axis { label: y.into(), scale: Scale::Linear },
         series,
-        notes,
+        reference_lines,
     }
 }
 
@@ -290,38 +295,44 @@ fn unreduced(of: impl Fn(UnreducedFallRow) -> f64) -> Series {
     }
 }
 
-fn heights(moments: &[Snapshot], is_papers: bool) -> Chart {
-    let mut series = vec![curve(moments, "palpate, in real time", |moment| 1e3 * height(moment))];
-    let mut notes = Vec::new();
+fn heights(steps: &[LoggedStep], is_papers: bool) -> Chart {
+    let mut series = vec![curve(steps, "palpate, in real time", |logged| 1e3 * height(logged))];
+    let mut reference_lines = Vec::new();
     if is_papers {
         series.push(unreduced(|row| 1e3 * row.height_m));
-        notes.push(Mark::Horizontal {
+        reference_lines.push(ReferenceLine::Horizontal {
             y: 1e3 * UNREDUCED_REBOUND_M,
             label: format!("{:.1} mm", 1e3 * UNREDUCED_REBOUND_M),
         });
     }
-    chart("Height of the centre", "above that of the undeformed cube on the floor [mm]", series, notes)
+    chart(
+        "Height of the centre",
+        "above that of the undeformed cube on the floor [mm]",
+        series,
+        reference_lines,
+    )
 }
 
-fn forces(moments: &[Snapshot], is_papers: bool, weight: f64) -> Chart {
-    let mut series = vec![curve(moments, "palpate, in real time", |moment| moment.support.y)];
+fn forces(steps: &[LoggedStep], is_papers: bool, weight: f64) -> Chart {
+    let mut series = vec![curve(steps, "palpate, in real time", |logged| logged.support.y)];
     if is_papers {
         series.push(unreduced(|row| row.force_n));
     }
-    let notes = vec![Mark::Horizontal { y: weight, label: format!("weight: {weight:.2} N") }];
-    chart("Force of the floor", "upward [N]", series, notes)
+    let reference_lines =
+        vec![ReferenceLine::Horizontal { y: weight, label: format!("weight: {weight:.2} N") }];
+    chart("Force of the floor", "upward [N]", series, reference_lines)
 }
 
-fn energies(moments: &[Snapshot], mass: f64) -> Chart {
+fn energies(steps: &[LoggedStep], mass: f64) -> Chart {
     let standing = mass * G * HALF_M;
     let series = vec![
-        curve(moments, "of height", |m| 1e3 * (m.energy.potential - standing)),
-        curve(moments, "of motion", |m| 1e3 * m.energy.kinetic),
-        curve(moments, "of deformation", |m| 1e3 * (m.energy.elastic + m.energy.residual)),
-        curve(moments, "lost", |m| 1e3 * m.energy.lost()),
+        curve(steps, "of height", |m| 1e3 * (m.energy.potential - standing)),
+        curve(steps, "of motion", |m| 1e3 * m.energy.kinetic),
+        curve(steps, "of deformation", |m| 1e3 * (m.energy.elastic + m.energy.residual)),
+        curve(steps, "lost", |m| 1e3 * m.energy.lost()),
         Series {
             style: Style::Dashed,
-            ..curve(moments, "sum", |m| 1e3 * (m.energy.stored() - standing + m.energy.lost()))
+            ..curve(steps, "sum", |m| 1e3 * (m.energy.stored() - standing + m.energy.lost()))
         },
     ];
     chart("Where the energy is", "energy [mJ]", series, Vec::new())
@@ -334,9 +345,9 @@ mod tests {
     use palpate::EnergyLedger;
 
     /// A ball on a spring floor, in numbers.
-    fn bounce() -> Vec<Snapshot> {
+    fn bounce() -> Vec<LoggedStep> {
         let heights = [50, 30, 0, -10, -5, 0, 10, 24, 12, 0, -6, -3, 4, 0];
-        let moment = |(at, mm): (usize, i32)| Snapshot {
+        let logged = |(at, mm): (usize, i32)| LoggedStep {
             step: at as u64 + 1,
             time_s: 0.01 * (at + 1) as f64,
             centre: DVec3::Y * (HALF_M + 1e-3 * f64::from(mm)),
@@ -344,7 +355,7 @@ mod tests {
             support: DVec3::Y * f64::from(u8::from(mm < 0)),
             energy: EnergyLedger::default(),
         };
-        heights.into_iter().enumerate().map(moment).collect()
+        heights.into_iter().enumerate().map(logged).collect()
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Table 1: the size of the model, and what recording a column costs.
 
-use super::{Chapter, Effort, Finding, csv};
-use crate::Failure;
-use crate::progress::Bars;
-use crate::report::{Section, code, paragraph, table};
+use crate::chapter::{Chapter, csv};
+use crate::error::ReproduceError;
+use crate::findings::Finding;
+use crate::options::Effort;
+use crate::page::{Section, code, paragraph, table};
+use crate::progress::StageProgress;
 use palpate::Sampling;
-use palpate_fem::progress::Progress;
 use palpate_fem::record::Recorded;
 use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
 use std::time::Instant;
@@ -16,7 +17,11 @@ const TIMED: usize = 50;
 const STEP_S: f64 = 2e-3;
 
 /// Table 1 with our figures beside the paper's.
-pub fn chapter(body: &Recorded, effort: Effort, progress: &mut Bars) -> Result<Chapter, Failure> {
+pub fn chapter(
+    body: &Recorded,
+    effort: Effort,
+    progress: &mut dyn StageProgress,
+) -> Result<Chapter, ReproduceError> {
     let discretisation = &body.system.discretisation;
     let surface = discretisation.surface_nodes();
     let ways = [
@@ -34,7 +39,7 @@ pub fn chapter(body: &Recorded, effort: Effort, progress: &mut Bars) -> Result<C
             touchable_nodes: surface.clone(),
             observed_nodes: surface.clone(),
         };
-        let recorder = TableRecorder::new(body, &parameters).map_err(|e| Failure(e.to_string()))?;
+        let recorder = TableRecorder::new(body, &parameters)?;
         let columns = effort.columns.min(3 * surface.len());
         progress.begin("timing a column", columns as u64);
         let counter = progress.counter();

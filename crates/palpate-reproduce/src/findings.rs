@@ -1,6 +1,6 @@
 //! What the paper reports beside what was measured: the table at the top of the page.
 
-use crate::report::listing;
+use crate::page::listing;
 
 /// One thing that the paper reports.
 #[derive(Debug, Clone)]
