@@ -41,9 +41,12 @@ from_display!(
     palpate_fem::table::TableError,
     palpate_haptics::Error,
     palpate_render::RenderError,
+    palpate_reproduce::ReproduceError,
     palpate_scene::ReplayError,
     palpate_scene::SceneError,
     palpate_store::StoreError,
+    palpate_verify::UnknownCase,
+    palpate_verify::VerifyError,
 );
 
 impl From<ExportError> for Failure {

@@ -3,6 +3,7 @@
 use crate::terminal::notify;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_fem::progress::Progress;
+use palpate_reproduce::StageProgress;
 use std::io::IsTerminal;
 use std::time::Instant;
 
@@ -37,6 +38,16 @@ impl Bars {
         if let Some((stage, since)) = self.stage.take() {
             notify(&format!("  {stage:<24} {:>7.2} s", since.elapsed().as_secs_f64()));
         }
+    }
+}
+
+impl StageProgress for Bars {
+    fn finish(&mut self) {
+        self.finish();
+    }
+
+    fn counter(&self) -> Box<dyn Fn(usize) + Sync> {
+        Box::new(self.counter())
     }
 }
 

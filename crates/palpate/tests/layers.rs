@@ -46,9 +46,23 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
     ("palpate-viewer", &["palpate", "palpate-haptics"]),
+    ("palpate-testkit", &["palpate", "palpate-fem"]),
+    ("palpate-verify", &["palpate", "palpate-fem", "palpate-haptics", "palpate-testkit"]),
     ("palpate-export", &["palpate", "palpate-fem"]),
     ("palpate-scene", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-export"]),
     ("palpate-render", &["palpate", "palpate-haptics", "palpate-viewer", "palpate-export", "palpate-scene"]),
+    (
+        "palpate-reproduce",
+        &[
+            "palpate",
+            "palpate-fem",
+            "palpate-viewer",
+            "palpate-export",
+            "palpate-scene",
+            "palpate-render",
+            "palpate-verify",
+        ],
+    ),
     (
         "palpate-cli",
         &[
@@ -57,6 +71,9 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-store",
             "palpate-haptics",
             "palpate-viewer",
+            "palpate-testkit",
+            "palpate-verify",
+            "palpate-reproduce",
             "palpate-export",
             "palpate-scene",
             "palpate-render",

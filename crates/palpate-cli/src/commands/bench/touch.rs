@@ -2,27 +2,25 @@
 
 use super::{Case, pictures, timed_step};
 use crate::failure::Failure;
-use glam::{DMat3, DVec3};
-use palpate::{
-    DeviceInput, DeviceParameters, Input, ModalBasis, Model, ModelObject, ModelParameters, NearField,
-    ObjectStart, Obstacle, Pose, Recording, ResidualCompliance, Shape, State, Surface, Twist,
-};
+use glam::DVec3;
+use palpate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, Recording, State};
+use palpate_testkit::{GRAVITY_M_S2, finger, floor, start_at, subdivided_near_field};
 use palpate_viewer::FrameFormat;
-use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Typical finger.
-pub const FINGER: DeviceParameters =
-    DeviceParameters { tip_radius: 0.005, patch_radius: 0.004, friction: 0.6, coupling: None };
+/// Fingers like these are on every haptic workbench.
+pub const FINGER: DeviceParameters = finger(0.005, 0.004, 0.6);
 
 /// Half the side of the cubes [m].
 pub const HALF: f64 = 0.05;
 
-/// Contact samples: at all nodes, or few.
+/// Contact samples at all nodes.
 const ALL: usize = usize::MAX;
-const FEW: usize = 48;
 
-/// Refinements of the recorded surface, each of which splits every triangle in four.
+/// Contact samples of a run in real time.
+const SAMPLES: usize = 48;
+
+/// Subdivisions of the recorded cube's surface on the finest one.
 const REFINEMENTS: usize = 3;
 
 /// Cases with the paper's cube and a finer one.
@@ -39,7 +37,7 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     let mut recording = finer;
     for refinement in 0..=REFINEMENTS {
         if refinement > 0 {
-            recording = Arc::new(refined(&recording));
+            recording = Arc::new(subdivided_near_field(&recording));
         }
         fingers(recording.clone(), false);
     }
@@ -49,13 +47,13 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),
-        (0.0, 1, FEW, "lies on a floor, 48 contact samples"),
+        (0.0, 1, SAMPLES, "lies on a floor, 48 contact samples"),
         (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
-        (0.05, 1, FEW, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
+        (0.05, 1, SAMPLES, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
         (0.0, 2, ALL, "one on another on a floor"),
-        (0.0, 2, FEW, "one on another on a floor, 48 contact samples"),
+        (0.0, 2, SAMPLES, "one on another on a floor, 48 contact samples"),
         (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
-        (0.001, 2, FEW, "one on another, falls on a floor, contact steps, 48 contact samples"),
+        (0.001, 2, SAMPLES, "one on another, falls on a floor, contact steps, 48 contact samples"),
     ];
     // Damping lets resting cubes come to rest.
     let damped_cube = Arc::new(damped(&cube));
@@ -88,7 +86,7 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
         ],
         ..ModelParameters::default()
     };
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(0.0))])?;
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])?;
     let mut state = State::new(&model);
     // A free cube between sliding fingers slips away in the end.
     let steps = if sliding { steps.min(4000) } else { steps };
@@ -124,7 +122,7 @@ fn floor_steps(
     let parameters = on_a_floor(max_contact_samples);
     let cube = |number: usize| {
         let above = height + number as f64 * (2.0 * HALF + height);
-        ModelObject::new(recording.clone(), at_height(HALF + above))
+        ModelObject::new(recording.clone(), start_at(DVec3::Y * (HALF + above)))
     };
     let model = Model::new(parameters, (0..cubes).map(cube).collect())?;
     let mut state = State::new(&model);
@@ -142,9 +140,13 @@ fn floor_steps(
 
 /// Parameters with gravity and a floor.
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
-    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
-    let gravity = DVec3::Y * -9.81;
-    ModelParameters { gravity, obstacles: vec![floor], max_contact_samples, ..ModelParameters::default() }
+    let gravity = DVec3::Y * -GRAVITY_M_S2;
+    ModelParameters {
+        gravity,
+        obstacles: vec![floor(0.5)],
+        max_contact_samples,
+        ..ModelParameters::default()
+    }
 }
 
 /// Compute times of steps in which two fingers press a cube on a floor by 3 mm and push it [ns].
@@ -154,7 +156,7 @@ fn moving_steps(
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(max_contact_samples) };
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::Y * HALF))])?;
     let mut state = State::new(&model);
     // Settling, then pressing, then pushing.
     let (settled, moved) = (1000, 1500);
