@@ -64,7 +64,7 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         cases.push((label, Box::new(run)));
     }
     for (max_contact_samples, what) in
-        [(ALL, "2 fingers move it on a floor"), (FEW, "2 fingers move it on a floor, 48 contact samples")]
+        [(ALL, "2 fingers move it on a floor"), (SAMPLES, "2 fingers move it on a floor, 48 contact samples")]
     {
         let recording = damped_cube.clone();
         let label = format!("12³ cells, 200 modes, {what}");

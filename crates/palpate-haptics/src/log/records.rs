@@ -1,62 +1,62 @@
-//! What goes from the force process to the log, in buffers that are made once and go round.
+//! Records of steps and frames, in buffers that the force process fills and the log writer empties.
 
 use palpate::{
     ContactOutput, DeviceOutput, EnergyLedger, Input, Model, ObjectOutput, Output, Pose, State, StepStatus,
 };
 use std::time::Duration;
 
-/// One step.
+/// Record of one step: input, output and timing.
 #[derive(Debug)]
-pub struct Record {
-    /// Steps since the start, and the tick of the clock that it was made at.
+pub struct StepRecord {
+    /// Number of the step, from 1.
     pub step: u64,
-    /// See `step`.
+    /// Tick of the force process's clock.
     pub tick: u64,
-    /// Simulated time at its end [s].
+    /// Simulated time at the end of the step [s].
     pub time_s: f64,
-    /// How late it began.
-    pub late: Duration,
-    /// How long it took.
-    pub took: Duration,
-    /// What it was given.
+    /// Delay of the cycle after its deadline.
+    pub lateness: Duration,
+    /// Compute time of the cycle.
+    pub compute: Duration,
+    /// Input.
     pub input: Input,
-    /// What came out.
+    /// Output of every device.
     pub devices: Vec<DeviceOutput>,
-    /// See `devices`.
+    /// Output of every object.
     pub objects: Vec<ObjectOutput>,
-    /// See `devices`.
+    /// Energy ledger of the scene.
     pub energy: EnergyLedger,
-    /// See `devices`.
+    /// Status of the step.
     pub status: StepStatus,
 }
 
-/// What a picture of a step takes.
+/// Record of one frame: what a display needs beyond the steps.
 #[derive(Debug)]
-pub struct Picture {
-    /// Steps since the start.
+pub struct FrameRecord {
+    /// Number of the step, from 1.
     pub step: u64,
-    /// Simulated time at its end [s].
+    /// Simulated time at the end of the step [s].
     pub time_s: f64,
-    /// Where the objects and the obstacles are.
+    /// Poses of the objects.
     pub objects: Vec<Pose>,
-    /// See `objects`.
+    /// Poses of the obstacles.
     pub obstacles: Vec<Pose>,
     /// Contacts that carry force.
     pub contacts: Vec<ContactOutput>,
-    /// Modal coordinates q [m·√kg] of every object.
+    /// Modal coordinates q of every object [m·√kg].
     pub modes: Vec<Vec<f64>>,
 }
 
-impl Record {
-    /// Room for the steps of a scene.
+impl StepRecord {
+    /// Record with the capacity of any step of a scene.
     pub fn new(state: &State, input: &Input) -> Self {
         let output = state.output();
         Self {
             step: 0,
             tick: 0,
             time_s: 0.0,
-            late: Duration::ZERO,
-            took: Duration::ZERO,
+            lateness: Duration::ZERO,
+            compute: Duration::ZERO,
             input: input.clone(),
             devices: output.devices.clone(),
             objects: output.objects.clone(),
@@ -65,11 +65,11 @@ impl Record {
         }
     }
 
-    /// Take over a step.
+    /// Overwrites the record with a step, except for its number and timing.
     ///
     /// # Real time
     /// No allocation.
-    pub fn take(&mut self, input: &Input, state: &State) {
+    pub fn capture(&mut self, input: &Input, state: &State) {
         let Output { time_s, devices, objects, energy, status, .. } = state.output();
         (self.time_s, self.energy, self.status) = (*time_s, *energy, *status);
         self.input.devices.copy_from_slice(&input.devices);
@@ -79,8 +79,8 @@ impl Record {
     }
 }
 
-impl Picture {
-    /// Room for the pictures of a scene.
+impl FrameRecord {
+    /// Record with the capacity of any frame of a scene.
     pub fn new(model: &Model, state: &State, input: &Input) -> Self {
         let output = state.output();
         let modes = (0..model.recordings().count()).map(|object| vec![0.0; state.modal_state(object).len()]);
@@ -94,11 +94,11 @@ impl Picture {
         }
     }
 
-    /// Take over a step.
+    /// Overwrites the record with a step, except for its number.
     ///
     /// # Real time
     /// No allocation.
-    pub fn take(&mut self, input: &Input, state: &State) {
+    pub fn capture(&mut self, input: &Input, state: &State) {
         let output = state.output();
         self.time_s = output.time_s;
         self.objects.iter_mut().zip(&output.objects).for_each(|(pose, object)| *pose = object.pose);
