@@ -95,7 +95,7 @@ impl Tree {
                 module = parent_module(&module)?;
                 continue;
             }
-            let child = [&module[..], &[segment.clone()]].concat();
+            let child = [&module[..], std::slice::from_ref(segment)].concat();
             if self.modules.contains_key(&child) {
                 module = child;
                 continue;

@@ -22,7 +22,7 @@ const THEORY: &str = "docs/theory.md";
 /// History of versions: only its first section, of the next version, is held to the words.
 const CHANGELOG: &str = "CHANGELOG.md";
 
-/// How a doc comment must not begin: it would not name its thing.
+/// Forbidden beginnings of doc comments: they do not name the thing.
 const EMPTY_BEGINNINGS: &[&str] = &["What ", "How ", "The same", "See "];
 
 /// Findings, each as `file:line: text`.
@@ -93,10 +93,11 @@ fn empty_doc_comments(name: &str, text: &str) -> Vec<String> {
     let mut inside = false;
     for (at, line) in text.lines().enumerate() {
         let own = doc(line).filter(|_| name.ends_with(".rs") || name.ends_with(".ts"));
-        if let Some(beginning) = own.as_ref().filter(|_| !inside) {
-            if EMPTY_BEGINNINGS.iter().any(|empty| beginning.starts_with(empty)) {
-                found.push(format!("{name}:{}: doc comment begins with {beginning:.40?}", at + 1));
-            }
+        let beginning = own.as_ref().filter(|_| !inside);
+        let is_empty = |text: &&String| EMPTY_BEGINNINGS.iter().any(|empty| text.starts_with(empty));
+        if let Some(beginning) = beginning.filter(is_empty) {
+            let shown: String = beginning.chars().take(40).collect();
+            found.push(format!("{name}:{}: doc comment begins with {shown:?}", at + 1));
         }
         inside = own.is_some();
     }

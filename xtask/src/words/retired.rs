@@ -90,10 +90,12 @@ impl Retired {
                 continue;
             }
             let of = |list: &[Entry], any: &Regex, text: &str| {
-                let own = list.iter().filter(|entry| any.is_match(text) && name.starts_with(&entry.below));
-                let used = own.map(|entry| (entry.regex.find(text), &entry.replacement));
-                used.filter_map(|(used, replacement)| Some((used?.as_str().to_string(), replacement.clone())))
-                    .next()
+                if !any.is_match(text) {
+                    return None;
+                }
+                let own = list.iter().filter(|entry| name.starts_with(&entry.below));
+                let mut used = own.filter_map(|entry| Some((entry.regex.find(text)?, &entry.replacement)));
+                used.next().map(|(used, replacement)| (used.as_str().to_string(), replacement.clone()))
             };
             let code = if is_source { line.split("//").next().unwrap_or_default() } else { "" };
             let of_both = [of(&self.words, &self.any[0], &spoken(line)), of(&self.names, &self.any[1], code)];
