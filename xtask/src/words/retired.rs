@@ -22,21 +22,24 @@ struct Entry {
 pub(super) struct Retired {
     /// Of prose and identifiers alike, as lower-case words.
     words: Vec<Entry>,
+    /// Of all files, as they are written.
+    texts: Vec<Entry>,
     /// Of identifiers in code, as they are written.
     names: Vec<Entry>,
     /// Any of them, to pass most lines at once.
-    any: [Regex; 2],
+    any: [Regex; 3],
     /// Beginnings of paths that are not looked at.
     allowed: Vec<String>,
 }
 
 impl Retired {
-    /// Parse the list: `word REGEX → REPLACEMENT`, `name REGEX → REPLACEMENT`, `in PATH`, `allow PATH`, `#` comments.
+    /// Parse the list: `word|text|name REGEX → REPLACEMENT`, `in PATH`, `allow PATH`, `#` comments.
     ///
     /// # Errors
     /// When a line is none of these, or its regular expression is not one.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
-        let (mut words, mut names, mut allowed) = (Vec::new(), Vec::new(), Vec::new());
+        let [mut words, mut texts, mut names] = [const { Vec::new() }; 3];
+        let mut allowed = Vec::new();
         let mut below = String::new();
         for (at, line) in text.lines().enumerate() {
             let line = line.trim();
@@ -54,24 +57,31 @@ impl Retired {
             }
             let (kind, rest) = line.split_once(' ').unwrap_or((line, ""));
             let Some((pattern, replacement)) = rest.split_once('→') else {
-                return Err(fail("expected `word REGEX → REPLACEMENT`, `name REGEX → REPLACEMENT`, `in PATH` or `allow PATH`".into()));
+                return Err(fail(
+                    "expected `word|text|name REGEX → REPLACEMENT`, `in PATH` or `allow PATH`".into(),
+                ));
             };
             let list = match kind {
                 "word" => &mut words,
+                "text" => &mut texts,
                 "name" => &mut names,
-                _ => return Err(fail(format!("begins with {kind:?}, expected word, name, in or allow"))),
+                _ => {
+                    return Err(fail(format!("begins with {kind:?}, expected word, text, name, in or allow")));
+                }
             };
             // ASCII boundaries: those of Unicode would cost seconds.
             let regex = Regex::new(&format!(r"(?-u:\b)(?:{})(?-u:\b)", pattern.trim()));
             let regex = regex.map_err(|error| fail(error.to_string()))?;
             list.push(Entry { below: below.clone(), regex, replacement: replacement.trim().to_string() });
         }
-        let any = [&words, &names].map(|list| {
+        let any = [&words, &texts, &names].map(|list| {
             let parts: Vec<_> = list.iter().map(|entry| entry.regex.as_str()).collect();
             Regex::new(&parts.join("|"))
         });
-        let [Ok(any_word), Ok(any_name)] = any else { return Err("the retired words are too many".into()) };
-        Ok(Self { words, names, any: [any_word, any_name], allowed })
+        let [Ok(any_word), Ok(any_text), Ok(any_name)] = any else {
+            return Err("the retired words are too many".into());
+        };
+        Ok(Self { words, texts, names, any: [any_word, any_text, any_name], allowed })
     }
 
     /// Where a file uses retired words: in the first of each kind of a line.
@@ -98,8 +108,12 @@ impl Retired {
                 used.next().map(|(used, replacement)| (used.as_str().to_string(), replacement.clone()))
             };
             let code = if is_source { line.split("//").next().unwrap_or_default() } else { "" };
-            let of_both = [of(&self.words, &self.any[0], &spoken(line)), of(&self.names, &self.any[1], code)];
-            for (used, replacement) in of_both.into_iter().flatten() {
+            let found_here = [
+                of(&self.words, &self.any[0], &spoken(line)),
+                of(&self.texts, &self.any[1], line),
+                of(&self.names, &self.any[2], code),
+            ];
+            for (used, replacement) in found_here.into_iter().flatten() {
                 found.push(format!("{name}:{}: {used:?} → {replacement}", at + 1));
             }
         }
@@ -131,7 +145,7 @@ mod tests {
 
     const LIST: &str = "# of a test\nword vicinity|vicinities → candidate cache\nword most places → max_contact_samples\n\
                         name Sight → SurfaceView\nallow docs/glossary.md\n\
-                        in viewer/\nname dress → apply theme\n";
+                        in viewer/\nname dress → apply theme\ntext old_key → new_key\n";
 
     #[test]
     fn words_are_found_in_prose_and_identifiers_and_names_in_source_only() {
@@ -139,6 +153,10 @@ mod tests {
         let text = "let vicinity_of = MostPlaces;\nuse Sight; // Sight\nlet dress = insight; // Sight\n";
         let expected = ["a.rs:1: \"vicinity\" → candidate cache", "a.rs:2: \"Sight\" → SurfaceView"];
         assert_eq!(retired.found_in("a.rs", text), expected);
+        assert_eq!(
+            retired.found_in("viewer/a.md", "old key, `old_key`"),
+            ["viewer/a.md:1: \"old_key\" → new_key"]
+        );
         assert_eq!(retired.found_in("viewer/a.ts", "dress()"), ["viewer/a.ts:1: \"dress\" → apply theme"]);
         assert_eq!(
             retired.found_in("a.md", "MostPlaces\nSight"),
@@ -159,10 +177,10 @@ mod tests {
         let error = Retired::parse("\nwrod a → b").expect_err("no such kind");
         assert_eq!(
             error,
-            "xtask/retired_words.txt:2: begins with \"wrod\", expected word, name, in or allow"
+            "xtask/retired_words.txt:2: begins with \"wrod\", expected word, text, name, in or allow"
         );
         let error = Retired::parse("word a").expect_err("no replacement");
-        let expected = "xtask/retired_words.txt:1: expected `word REGEX → REPLACEMENT`, `name REGEX → REPLACEMENT`, `in PATH` or `allow PATH`";
+        let expected = "xtask/retired_words.txt:1: expected `word|text|name REGEX → REPLACEMENT`, `in PATH` or `allow PATH`";
         assert_eq!(error, expected);
     }
 }
