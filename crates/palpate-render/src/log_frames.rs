@@ -130,7 +130,7 @@ fn compute_frames(
         number += 1;
         progress.advance(1);
         if steps.contains(number) {
-            snapshot.take(number, input, state);
+            snapshot.capture(number, input, state);
             builder.take(&snapshot);
         }
         if stop.load(Ordering::Relaxed) { Err(RenderError::ReplayInterrupted) } else { Ok(()) }

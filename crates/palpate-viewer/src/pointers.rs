@@ -103,11 +103,11 @@ impl Pointers {
     /// Advances all interface points by `dt` [s] and sends them to the force process.
     pub fn advance(&mut self, dt: f64, now_s: f64) {
         for slot in &mut self.0 {
-            if slot.port.newest().answers >= slot.press_sequence {
+            if slot.port.newest().in_reply_to >= slot.press_sequence {
                 slot.follow(dt);
             }
             slot.sequence += 1;
-            slot.port.tell(Motion {
+            slot.port.send(Motion {
                 sequence: slot.sequence,
                 time_s: now_s,
                 position: slot.position,
@@ -152,9 +152,9 @@ mod tests {
             pointers.set_target((1, 7), DVec3::X * 0.1 * frame);
             pointers.advance(1e-3, t);
             let motion = forces[0].newest();
-            forces[0].answer(Effort {
+            forces[0].send(Effort {
                 sequence: motion.sequence,
-                answers: motion.sequence,
+                in_reply_to: motion.sequence,
                 ..Effort::default()
             });
             assert_eq!((motion.mode, motion.sequence), (Some(DeviceMode::Touch), u64::from(tick)));
@@ -178,7 +178,7 @@ mod tests {
         (0..100).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
         let motion = forces[0].newest();
         assert_eq!(motion.position, DVec3::Y);
-        forces[0].answer(Effort { answers: motion.sequence, ..Effort::default() });
+        forces[0].send(Effort { in_reply_to: motion.sequence, ..Effort::default() });
         (100..300).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
         assert!(forces[0].newest().position.length() < 1e-6);
     }

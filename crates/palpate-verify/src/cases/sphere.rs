@@ -12,8 +12,8 @@
 use crate::check::Check;
 use crate::error::VerifyError;
 use crate::modal::{frequencies_hz, lowest, mean};
-use palpate_fem::element::Order;
 use palpate_fem::mesh::ball_mesh;
+use palpate_fem::ElementOrder;
 use palpate_testkit::undamped;
 use std::f64::consts::TAU;
 
@@ -79,11 +79,11 @@ pub fn free_vibrations() -> Result<Vec<Check>, VerifyError> {
     ];
     let shear_speed = (YOUNG / (2.0 * (1.0 + POISSON)) / DENSITY).sqrt();
     let mut checks = Vec::new();
-    for (order, layers, allowed) in [(Order::Linear, [6, 12], 0.025), (Order::Quadratic, [3, 6], 0.016)] {
+    for (order, layers, allowed) in [(ElementOrder::Linear, [6, 12], 0.025), (ElementOrder::Quadratic, [3, 6], 0.016)] {
         let modes = |layers: u32| -> Result<Vec<f64>, VerifyError> {
             let parameters = undamped(YOUNG, POISSON, DENSITY, order, 27);
-            let (_, modes) = lowest(ball_mesh(RADIUS, layers)?, &parameters)?;
-            Ok(frequencies_hz(&modes).into_iter().map(|f| f * TAU * RADIUS / shear_speed).collect())
+            let body = lowest(ball_mesh(RADIUS, layers)?, &parameters)?;
+            Ok(frequencies_hz(&body).into_iter().map(|f| f * TAU * RADIUS / shear_speed).collect())
         };
         let (coarse, fine) = (modes(layers[0])?, modes(layers[1])?);
         let mut at = 0;

@@ -8,7 +8,7 @@ use crate::scene_provider::{OpenLog, SharedTrajectory, ViewerDevice, ViewerScene
 use palpate::{DeviceInput, DeviceMode, Input, ObjectSnapshot, State};
 use palpate_haptics::{
     Clock, CycleReceiver, DevicePort, ObstacleTrajectory, Playback, Report, Scheduling, Session,
-    SessionDevice, Snapshot, Timing, cycles, port,
+    SessionDevice, Snapshot, Timing, cycle_channel, port,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -58,10 +58,10 @@ impl DeviceInputs {
             ViewerDevice::Pointer => {
                 let (device_port, force_port) = port();
                 pointer_ports.push((index, device_port));
-                Ok(SessionDevice::Linked(force_port, DeviceMode::Touch))
+                Ok(SessionDevice::Remote(force_port, DeviceMode::Touch))
             }
-            ViewerDevice::Following(path, mode) => Ok(SessionDevice::Following(path.clone(), *mode)),
-            ViewerDevice::Here(open) => open().map(SessionDevice::Here),
+            ViewerDevice::Following(path, mode) => Ok(SessionDevice::Path(path.clone(), *mode)),
+            ViewerDevice::Here(open) => open().map(SessionDevice::Local),
         };
         let devices = scene.devices.iter().enumerate().map(open).collect::<Result<_, SceneError>>()?;
         Ok(Self { devices, pointer_ports })
@@ -93,18 +93,18 @@ impl RunningScene {
             let pose = pose.clone();
             Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
         });
-        let (cycle_sender, cycle_receiver) = cycles(CYCLES);
+        let (cycle_sender, cycle_receiver) = cycle_channel(CYCLES);
         let start = Instant::now();
         let session = Session {
             model: scene.model.clone(),
             state: Some(state),
             start,
             devices: inputs.devices,
-            movers: movers.collect(),
+            obstacle_trajectories: movers.collect(),
             steps: None,
-            pictures_hz: FRAME_RATE_HZ,
+            frame_rate_hz: FRAME_RATE_HZ,
             scheduling,
-            patience_s: DEVICE_TIMEOUT_S,
+            device_timeout_s: DEVICE_TIMEOUT_S,
             playback: channels.playback.clone(),
             cycles: Some(cycle_sender),
         };
@@ -113,7 +113,7 @@ impl RunningScene {
         let steps = Arc::new(AtomicU64::new(0));
         let pointer_thread = {
             let (stop, pointers) = (stop.clone(), channels.pointers.clone());
-            let clock = Clock::new(start, 1.0 / POINTER_RATE_HZ).asleep();
+            let clock = Clock::new(start, 1.0 / POINTER_RATE_HZ).without_spinning();
             let advance = move || advance_pointers(&stop, &pointers, &clock);
             Builder::new().name("palpate pointers".into()).spawn(advance).map_err(SceneError::Thread)?
         };
@@ -127,7 +127,7 @@ impl RunningScene {
                     if let (Some(Ok(file)), Some(summary)) = (file, log) {
                         file.finish(summary);
                     }
-                    Some(state.motions())
+                    Some(state.snapshots())
                 }
                 Err(error) => {
                     let text = error.to_string();
@@ -151,12 +151,12 @@ impl RunningScene {
     /// Status with the timing so far.
     pub fn status(&mut self, generation: u32, viewers: usize, playback: &Playback) -> Status {
         let Self { steps, timing, cycle_receiver, .. } = self;
-        cycle_receiver.listen(timing);
+        cycle_receiver.drain_into(timing);
         let granted = cycle_receiver.granted();
         Status {
             generation,
             paused: playback.is_paused(),
-            slowdown: playback.slowness(),
+            slowdown: playback.slowdown(),
             steps: steps.load(Ordering::Relaxed),
             viewers,
             force_process: ProcessTiming {

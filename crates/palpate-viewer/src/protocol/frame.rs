@@ -83,7 +83,7 @@ impl FrameEncoder {
                     let q = object.modal_coordinates();
                     out.u32(q.len() as u32);
                     q.iter().zip(&self.scales[index]).for_each(|(q, scale)| out.f32(q * scale));
-                    object.dents(&self.model, cache, displacements);
+                    object.residual_displacements(&self.model, cache, displacements);
                     write_residuals(displacements, &mut out);
                 }
                 FrameFormat::Vertices => {

@@ -248,15 +248,15 @@ impl<'s> PageSession<'s> {
                 return Ok(());
             }
             ClientMessage::Pause { paused } => {
-                live.playback.pause(paused);
+                live.playback.set_paused(paused);
                 Command::SendStatus
             }
             ClientMessage::SingleStep => {
-                live.playback.step();
+                live.playback.request_step();
                 return Ok(());
             }
             ClientMessage::SlowMotion { slowdown } => {
-                live.playback.slow(slowdown.clamp(1, 1000));
+                live.playback.set_slowdown(slowdown.clamp(1, 1000));
                 Command::SendStatus
             }
             ClientMessage::Reset => Command::Reset,

@@ -4,7 +4,7 @@ use super::client::{TestServer, mode_shapes, recording, scene};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, State, step};
 use palpate_haptics::Scheduling;
-use palpate_haptics::log::{LogSummary, LogWriter, Names, Reader};
+use palpate_haptics::log::{LogSummary, LogWriter, SceneNames, LogReader};
 use palpate_viewer::{
     Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, ProgressCallback,
     SceneError, SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,
@@ -50,9 +50,9 @@ impl LogFile for InMemory {
     }
 }
 
-fn names() -> Names {
+fn names() -> SceneNames {
     let own = |names: &[&str]| names.iter().map(|name| (*name).to_string()).collect();
-    Names { objects: own(&["body"]), devices: own(&["left", "right"]), obstacles: own(&["floor"]) }
+    SceneNames { objects: own(&["body"]), devices: own(&["left", "right"]), obstacles: own(&["floor"]) }
 }
 
 /// Provider of a logged scene: finished logs, capacity of a log [bytes].
@@ -145,25 +145,25 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
     assert_eq!(logs.len(), 3);
     let mut before = None;
     for (bytes, gravity) in logs.iter().zip([DVec3::ZERO, DVec3::Y * -9.81, DVec3::Y * -9.81]) {
-        let reader = Reader::new(bytes).expect("a whole log");
+        let reader = LogReader::new(bytes).expect("a whole log");
         let model = scene(gravity, 1e-3).model;
         let motions = reader.start(&names()).expect("readable").expect("how the body begins");
         let mut state = State::resume(&model, &motions);
         let (mut max_force, mut steps) = (0.0_f64, 0);
-        for logged in reader.each_step() {
+        for logged in reader.logged_steps() {
             let logged = logged.expect("a step");
             let input = logged.input(&names(), &[DeviceMode::Touch; 2]).expect("an input");
             max_force = max_force.max(step(&model, &mut state, &input).devices[0].force_on_hand.length());
-            assert_eq!(logged.difference(&names(), state.output()), None, "step {}", logged.step);
+            assert_eq!(logged.first_difference(&names(), state.output()), None, "step {}", logged.step);
             steps += 1;
         }
         assert!(steps > 0, "an empty log");
         match before {
             None => assert!(max_force > 0.02, "{max_force} N"),
             Some(before) if std::ptr::eq(bytes, &logs[1]) => assert_eq!(motions, before),
-            Some(_) => assert_eq!(motions, State::new(&model).motions()),
+            Some(_) => assert_eq!(motions, State::new(&model).snapshots()),
         }
-        before = Some(state.motions());
+        before = Some(state.snapshots());
     }
 }
 
@@ -185,6 +185,6 @@ fn a_full_disk_ends_the_log_and_the_scene_keeps_running() {
     drop(served);
     // Every finished log is complete.
     for bytes in logs.lock().expect("no panic").iter() {
-        assert!(Reader::new(bytes).expect("a whole log").each_step().all(|logged| logged.is_ok()));
+        assert!(LogReader::new(bytes).expect("a whole log").logged_steps().all(|logged| logged.is_ok()));
     }
 }

@@ -23,7 +23,7 @@ fn log(number: usize, frames: u64) -> Arc<LogFrames> {
     for number in 1..=20 * frames {
         step(&model, &mut state, &input);
         if number % 20 == 0 {
-            snapshot.take(number, &input, &state);
+            snapshot.capture(number, &input, &state);
             builder.push(&snapshot);
         }
     }
