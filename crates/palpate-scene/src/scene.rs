@@ -69,7 +69,7 @@ impl SceneObstacle {
     pub fn pose_at(&self, time_s: f64) -> Pose {
         match &self.path {
             None => self.start,
-            Some(path) if path.turns() => path.at(time_s),
+            Some(path) if path.has_orientations() => path.at(time_s),
             Some(path) => Pose { position: path.at(time_s).position, ..self.start },
         }
     }

@@ -58,7 +58,7 @@ pub(super) fn read_obstacle(
     let mut path = None;
     if let Some(entry) = &obstacle.path {
         let read = source.motion_path(entry, Columns::Pose)?;
-        if let (Some(orientation), true) = (&obstacle.orientation, read.turns()) {
+        if let (Some(orientation), true) = (&obstacle.orientation, read.has_orientations()) {
             let message = "the orientation is in the path: leave one of the two out";
             return source.fail(orientation.span(), SceneErrorKind::Conflict, "orientation", message);
         }

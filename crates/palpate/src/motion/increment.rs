@@ -32,7 +32,7 @@ impl Default for RigidIncrement {
 
 impl RigidIncrement {
     /// Add a force [N, world] at the end of an arm [m, world].
-    pub(crate) fn set_force(&mut self, force: DVec3, arm: DVec3) {
+    pub(crate) fn push(&mut self, force: DVec3, arm: DVec3) {
         self.displacement += force * self.mobility;
         self.rotation += self.angular_mobility * arm.cross(force);
     }

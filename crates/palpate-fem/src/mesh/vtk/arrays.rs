@@ -20,7 +20,7 @@ const REGION_ARRAYS: [&str; 11] = [
     "part",
 ];
 
-impl LogReader<'_> {
+impl Reader<'_> {
     /// `POINT_DATA` or `CELL_DATA`.
     pub(super) fn start_arrays(&mut self, keyword: &[u8]) -> Result<(), MeshError> {
         let points = self.points.as_ref().map(Vec::len);

@@ -4,7 +4,7 @@ use super::reader::{Cells, Reader, Tets};
 use crate::mesh::error::MeshError;
 use crate::mesh::scan::{CURVED_WARNING, Number, OtherSolids};
 
-impl LogReader<'_> {
+impl Reader<'_> {
     pub(super) fn read_cells(&mut self) -> Result<(), MeshError> {
         let Some(points) = &self.points else {
             return self.scan.fail("CELLS comes before POINTS");
