@@ -1,6 +1,7 @@
 //! Output on the terminal: results on standard output, messages on standard error.
 
 use crate::failure::Failure;
+use palpate_scene::SceneLog;
 use std::io::Write;
 
 /// Prints a message on standard error; a reader that has gone away is no failure.
@@ -29,5 +30,15 @@ pub fn size_text(bytes: usize) -> String {
         bytes if bytes < 1e5 => format!("{:.1} kB", bytes / 1e3),
         bytes if bytes >= 1e10 => format!("{:.1} GB", bytes / 1e9),
         bytes => format!("{:.1} MB", bytes / 1e6),
+    }
+}
+
+/// Warns of stores of impulse responses, which logs do not carry.
+pub fn warn_of_stores(scene: &SceneLog) {
+    for store in scene.stores_left_out() {
+        notify(&format!(
+            "warning: {} is not taken into the log: a replay needs it where it is",
+            store.display()
+        ));
     }
 }

@@ -155,13 +155,13 @@ mod tests {
     use std::collections::HashSet;
 
     /// 6·volume by the divergence theorem: positive when triangles face outwards.
-    fn volume(solid: &Solid) -> f64 {
+    fn volume(solid: &RigidSurface) -> f64 {
         let corner = |n: u32| solid.positions[n as usize];
         solid.triangles.iter().map(|[a, b, c]| corner(*a).dot(corner(*b).cross(corner(*c)))).sum::<f64>()
             / 6.0
     }
 
-    fn is_closed(solid: &Solid) -> bool {
+    fn is_closed(solid: &RigidSurface) -> bool {
         // By places: a box's faces have corners of their own.
         let place = |n: u32| solid.positions[n as usize].to_array().map(|x| (1e9 * x).round() as i64);
         let edges: Vec<_> = solid

@@ -1,7 +1,7 @@
 //! Devices of a scene as haptic updates take them: with mode, mount, rate and safety limits.
 
+use crate::devices::RealDevice;
 use crate::error::{SceneError, SceneErrorKind};
-use crate::file::RealDevice;
 use palpate::DeviceMode;
 use palpate_haptics::device::{Device, Hand, Mount, Scripted, Simulated, Traits};
 use palpate_haptics::{AttachedDevice, MotionPath, SafetyLimits};

@@ -11,6 +11,7 @@
 #![deny(missing_docs)]
 
 mod attach;
+mod devices;
 mod error;
 mod file;
 mod library;
@@ -23,11 +24,9 @@ mod scene;
 mod scene_log;
 
 pub use attach::{attach_path, attach_real};
+pub use devices::{ANY_HAND, MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
 pub use error::{SceneError, SceneErrorKind};
-pub use file::{
-    ANY_HAND, MAX_FORCE_N, RealDevice, Relocated, RunMode, find_device_traits, find_driver, find_grip,
-    read_path, read_relocated_scene, read_scene,
-};
+pub use file::{Relocated, RunMode, read_path, read_relocated_scene, read_scene};
 pub use library::{
     BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube,
 };

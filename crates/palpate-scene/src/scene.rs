@@ -1,6 +1,6 @@
 //! Scene: a model with the names of its parts, and the paths of its devices and obstacles.
 
-use crate::file::RealDevice;
+use crate::devices::RealDevice;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, SceneLabels};

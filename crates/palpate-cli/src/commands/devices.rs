@@ -1,4 +1,4 @@
-//! `palpate devices`: what can be held here, and why something can't.
+//! `palpate devices`: haptic devices of this machine.
 
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
@@ -7,15 +7,15 @@ use palpate_haptics::Error;
 use palpate_haptics::device::{Driver, Found, Traits, discover};
 use serde_json::json;
 
-/// List haptic devices: what is found, and why something is not
+/// List haptic devices, with the reason where one is not available
 ///
-/// Each driver looks for its devices through their maker's software, and opens each for a moment, without force.
+/// Each driver looks for its devices through the vendor's software, and opens each briefly, without force.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "A device that was found:
   palpate device NAME --driver dhd --which 0      # for a scene with linked = true
-  driver = { kind = \"dhd\", which = 0 }            # in a scene for palpate run --realtime
+  driver = { kind = \"dhd\", id = 0 }               # in a scene for palpate run --realtime
 Without a device: palpate device NAME --path FILE.csv --simulated touch
-A maker's software that is elsewhere is named in PALPATE_LIBHD, PALPATE_LIBDHD (files) and PALPATE_HAPLY (ADDRESS:PORT).")]
+Vendor software in other places is named in PALPATE_LIBHD, PALPATE_LIBDHD (files) and PALPATE_HAPLY (ADDRESS:PORT).")]
 pub struct Arguments {
     /// One JSON object on standard output
     #[arg(long)]

@@ -1,4 +1,4 @@
-//! `palpate render`: pictures of a log, drawn by the viewer without a person.
+//! `palpate render`: images of a log, drawn by the viewer's page.
 
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
@@ -12,10 +12,10 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Draw pictures of a log: PNG files, and an animation
+/// Render images of a log: PNG files, and an animation
 ///
-/// The log is computed again (as by `palpate replay`), and the page of `palpate serve` draws it in a browser without a window: the same
-/// pictures as in the viewer, and the same files every time. It needs Chromium or Chrome.
+/// The log is replayed (as by `palpate replay`), and the page of `palpate serve` draws it in a headless browser: the same images
+/// as in the viewer, and the same files every time. It needs Chromium or Chrome.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "For example:
   palpate render run.mcap -o frames                         # frames/frame_00000.png, …
@@ -23,18 +23,18 @@ use std::process::Command;
   palpate render run.mcap -o frames --mp4 run.mp4 --width 1920 --height 1080   # with ffmpeg
   palpate render run.mcap -o frames --camera 0.3,0.2,0.4,0,0.05,0 --colour strain --dark")]
 pub struct Arguments {
-    /// The log
+    /// Log
     log: PathBuf,
-    /// Folder for the pictures
+    /// Folder for the images
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Pictures per second of the log
+    /// Frame rate [Hz]
     #[arg(long, value_name = "HZ", default_value_t = 30.0, allow_negative_numbers = true)]
     fps: f64,
-    /// Begin there [s]
+    /// Start [s]
     #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     from: f64,
-    /// End there [s]; by default with the log
+    /// End [s]; by default that of the log
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Width [pixels]
@@ -43,22 +43,22 @@ pub struct Arguments {
     /// Height [pixels]
     #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(64..=4096))]
     height: u32,
-    /// Where the camera is and what it looks at [m, world]: six numbers x,y,z,x,y,z
+    /// Camera position and target [m, world]: six numbers x,y,z,x,y,z
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
     camera: Option<Vec<f64>>,
-    /// What colours tell
+    /// Quantity that colours show
     #[arg(long, value_enum, default_value_t = Colour::Displacement)]
     colour: Colour,
-    /// On a dark ground
+    /// Dark background
     #[arg(long)]
     dark: bool,
-    /// Write an animated GIF too
+    /// Also write an animated GIF
     #[arg(long, value_name = "OUT.gif")]
     gif: Option<PathBuf>,
-    /// Write a film too, where ffmpeg is found
+    /// Also write a film; needs ffmpeg
     #[arg(long, value_name = "OUT.mp4")]
     mp4: Option<PathBuf>,
-    /// The browser; by default the first of chromium, chromium-browser, google-chrome, chrome that is found
+    /// Browser; by default the first of chromium, chromium-browser, google-chrome, chrome that is found
     #[arg(long, value_name = "PROGRAM")]
     browser: Option<PathBuf>,
     /// Print one JSON object
@@ -66,7 +66,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What colours of the surface tell.
+/// Quantity that the colours of the surface show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Colour {
     Displacement,
@@ -74,8 +74,8 @@ enum Colour {
     Plain,
 }
 
-/// Most pictures of one call.
-const MOST_PICTURES: u64 = 20_000;
+/// Upper bound of images.
+const MAX_IMAGES: u64 = 20_000;
 
 /// Runs the command.
 pub fn render(arguments: &Arguments) -> Result<(), Failure> {
@@ -134,7 +134,7 @@ fn read_camera(numbers: &[f64]) -> Result<CameraView, Failure> {
     }
 }
 
-/// The frames between two times.
+/// Frames between two times.
 fn chosen(frames: FrameSpacing, from: f64, to: Option<f64>) -> Result<Vec<u64>, Failure> {
     let end = (frames.count - 1) as f64 * frames.interval_s;
     let to = to.unwrap_or(end);
@@ -143,9 +143,9 @@ fn chosen(frames: FrameSpacing, from: f64, to: Option<f64>) -> Result<Vec<u64>, 
     }
     let number = |t: f64| (t / frames.interval_s).round() as u64;
     let numbers: Vec<u64> = (number(from)..=number(to).min(frames.count - 1)).collect();
-    if numbers.len() as u64 > MOST_PICTURES {
+    if numbers.len() as u64 > MAX_IMAGES {
         return Err(Failure(format!(
-            "these are {} pictures, at most {MOST_PICTURES} are drawn at once: take a lower --fps, or --from and --to",
+            "these are {} pictures, at most {MAX_IMAGES} are drawn at once: take a lower --fps, or --from and --to",
             numbers.len()
         )));
     }

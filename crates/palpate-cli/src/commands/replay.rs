@@ -10,7 +10,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Repeat a log step by step, and check that every number comes out again, bit for bit
+/// Replay a log step by step, and check that all numbers are the same, bit for bit
 ///
 /// The log carries the scene and its recordings. Forces, proxies, poses, velocities and energies of every step are compared
 /// with those that were logged; the first that differs ends the replay. The same build on the same kind of machine gives
@@ -19,15 +19,14 @@ use std::time::Duration;
 #[command(after_help = "For example:
   palpate run scene.toml --realtime --log run.mcap
   palpate replay run.mcap --csv steps.csv --contacts contacts.csv --vtu frames
-  palpate replay run.mcap --runs 5        # what steps take by themselves")]
+  palpate replay run.mcap --runs 5        # compute times without interruptions")]
 pub struct Arguments {
-    /// The log
+    /// Log
     pub log: PathBuf,
-    /// Times that it is repeated: of every step the least time counts, which is what the step itself took, without what
-    /// others took from the machine
+    /// Number of replays: the minimum over them is reported for each step, its compute time without interruptions
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub runs: usize,
-    /// What it should leave
+    /// Outputs
     #[command(flatten)]
     pub outputs: OutputArguments,
 }

@@ -19,7 +19,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "step = 0.001",
             "stepp = 0.001",
             1,
-            "`step`, `gravity`, `motion`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `object`, `plane`, `obstacle`, `device`",
+            "`step`, `gravity`, `integrator`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `object`, `plane`, `obstacle`, `device`",
         ),
         (
             "recording = \"cube.palp\"",
@@ -53,8 +53,8 @@ fn what_a_scene_file_gets_wrong_is_named_with_its_line() {
         ("step = 0.001", "step = nan", "scene.toml: line 1: step is NaN s, expected above 0 and at most 1"),
         (
             "\n\n[[object]]",
-            "\nmotion = \"rough\"\n[[object]]",
-            "scene.toml: line 3: motion is \"rough\", expected \"exact\" or \"paper\"",
+            "\nintegrator = \"rough\"\n[[object]]",
+            "scene.toml: line 3: integrator is \"rough\", expected \"exact\" or \"paper\"",
         ),
         (
             "recording = \"cube.palp\"",

@@ -122,7 +122,7 @@ fn a_cube_that_falls_on_a_plane_gets_the_force_that_stops_it() {
     contacts.table.column("t").iter().for_each(|t| counts[(t / STEP).round() as usize - 1] += 1);
     let most_force = contacts.vectors('f').iter().map(|force| force.length()).fold(0.0, f64::max);
     let most = counts.into_iter().max().unwrap_or(0);
-    assert_eq!(summary["contacts"], serde_json::json!({ "most": most, "most_force_n": most_force }));
+    assert_eq!(summary["contacts"], serde_json::json!({ "count_max": most, "force_max_n": most_force }));
     for name in ["coupling", "friction", "impact"] {
         let last = table.column(&format!("energy.{name}")).last().copied();
         assert_eq!(summary["energy_j"][name].as_f64(), last, "{name}");
@@ -331,7 +331,7 @@ fn contacts_without_room_are_told_of_and_the_run_goes_on() {
     workplace.write("scene.toml", format!("max_contact_points = 4\n{FLOOR}{}", object("[0.0, 0.052, 0.0]")));
     let arguments = ["run", "scene.toml", "--duration", "0.05"];
     let summary = workplace.json(&[&arguments[..], &["--json"]].concat());
-    assert_eq!(summary["contacts"]["most"], 4);
+    assert_eq!(summary["contacts"]["count_max"], 4);
     assert!(summary["solver"]["dropped_contacts"].as_u64().is_some_and(|dropped| dropped >= 12), "{summary}");
     let text = workplace.succeed(&arguments);
     assert!(text.contains(" at once: raise max_contact_points above 4\n"), "{text}");

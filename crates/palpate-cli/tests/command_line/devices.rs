@@ -160,10 +160,13 @@ fn what_a_real_device_can_not_be_is_refused_in_words() {
             "line 12: driver is \"phantom\", expected one of \"openhaptics\", \"dhd\", \"haply\"",
         ),
         (
-            "driver = { kind = \"dhd\", which = -1 }",
-            "line 12: which is neither a number from 0 nor a name in quotes",
+            "driver = { kind = \"dhd\", id = -1 }",
+            "line 12: id is neither a number from 0 nor a name in quotes",
         ),
-        ("driver = { kind = \"dhd\", force = 0.0 }", "line 12: force is 0 N, expected above 0 and below 1e2"),
+        (
+            "driver = { kind = \"dhd\", max_force = 0.0 }",
+            "line 12: max_force is 0 N, expected above 0 and below 1e2",
+        ),
         ("driver = { kind = \"dhd\" }\nmount = { scale = 0.0 }", "line 13: scale is 0, expected above 0"),
         (
             "driver = { kind = \"dhd\" }\nmount = { orientation = [2.0, 0.0, 0.0, 0.0] }",

@@ -246,7 +246,7 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
         assert_eq!(number(&summary["energy_j"][name]), energy(name)[49], "{name}");
     }
     // Held points are not contacts.
-    assert_eq!(summary["contacts"], serde_json::json!({ "most": 0, "most_force_n": 0.0 }));
+    assert_eq!(summary["contacts"], serde_json::json!({ "count_max": 0, "force_max_n": 0.0 }));
     assert_eq!(
         (&summary["solver"]["dropped_contacts"], &summary["solver"]["unsolved_steps"]),
         (&Value::from(0), &Value::from(0))
@@ -312,8 +312,8 @@ fn the_papers_rules_can_be_chosen_and_change_the_outcome() {
     let mut runs = Vec::new();
     for (at, rules) in [
         "",
-        "motion = \"exact\"\nrigid_compliance = true\n",
-        "motion = \"paper\"\n",
+        "integrator = \"exact\"\nrigid_compliance = true\n",
+        "integrator = \"paper\"\n",
         "rigid_compliance = false\n",
     ]
     .into_iter()

@@ -1,9 +1,9 @@
 //! `coupling`: gains of the virtual coupling, or `"auto"` for those that are stable with a margin.
 
-use super::devices::read_simulated;
-use super::drivers::read_real;
+use super::drivers::{read_real, read_simulated};
 use super::keys::{CouplingChoice, DeviceEntry};
 use super::source::{Quantity, Source};
+use crate::devices::ANY_HAND;
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::{Coupling, DeviceParameters, ModelObject};
@@ -18,14 +18,6 @@ const LARGEST_GAIN: f64 = 1e18;
 
 /// Delay of a link [s]: more than 99 % of motions see on one machine.
 const LINK_DELAY_S: f64 = 0.005;
-
-/// Grips of a hand on a device, and none, by name.
-pub const ANY_HAND: [(&str, Option<Hand>); 4] = [
-    ("let go", None),
-    ("fingertip", Some(Hand::FINGERTIP)),
-    ("light", Some(Hand::LIGHT)),
-    ("firm", Some(Hand::FIRM)),
-];
 
 /// Gains of the scene; none for `"auto"`, which is chosen when the objects are known.
 pub(super) fn read_gains(

@@ -1,15 +1,14 @@
 //! `[[device]]`: devices that hold a point, and tips that touch.
 
 use super::coupling;
-use super::drivers::read_real;
-use super::keys::{AttachEntry, DeviceEntry, SimulatedEntry};
+use super::drivers::{read_real, read_simulated};
+use super::keys::{AttachEntry, DeviceEntry};
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
 use palpate_haptics::Columns;
-use palpate_haptics::device::{Hand, Traits};
 use toml::Spanned;
 
 /// Allowed distance of a held point from the surface, as a share of the object's diagonal.
@@ -127,42 +126,6 @@ fn refuse_other_hands(
             "a pointer holds what it is pressed on: leave attach out, and say mode = \"touch\"",
         ),
         None => Ok(()),
-    }
-}
-
-pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), SceneError> {
-    let traits = find_device_traits(entry.device.get_ref());
-    let traits = traits
-        .or_else(|what| source.fail(entry.device.span(), SceneErrorKind::UnknownValue, "device", what))?;
-    let hand = match &entry.grip {
-        None => Hand::FIRM,
-        Some(grip) => {
-            let hand = find_grip(grip.get_ref());
-            hand.or_else(|what| source.fail(grip.span(), SceneErrorKind::UnknownValue, "grip", what))?
-        }
-    };
-    Ok((traits, hand))
-}
-
-/// Device traits by name.
-///
-/// # Errors
-/// A message with the known names.
-pub fn find_device_traits(name: &str) -> Result<Traits, String> {
-    let known = || Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
-    Traits::named(name).ok_or_else(|| format!("device is {name:?}, expected one of {}", known()))
-}
-
-/// Hand by the name of its grip.
-///
-/// # Errors
-/// A message with the known names.
-pub fn find_grip(name: &str) -> Result<Hand, String> {
-    match name {
-        "firm" => Ok(Hand::FIRM),
-        "light" => Ok(Hand::LIGHT),
-        "fingertip" => Ok(Hand::FINGERTIP),
-        other => Err(format!("grip is {other:?}, expected \"firm\", \"light\" or \"fingertip\"")),
     }
 }
 

@@ -1,40 +1,13 @@
-//! Real devices of a scene: `driver` and `mount`.
+//! Real and simulated devices of a scene: `driver`, `mount` and `simulated`.
 
-use super::LARGEST;
-use super::keys::{DeviceEntry, DriverEntry, MountEntry};
+use super::keys::{DeviceEntry, DriverEntry, LARGEST, MountEntry, SimulatedEntry};
 use super::source::{Quantity, Source};
+use crate::devices::{MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::Pose;
-use palpate_haptics::device::{Driver, Mount};
+use palpate_haptics::device::{Hand, Mount, Traits};
 use palpate_haptics::orientation;
-
-/// Real device with its limits.
-#[derive(Debug, Clone)]
-pub struct RealDevice {
-    /// Driver.
-    pub driver: Driver,
-    /// Device of the driver: a number from 0, or a name.
-    pub id: String,
-    /// Pose and scale of its frame in the world.
-    pub mount: Mount,
-    /// Force limit [N]; none for the default of [`SafetyLimits`](palpate_haptics::SafetyLimits).
-    pub max_force_n: Option<f64>,
-    /// Whether forces are on from the start; otherwise from the press of a button.
-    pub armed: bool,
-}
-
-/// Upper bound of force limits [N].
-pub const MAX_FORCE_N: f64 = 100.0;
-
-/// Driver by name.
-///
-/// # Errors
-/// A message with the known names.
-pub fn find_driver(name: &str) -> Result<Driver, String> {
-    let known = || Driver::ALL.map(|driver| format!("{:?}", driver.name())).join(", ");
-    Driver::named(name).ok_or_else(|| format!("driver is {name:?}, expected one of {}", known()))
-}
 
 /// Real device of an entry, if it has one.
 pub(super) fn read_real(source: &Source, device: &DeviceEntry) -> Result<Option<RealDevice>, SceneError> {
@@ -87,4 +60,19 @@ fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> 
     let scale = Quantity { key: "scale", unit: "", below: LARGEST };
     let scale = entry.scale.as_ref().map_or(Ok(1.0), |number| source.positive(number, scale))?;
     Ok(Mount { pose, scale })
+}
+
+/// Simulated device and hand of an entry.
+pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), SceneError> {
+    let traits = find_device_traits(entry.device.get_ref());
+    let traits = traits
+        .or_else(|what| source.fail(entry.device.span(), SceneErrorKind::UnknownValue, "device", what))?;
+    let hand = match &entry.grip {
+        None => Hand::FIRM,
+        Some(grip) => {
+            let hand = find_grip(grip.get_ref());
+            hand.or_else(|what| source.fail(grip.span(), SceneErrorKind::UnknownValue, "grip", what))?
+        }
+    };
+    Ok((traits, hand))
 }

@@ -1,11 +1,16 @@
 //! Keys of a scene file. Keys of earlier versions are aliases.
 
-use super::LARGEST;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 use toml::Spanned;
+
+/// Upper bound of lengths [m], velocities and accelerations.
+pub(super) const LARGEST: f64 = 1e6;
+
+/// Keys of earlier versions, which open but are not listed in errors.
+pub(super) const RETIRED_KEYS: [&str; 5] = ["motion", "most_contact_points", "most_places", "which", "force"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -10,11 +10,8 @@ mod source;
 
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::Scene;
-pub use coupling::ANY_HAND;
-pub use devices::{find_device_traits, find_grip};
-pub use drivers::{MAX_FORCE_N, RealDevice, find_driver};
 use glam::DVec3;
-use keys::SceneFile;
+use keys::{RETIRED_KEYS, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, RigidCompliance, RigidIntegrator};
 use source::Source;
 pub use source::{Relocated, read_path};
@@ -23,9 +20,6 @@ use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
-
-/// Upper bound of lengths [m], velocities and accelerations.
-const LARGEST: f64 = 1e6;
 
 /// Upper bound of contact points of an object: their coupling takes 9·n² numbers, a gigabyte here.
 const MAX_CONTACT_POINTS: i64 = 4096;
@@ -104,7 +98,9 @@ fn parse(source: &Source) -> Result<SceneFile, SceneError> {
 
 /// Error of the parser, with types in the user's words.
 fn syntax_error(source: &Source, error: &toml::de::Error) -> SceneError {
-    let text = error.to_string();
+    // The keys that are known stand after commas.
+    let listed = |text: String, key: &&str| text.replace(&format!(", `{key}`"), "");
+    let text = RETIRED_KEYS.iter().fold(error.to_string(), listed);
     let text =
         text.replace("expected f64", "expected a number").replace("expected i64", "expected a whole number");
     // As in: unknown field `colour`, expected one of …

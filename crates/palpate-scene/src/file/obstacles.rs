@@ -1,6 +1,6 @@
 //! `[[plane]]` and `[[obstacle]]`: rigid bodies that objects collide with.
 
-use super::keys::{MeshEntry, Numbers, ObstacleEntry, PlaneEntry};
+use super::keys::{LARGEST, MeshEntry, Numbers, ObstacleEntry, PlaneEntry};
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::mesh_source;
@@ -123,7 +123,7 @@ fn read_mesh(
 ) -> Result<ObstacleMesh, SceneError> {
     let place = entry.file.span();
     let path = source.stored_path(entry.file.get_ref());
-    let scale = Quantity { key: "scale", unit: "", below: super::LARGEST };
+    let scale = Quantity { key: "scale", unit: "", below: LARGEST };
     let scale = entry.scale.as_ref().map_or(Ok(1.0), |number| source.positive(number, scale))?;
     let mut mesh = mesh_source::read_surface(&path)
         .or_else(|error| source.fail(place.clone(), SceneErrorKind::Mesh, "mesh", error))?;

@@ -1,7 +1,6 @@
 //! Text of a scene file: errors with their line, numbers within their range, paths of its files.
 
-use super::LARGEST;
-use super::keys::PathEntry;
+use super::keys::{LARGEST, PathEntry};
 use crate::error::{SceneError, SceneErrorKind};
 use palpate_haptics::{Columns, MotionPath};
 use std::collections::HashMap;

@@ -1,4 +1,4 @@
-//! `palpate bench`: step times with percentiles, and how they grow.
+//! `palpate bench`: percentiles of step times.
 
 mod pictures;
 mod touch;
@@ -30,13 +30,13 @@ pub struct Arguments {
     /// Steps that are timed per row
     #[arg(long, default_value_t = 20_000)]
     steps: usize,
-    /// Times that each row is run: of every step the least time counts, which leaves out what others took from the machine
+    /// Number of repeats: the minimum over them is taken for each step, its compute time without interruptions
     #[arg(long, default_value_t = 1, value_name = "N")]
     runs: usize,
     /// Time only the rows whose name contains this
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
-    /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
+    /// Cache folder of recordings [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// One JSON object on standard output
@@ -44,7 +44,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Steps with held points that move.
+/// Case with moving held points.
 struct HeldCase {
     label: String,
     recording: Arc<Recording>,
@@ -52,7 +52,7 @@ struct HeldCase {
     points: usize,
 }
 
-/// What is timed: a label, and what gives the times [ns] of so many steps, which are the same each time.
+/// Case: a label, and a function from a number of steps, the same each time, to their compute times [ns].
 type Case = (String, Box<dyn Fn(usize) -> Result<Vec<u32>, Failure>>);
 
 /// Runs the command.
@@ -120,13 +120,13 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.json { print_json(&json!({ "step_time_us": Value::Array(rows) })) } else { Ok(()) }
 }
 
-/// Times [ns] of steps in which every held point moves.
+/// Compute times of steps with moving held points [ns].
 fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
     let surface = &case.recording.surface;
     let held: Vec<Grasp> = (0..case.objects)
         .flat_map(|object| {
             (0..case.points).filter_map(move |at| {
-                // Points all over the surface, none twice: a spiral on the sphere about the body.
+                // Points on a spiral over the bounding sphere, projected to the surface.
                 let share = (at as f64 + 0.5) / case.points as f64;
                 let height = 1.0 - 2.0 * share;
                 let angle = at as f64 * 2.4;
@@ -137,7 +137,7 @@ fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
             })
         })
         .collect();
-    // Side by side, far enough not to meet.
+    // Side by side, far enough for no contact.
     let spacing = 5.0 * surface.radius();
     let centre = |object: usize| DVec3::Z * (spacing * object as f64);
     let start = |object| ObjectStart {
@@ -156,7 +156,7 @@ fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps {
         let t = number as f64 * 1e-3;
-        // Gently: nothing damps the paper's cube, and shaken hard for long it swings to several times its size.
+        // Gently: the paper's cube is undamped here, and strong shaking builds up to several times its size.
         let sway = DVec3::new(0.006 * (12.0 * t).sin(), 0.004 * (5.0 * t).sin(), 0.002 * (7.0 * t).sin());
         input.devices = held
             .iter()
@@ -168,7 +168,7 @@ fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
     Ok(times)
 }
 
-/// Compute time [ns] of a step.
+/// Compute time of a step [ns].
 fn timed_step(model: &Model, state: &mut State, input: &Input) -> u32 {
     let before = Instant::now();
     step(model, state, input);

@@ -1,4 +1,4 @@
-//! What pictures for the viewer take of the server: time, and bytes.
+//! Encoding of frames for the viewer: time and bytes.
 
 use super::{Case, touch::FINGER, touch::HALF};
 use crate::failure::Failure;
@@ -12,14 +12,14 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Pictures per second, and steps between two.
-const PICTURES_HZ: f64 = 60.0;
-const EVERY: usize = 16;
+/// Frame rate [Hz], and steps per frame.
+const FRAMES_HZ: f64 = 60.0;
+const STEPS_PER_FRAME: usize = 16;
 
-/// Fewer pictures than this tell nothing of their spread.
-const LEAST: usize = 200;
+/// Number of frames below which percentiles are meaningless.
+const MIN_FRAMES: usize = 200;
 
-/// Pictures of an object that two fingers pinch and shake, and that may lie on a floor.
+/// Frames of an object that two fingers pinch and shake, on a floor or free.
 pub fn case(recording: Arc<Recording>, form: FrameFormat, on_floor: bool) -> Case {
     let nodes = recording.surface.positions.len();
     let how = match form {
@@ -27,11 +27,11 @@ pub fn case(recording: Arc<Recording>, form: FrameFormat, on_floor: bool) -> Cas
         FrameFormat::Vertices => "vertices",
     };
     let on_a_floor = if on_floor { " and it lies on a floor" } else { "" };
-    let label = format!("{nodes} surface nodes, a picture ({how}), 2 fingers{on_a_floor}");
-    (label, Box::new(move |steps| picture_times(&recording, form, on_floor, steps)))
+    let label = format!("{nodes} surface nodes, a frame ({how}), 2 fingers{on_a_floor}");
+    (label, Box::new(move |steps| frame_times(&recording, form, on_floor, steps)))
 }
 
-fn picture_times(
+fn frame_times(
     recording: &Arc<Recording>,
     form: FrameFormat,
     on_floor: bool,
@@ -47,12 +47,12 @@ fn picture_times(
     let object = object_at(recording, DVec3::ZERO, DVec3::ZERO);
     let model = Arc::new(Model::new(parameters, vec![object])?);
     let mut state = State::new(&model);
-    let mut maker = FrameEncoder::new(model.clone(), 1);
+    let mut encoder = FrameEncoder::new(model.clone(), 1);
     let obstacles: Vec<Pose> = model.parameters().obstacles.iter().map(|obstacle| obstacle.pose).collect();
     let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles };
-    let mut moment = Snapshot::new(&model, &state, &input);
+    let mut snapshot = Snapshot::new(&model, &state, &input);
     let (mut times, mut bytes) = (Vec::new(), 0);
-    for number in 1..=steps.max(EVERY * LEAST) {
+    for number in 1..=steps.max(STEPS_PER_FRAME * MIN_FRAMES) {
         let t = number as f64 * model.parameters().step_s;
         let squeeze = 0.006 * (t / 0.2).min(1.0);
         let shake = 0.01 * (TAU * 2.0 * t).sin() * (t / 0.5).min(1.0);
@@ -61,21 +61,21 @@ fn picture_times(
             *device = DeviceInput::touching(DVec3::new(x, 0.0, 0.0));
         }
         step(&model, &mut state, &input);
-        if number % EVERY == 0 {
-            moment.take(number as u64, &input, &state);
+        if number % STEPS_PER_FRAME == 0 {
+            snapshot.take(number as u64, &input, &state);
             let before = Instant::now();
-            let picture = maker.make(&moment, form);
+            let frame = encoder.make(&snapshot, form);
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
-            bytes += picture.len();
+            bytes += frame.len();
         }
     }
     let seconds: f64 = times.iter().map(|time| f64::from(*time) * 1e-9).sum();
-    let pictures = times.len() as f64;
+    let frames = times.len() as f64;
     notify(&format!(
-        "{:.1} kB a picture; at {PICTURES_HZ} Hz {:.0} kB/s and {:.1} % of a core:",
-        bytes as f64 / pictures / 1e3,
-        bytes as f64 / pictures * PICTURES_HZ / 1e3,
-        100.0 * seconds / pictures * PICTURES_HZ
+        "{:.1} kB a frame; at {FRAMES_HZ} Hz {:.0} kB/s and {:.1} % of a core:",
+        bytes as f64 / frames / 1e3,
+        bytes as f64 / frames * FRAMES_HZ / 1e3,
+        100.0 * seconds / frames * FRAMES_HZ
     ));
     Ok(times)
 }

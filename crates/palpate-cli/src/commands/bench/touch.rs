@@ -1,4 +1,4 @@
-//! Steps with contacts: fingers on meshes of different fineness, a cube on a floor.
+//! Steps with contacts: fingers on meshes of different resolution, a cube on a floor.
 
 use super::{Case, pictures, timed_step};
 use crate::failure::Failure;
@@ -8,22 +8,20 @@ use palpate_testkit::{GRAVITY_M_S2, finger, floor, start_at, subdivided_near_fie
 use palpate_viewer::FrameFormat;
 use std::sync::Arc;
 
-/// Fingers like these are on every haptic workbench.
+/// Typical finger.
 pub const FINGER: DeviceParameters = finger(0.005, 0.004, 0.6);
 
 /// Half the side of the cubes [m].
 pub const HALF: f64 = 0.05;
 
-/// Contact samples at all nodes.
+/// Contact samples: at all nodes, or few.
 const ALL: usize = usize::MAX;
+const FEW: usize = 48;
 
-/// Contact samples of a run in real time.
-const SAMPLES: usize = 48;
-
-/// Subdivisions of the recorded cube's surface on the finest one.
+/// Refinements of the recorded surface, each of which splits every triangle in four.
 const REFINEMENTS: usize = 3;
 
-/// The cases, with the paper's cube and a finer one.
+/// Cases with the paper's cube and a finer one.
 pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item = Case> {
     let mut cases: Vec<Case> = Vec::new();
     let mut fingers = |recording: Arc<Recording>, sliding: bool| {
@@ -47,33 +45,33 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),
-        (0.0, 1, SAMPLES, "lies on a floor, 48 places"),
+        (0.0, 1, FEW, "lies on a floor, 48 contact samples"),
         (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
-        (0.05, 1, SAMPLES, "falls on a floor from 5 cm, contact steps, 48 places"),
+        (0.05, 1, FEW, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
         (0.0, 2, ALL, "one on another on a floor"),
-        (0.0, 2, SAMPLES, "one on another on a floor, 48 places"),
+        (0.0, 2, FEW, "one on another on a floor, 48 contact samples"),
         (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
-        (0.001, 2, SAMPLES, "one on another, falls on a floor, contact steps, 48 places"),
+        (0.001, 2, FEW, "one on another, falls on a floor, contact steps, 48 contact samples"),
     ];
-    // What is to lie still has to lose its energy.
-    let calm = Arc::new(damped(&cube));
+    // Damping lets resting cubes come to rest.
+    let damped_cube = Arc::new(damped(&cube));
     for (height, cubes, max_contact_samples, what) in floors {
-        let recording = if height == 0.0 { calm.clone() } else { cube.clone() };
+        let recording = if height == 0.0 { damped_cube.clone() } else { cube.clone() };
         let label = format!("12³ cells, 200 modes, {what}");
         let run = move |steps| floor_steps(&recording, (height, cubes, max_contact_samples), steps);
         cases.push((label, Box::new(run)));
     }
     for (max_contact_samples, what) in
-        [(ALL, "2 fingers move it on a floor"), (SAMPLES, "2 fingers move it on a floor, 48 places")]
+        [(ALL, "2 fingers move it on a floor"), (FEW, "2 fingers move it on a floor, 48 contact samples")]
     {
-        let recording = calm.clone();
+        let recording = damped_cube.clone();
         let label = format!("12³ cells, 200 modes, {what}");
         cases.push((label, Box::new(move |steps| moving_steps(&recording, max_contact_samples, steps))));
     }
     cases.into_iter()
 }
 
-/// Times [ns] of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it.
+/// Compute times of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it [ns].
 fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters {
         devices: vec![
@@ -84,15 +82,15 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
     };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])?;
     let mut state = State::new(&model);
-    // A free cube that is stroked from both sides with little friction slips away in the end.
+    // A free cube between sliding fingers slips away in the end.
     let steps = if sliding { steps.min(4000) } else { steps };
     let mut times = Vec::with_capacity(steps);
     for number in 0..steps + 200 {
         let t = number as f64 * 1e-3;
         let press = 0.004 * (t / 0.1).min(1.0) - 0.0005;
-        // As far as friction holds the cube for long.
+        // Amplitude at which friction holds the cube.
         let sway = 0.006 * (std::f64::consts::TAU * 2.0 * t).sin();
-        // Shaken together, or each the other way.
+        // In phase, or in opposite phase when sliding.
         let hand = |side: f64| {
             let across = if sliding { side * sway } else { sway };
             DeviceInput::touching(DVec3::new(side * (HALF + FINGER.tip_radius - press), across, 0.0))
@@ -109,7 +107,7 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
     Ok(times)
 }
 
-/// Times [ns] of steps in which a face is in contact with a floor, or another cube's, with friction.
+/// Compute times of steps with frictional contact of a face with a floor, or with another cube [ns].
 fn floor_steps(
     recording: &Arc<Recording>,
     (height, cubes, max_contact_samples): (f64, usize, usize),
@@ -122,7 +120,7 @@ fn floor_steps(
     };
     let model = Model::new(parameters, (0..cubes).map(cube).collect())?;
     let mut state = State::new(&model);
-    // One that lies is looked at when it has come to rest.
+    // Resting cubes settle first.
     let settling = if height > 0.0 { 0 } else { 3000 };
     let mut times = Vec::new();
     for number in 0..settling + steps.min(2000) {
@@ -134,7 +132,7 @@ fn floor_steps(
     Ok(times)
 }
 
-/// A floor, with gravity.
+/// Parameters with gravity and a floor.
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     let gravity = DVec3::Y * -GRAVITY_M_S2;
     ModelParameters {
@@ -145,7 +143,7 @@ fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     }
 }
 
-/// Times [ns] of steps in which two fingers press a cube on a floor by 3 mm and push it about.
+/// Compute times of steps in which two fingers press a cube on a floor by 3 mm and push it [ns].
 fn moving_steps(
     recording: &Arc<Recording>,
     max_contact_samples: usize,
@@ -154,7 +152,7 @@ fn moving_steps(
     let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(max_contact_samples) };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::Y * HALF))])?;
     let mut state = State::new(&model);
-    // It settles, then it is pressed, then it is moved.
+    // Settling, then pressing, then pushing.
     let (settled, moved) = (1000, 1500);
     let mut times = Vec::new();
     for number in 0..moved + steps.min(20_000) {
@@ -176,7 +174,7 @@ fn moving_steps(
     Ok(times)
 }
 
-/// A body with the damping βK, β = 2 ms, instead of its own.
+/// Copy with stiffness-proportional damping, β = 2 ms.
 fn damped(cube: &Recording) -> Recording {
     let mut cube = cube.clone();
     let modes = &mut cube.modes;

@@ -19,14 +19,14 @@ use std::f64::consts::PI;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// The main job in one command: record an elastic cube, shake it, and touch it in the browser
+/// Record an elastic cube, shake it, and touch it in the browser
 ///
 /// Records the cube once (a few seconds; kept in the cache folder), runs a shake by two hands at 2 Hz, shows the forces, and
 /// writes the scene, its paths, the steps as CSV and the deformed surfaces for ParaView. Then, on a terminal, it opens the
 /// viewer with the built-in scenes, where you poke, squeeze and throw.
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene that the viewer begins with: bounce, shake, pinch, stack, ball, slab
+    /// Initial scene of the viewer: bounce, shake, pinch, stack, ball, slab
     #[arg(value_name = "NAME", default_value = BUILT_IN_SCENES[0].id, value_parser = BUILT_IN_SCENES.map(|scene| scene.id))]
     name: String,
     /// Folder for what is written
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// End after the shake
     #[arg(long, conflicts_with = "serve")]
     no_serve: bool,
-    /// How the viewer is served
+    /// Server options
     #[command(flatten)]
     serving: Serving,
 }
@@ -68,7 +68,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let bytes = recording.to_bytes()?;
     write_atomically(&recording_path, &bytes)?;
     print("An elastic cube, 10 cm and 110 g, as soft as jelly:\n\n")?;
-    inspect::print_for_person(&recording, &recording_path, bytes.len())?;
+    inspect::print_as_text(&recording, &recording_path, bytes.len())?;
 
     for (name, side) in [("left", -1.0), ("right", 1.0)] {
         write_atomically(&output.join(format!("{name}.csv")), shake_path(side).as_bytes())?;
@@ -138,7 +138,7 @@ attach = { object = "cube", point = [0.05, 0.0, 0.0] }
 path = { file = "right.csv" }
 "#;
 
-/// Path of the hand on one side (−1 left, 1 right): squeeze within 0.2 s, shake with a soft start.
+/// Path of the hand on a side (−1 left, 1 right): squeeze within 0.2 s, then shake with a smooth start.
 fn shake_path(side: f64) -> String {
     let smooth = |share: f64| 0.5 - 0.5 * (PI * share.clamp(0.0, 1.0)).cos();
     let mut text = String::from("t,x,y,z\n");
@@ -151,7 +151,7 @@ fn shake_path(side: f64) -> String {
     text
 }
 
-/// The paper's cube from the cache, or recorded into it.
+/// Recording of the paper's cube, from the cache or made and cached.
 pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Recording, Failure> {
     let recipe = cube_recipe(cells, modes);
     let folder = cache_folder(cache);

@@ -1,4 +1,4 @@
-//! `palpate device`: a device here, for a scene in another process or on another machine.
+//! `palpate device`: a local device for a scene in another process or on another machine.
 
 mod real;
 
@@ -19,11 +19,11 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Run a haptic device here for a scene that runs elsewhere
+/// Connect a haptic device to a scene in another process or on another machine
 ///
 /// The scene has a device of this name with `linked = true`, and runs with `palpate run SCENE --realtime`. This process reads the
-/// device, sends where the hand is, and pushes the hand with what comes back, as far as it is safe and passive. If the link
-/// breaks, the force goes away at once, and comes back when the link does.
+/// device, sends its motion, and applies the force that comes back, within safety limits and passively. If the link breaks,
+/// the force is removed at once; it returns with the link.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "On one machine:
   palpate run scene.toml --realtime --duration 60
@@ -33,37 +33,36 @@ Between machines, with a secret that both know:
   palpate run scene.toml --realtime --listen 0.0.0.0:7402 --secret secret.txt
   palpate device left --path left.csv --connect 192.168.1.20:7402 --secret secret.txt")]
 pub struct Arguments {
-    /// The device's name in the scene
+    /// Name of the device in the scene
     pub name: String,
-    /// Where the scene runs
+    /// Address of the scene
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
     pub connect: SocketAddr,
-    /// Where the hand goes: t,x,y,z in s and m, world
+    /// Motion path: t,x,y,z in s and m, world
     #[arg(long, value_name = "FILE.csv", required_unless_present = "driver")]
     pub path: Option<PathBuf>,
-    /// A simulated device in a simulated hand that wants to be where the path is: touch, omega.3 or inverse3
+    /// Simulated device, in a simulated hand that tracks the path: touch, omega.3 or inverse3
     #[arg(long, value_name = "DEVICE")]
     pub simulated: Option<String>,
-    /// How the simulated hand holds it: firm, light or fingertip
+    /// Grip of the simulated hand: firm, light or fingertip
     #[arg(long, value_name = "GRIP", requires = "simulated")]
     pub grip: Option<String>,
-    /// A real device
+    /// Real device
     #[command(flatten)]
     pub real: RealArguments,
     /// Updates per second [Hz]
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
     pub rate: f64,
-    /// How long [s], from when the link is there; by default to the end of the path, and with a real device until
-    /// Ctrl-C
+    /// Duration from the connection on [s]; by default to the end of the path, with a real device until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// How long a scene is looked for [s]
+    /// Timeout of the connection [s]
     #[arg(long, value_name = "S", default_value_t = 30.0, allow_negative_numbers = true)]
     pub wait: f64,
-    /// A file with the secret that both ends of the link know; needed between machines
+    /// File with the shared secret of the link; needed between machines
     #[arg(long, value_name = "FILE")]
     pub secret: Option<PathBuf>,
-    /// Leave the passivity controller out
+    /// Without passivity controller
     #[arg(long)]
     pub not_passive: bool,
     /// One JSON object on standard output
@@ -77,7 +76,7 @@ const PRIORITY: u8 = 70;
 /// Interval of checks of the link.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// What moves the device.
+/// Source of motion.
 enum Source {
     Path(MotionPath, Option<(Traits, Hand)>),
     Real(Box<AttachedDevice>),
@@ -88,7 +87,7 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     if !(50.0..=5000.0).contains(&arguments.rate) {
         return Err(Failure(format!("--rate is {} Hz, expected 50 to 5000", arguments.rate)));
     }
-    // The scene says what it does there.
+    // The scene decides the mode.
     let (mode, rate, passivity) = (DeviceMode::Touch, arguments.rate, !arguments.not_passive);
     let source = match (arguments.real.real()?, &arguments.path) {
         (Some(real), _) => {
@@ -106,8 +105,8 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     let secret = read_secret(arguments.secret.as_deref())?;
     let (port, client) = LinkClient::new(arguments.connect, &secret, &arguments.name, start)?;
     let stop = stop_on_interrupt();
-    find(&client, arguments, start, stop)?;
-    // The hand sets out when there is something to touch.
+    connect(&client, arguments, start, stop)?;
+    // The path begins with the connection.
     let found = start.elapsed().as_secs_f64();
     let attached = match source {
         Source::Path(path, simulated) => attach_path(path.later(found), simulated, mode, rate, passivity),
@@ -131,7 +130,7 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// How long [s] it goes on.
+/// Duration from the connection on [s].
 fn duration(arguments: &Arguments, source: &Source) -> Result<f64, Failure> {
     let end = match source {
         Source::Path(path, _) => path.end(),
@@ -145,15 +144,15 @@ fn duration(arguments: &Arguments, source: &Source) -> Result<f64, Failure> {
     Err(Failure(format!("the duration is {duration} s, expected above 0: --duration gives one")))
 }
 
-/// The simulated device and hand that are asked for.
+/// Simulated device and hand, if given.
 fn simulated(arguments: &Arguments) -> Result<Option<(Traits, Hand)>, Failure> {
     let hand = arguments.grip.as_deref().map_or(Ok(Hand::FIRM), find_grip).map_err(Failure)?;
     let traits = arguments.simulated.as_deref().map(find_device_traits).transpose().map_err(Failure)?;
     Ok(traits.map(|traits| (traits, hand)))
 }
 
-/// Wait until the link is there.
-fn find(
+/// Waits for the connection.
+fn connect(
     client: &LinkClient,
     arguments: &Arguments,
     start: Instant,
@@ -179,7 +178,7 @@ fn find(
     }
 }
 
-/// Say how the link is until the time is over; gives for how long [s] it was there.
+/// Reports changes of the link until the end; returns how long it was connected [s].
 fn watch(
     client: &LinkClient,
     arguments: &Arguments,

@@ -1,4 +1,4 @@
-//! A real device on the command line.
+//! Options of a real device.
 
 use crate::failure::Failure;
 use clap::Args;
@@ -8,34 +8,34 @@ use palpate_haptics::device::Mount;
 use palpate_haptics::orientation;
 use palpate_scene::{MAX_FORCE_N, RealDevice, find_driver};
 
-/// A real device, in the place of a path.
+/// Real device, instead of a path.
 #[derive(Args, Debug, Clone)]
 pub struct RealArguments {
-    /// A real device, by its driver: openhaptics, dhd or haply (`palpate devices` lists what is there)
+    /// Driver of a real device: openhaptics, dhd or haply (`palpate devices` lists the devices)
     #[arg(long, value_name = "DRIVER", conflicts_with_all = ["path", "simulated"])]
     pub driver: Option<String>,
     /// Which one: its number from 0 (0 by default), its serial, or (openhaptics) the name of its configuration
     #[arg(long, value_name = "DEVICE")]
     pub which: Option<String>,
-    /// Where the device's origin is [m, world]
+    /// Position of the device frame [m, world]
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     pub mount_position: Vec<f64>,
-    /// How the device's frame (x to the right, y up, z towards the user) is turned in the world
+    /// Orientation of the device frame (x right, y up, z towards the user) in the world
     #[arg(long, value_name = "W,X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     pub mount_orientation: Vec<f64>,
-    /// Metres in the world per metre of the device; by default 1
+    /// Scale from the device to the world; by default 1
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub mount_scale: Option<f64>,
-    /// Largest force [N], if the device gives as much; by default 3
+    /// Force limit [N], within that of the device; by default 3
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub force: Option<f64>,
-    /// Let force through from the start: not from the press of one of its buttons on
+    /// Enable forces from the start, without pressing a button
     #[arg(long)]
     pub armed: bool,
 }
 
 impl RealArguments {
-    /// The device that is asked for, if there is one.
+    /// Real device, if given.
     pub fn real(&self) -> Result<Option<RealDevice>, Failure> {
         let Some(driver) = &self.driver else { return self.refuse().map(|()| None) };
         let driver = find_driver(driver).map_err(|what| Failure(format!("--{what}")))?;
@@ -46,7 +46,7 @@ impl RealArguments {
         Ok(Some(RealDevice { driver, id, mount, max_force_n: self.force, armed: self.armed }))
     }
 
-    /// Options that mean nothing without a driver. Clap would not say so, since the driver conflicts with the path.
+    /// Refuses options that need a driver: clap would not, since the driver conflicts with the path.
     fn refuse(&self) -> Result<(), Failure> {
         let options = [
             (self.which.is_some(), "--which"),

@@ -1,4 +1,4 @@
-//! `palpate export`: a run or a recording as files that other programs open.
+//! `palpate export`: a log or a recording as files for other programs.
 
 mod log;
 mod recording;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// Turn a log or a recording into files for ParaView, Blender, a browser or a notebook
 ///
-/// A log (palpate run --realtime --log) is computed again step by step, as palpate replay does, so every frame is exact at its
-/// time; a step that comes out differently ends the export. Of a recording its mode shapes are shown, with the surface at rest.
+/// A log (palpate run --realtime --log) is replayed step by step, as by palpate replay, so every frame is exact at its time; a
+/// step that differs ends the export. Of a recording the mode shapes are exported, with the surface at rest.
 ///
 /// --vtu: surfaces of objects, planes and obstacles, contacts and devices as points with their forces; open scene.pvd in
 /// ParaView. --gltf: one animated file, y up, in metres; the objects' deformation as morph targets, one per frame.
@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Leave out what is after this time [s]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     to: Option<f64>,
-    /// So many modes of a recording, from the lowest [default: 10, and all for --csv]
+    /// Number of modes of a recording, from the lowest [default: 10, and all for --csv]
     #[arg(long, value_name = "N")]
     modes: Option<usize>,
     /// One JSON object on standard output

@@ -1,4 +1,4 @@
-//! A recording as files: the surface at rest, and the shapes that its modes give it.
+//! Export of a recording: the surface at rest, and its mode shapes.
 
 use super::{Arguments, print_written};
 use crate::failure::Failure;
@@ -13,24 +13,24 @@ use serde_json::json;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-/// Modes are many, and the low ones tell most.
+/// Default number of modes: the lowest are those that are felt and seen.
 const MODES: usize = 10;
 
-/// A mode's largest displacement, as a share of the object's diagonal: enough to be seen.
-const SWING: f64 = 0.1;
+/// Largest displacement of a shown mode, as a share of the object's diagonal.
+const AMPLITUDE: f64 = 0.1;
 
-/// An animation swings its mode once in this time [s], whatever its frequency is.
+/// Period of the animation of a mode [s], whatever its frequency.
 const PERIOD_S: f64 = 2.0;
 
-/// Between the times of such a swing weights are linear.
+/// Key times per period; weights are linear between them.
 const KEYS: usize = 24;
 
 const COLOUR: [f32; 3] = [0.75, 0.22, 0.13];
 
-/// The recording, and what is wanted of it.
+/// Recording and export options.
 struct Export<'a> {
     recording: &'a Recording,
-    /// How many modes are drawn, and how many have a row.
+    /// Number of modes with shapes, and with rows.
     drawn: usize,
     rows: usize,
     inputs: Vec<PathBuf>,
@@ -77,24 +77,24 @@ impl Export<'_> {
                 "{drawn} of {kept} modes, {:.2} to {:.2} Hz; their largest displacement is drawn as {:.0} % of the diagonal",
                 self.frequency_hz(0),
                 self.frequency_hz(drawn - 1),
-                100.0 * SWING
+                100.0 * AMPLITUDE
             ),
         }
     }
 
-    /// What a mode is called.
+    /// Name of a mode.
     fn name(&self, mode: usize) -> String {
         format!("mode {}: {:.2} Hz", mode + 1, self.frequency_hz(mode))
     }
 
-    /// A mode's displacement of every surface node [m].
+    /// Mode shape: displacements of the surface nodes [m].
     fn shape(&self, mode: usize) -> Vec<DVec3> {
         let nodes = self.recording.surface.positions.len();
         let at = |node, axis| self.recording.modes.row(node, axis)[mode];
         let shape = (0..nodes).map(|node| DVec3::new(at(node, 0), at(node, 1), at(node, 2)));
         let shape: Vec<DVec3> = shape.collect();
         let largest = shape.iter().map(|u| u.length()).fold(f64::MIN_POSITIVE, f64::max);
-        let scale = SWING * self.recording.surface.diagonal() / largest;
+        let scale = AMPLITUDE * self.recording.surface.diagonal() / largest;
         shape.into_iter().map(|u| scale * u).collect()
     }
 
@@ -109,7 +109,7 @@ impl Export<'_> {
         Ok(file.finish()?)
     }
 
-    /// A time for each mode, from 1, and the surface at rest at time 0.
+    /// VTU series with the surface at rest at time 0 and a mode at each time from 1.
     fn vtu(&self, folder: &Path) -> Result<PathBuf, Failure> {
         let surface = &self.recording.surface;
         let mut series = VtuSeries::new(folder, "modes.pvd", &self.inputs)?;
@@ -130,10 +130,10 @@ impl Export<'_> {
         Ok(series.finish()?)
     }
 
-    /// A morph target and an animation for each mode.
+    /// GLB file with a morph target and an animation per mode.
     fn gltf(&self, path: &Path) -> Result<PathBuf, Failure> {
         let surface = &self.recording.surface;
-        // A node of the surface is drawn as one vertex at least.
+        // A surface node has at least one vertex.
         check_glb_size((24 * surface.positions.len() as u64).saturating_mul(1 + self.drawn as u64), path)?;
         let mut glb = Glb::new(path, &self.inputs)?;
         glb.content.nodes.push(root_node(DVec3::ZERO));
@@ -144,14 +144,14 @@ impl Export<'_> {
             object.add_shape(&mut glb, &self.shape(mode), self.name(mode))?;
         }
         if self.drawn > 0 {
-            self.swing(&mut glb, object.node());
+            self.animate(&mut glb, object.node());
         }
         object.finish(&mut glb.content, &vec![0.0; self.drawn]);
         Ok(glb.finish()?)
     }
 
-    /// Let a mode after the other swing once, alone: an animation for each.
-    fn swing(&self, glb: &mut Glb, node: usize) {
+    /// Adds an animation per mode: one period of its weight.
+    fn animate(&self, glb: &mut Glb, node: usize) {
         let times: Vec<f64> = (0..=KEYS).map(|key| PERIOD_S * key as f64 / KEYS as f64).collect();
         let times = glb.times(&times);
         let weight = |key: usize| (TAU * key as f64 / KEYS as f64).sin() as f32;

@@ -1,4 +1,4 @@
-//! `palpate inspect`: what is in a recording, and which coupling a device can have on it.
+//! `palpate inspect`: contents of a recording or a store, and the stable couplings of a device.
 
 mod stability;
 
@@ -15,11 +15,11 @@ use stability::StabilityArguments;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Show what is in a recording, with its force-error certificate, or in a store of impulse responses
+/// Show a recording with its force-error certificate, or a store of impulse responses
 ///
-/// Of a store it tells which shards are there and which are missing, and checks those that are there. With --device it tells which
-/// virtual coupling (scene key `coupling`) is stable for that device on this object at a rate, with a delay, in a hand; by how
-/// much; where it begins to swing; and the default, the stiffest with twice the gains and twice the delay to spare.
+/// Of a store it lists the shards that exist and those that are missing, and checks the former. With --device it shows which
+/// virtual couplings (scene key `coupling`) are stable for that device on this object at a rate, with a delay, in a hand; the
+/// margins; where oscillation begins; and the default, the stiffest with margins of twice the gains and twice the delay.
 #[derive(Args)]
 #[command(after_help = "Examples:
   palpate inspect cube.palp
@@ -35,7 +35,7 @@ pub struct Arguments {
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
-    /// The coupling of a device
+    /// Coupling of a device
     #[command(flatten)]
     stability: StabilityArguments,
 }
@@ -47,14 +47,14 @@ pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
         return inspect_store(arguments, &Location::parse(&text));
     }
     let recording = read_recording(&arguments.file)?;
-    if arguments.stability.tell(&recording, arguments.json)? {
+    if arguments.stability.print_if_given(&recording, arguments.json)? {
         return Ok(());
     }
     if arguments.json {
         return print_as_json(&recording);
     }
     let bytes = std::fs::metadata(&arguments.file).map_or(0, |m| m.len() as usize);
-    print_for_person(&recording, &arguments.file, bytes)
+    print_as_text(&recording, &arguments.file, bytes)
 }
 
 fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failure> {
@@ -74,7 +74,7 @@ fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failu
     let printed = if arguments.json {
         print_store_as_json(&store, &damaged)
     } else {
-        print_store_for_person(&store, &damaged)
+        print_store_as_text(&store, &damaged)
     };
     match damaged.into_iter().next() {
         Some((_, what)) => Err(Failure(what)),
@@ -82,7 +82,7 @@ fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failu
     }
 }
 
-/// A store as one JSON object; `damaged` are the shards that don't decode, with why.
+/// Prints a store as JSON; `damaged` are the shards that do not decode, with the reason.
 pub fn print_store_as_json(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
     let (content, present) = (store.content(), store.present()?);
     let attributes = &content.attributes;
@@ -107,8 +107,8 @@ pub fn print_store_as_json(store: &TableStore, damaged: &[(usize, String)]) -> R
     }))
 }
 
-/// A store for a person.
-pub fn print_store_for_person(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
+/// Prints a store as text.
+pub fn print_store_as_text(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
     let present = store.present()?;
     print(&describe_store(store, &present, damaged).map_err(|e| Failure(e.to_string()))?)
 }
@@ -183,7 +183,7 @@ fn frequencies_hz(recording: &Recording) -> Vec<f64> {
     recording.modes.angular_frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect()
 }
 
-/// The recording as one JSON object.
+/// Prints a recording as JSON.
 pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
     let metadata = &recording.metadata;
     let failed = |e: serde_json::Error| Failure(format!("JSON: {e}"));
@@ -219,8 +219,8 @@ pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
     }))
 }
 
-/// The recording for a person.
-pub fn print_for_person(recording: &Recording, path: &Path, bytes: usize) -> Result<(), Failure> {
+/// Prints a recording as text.
+pub fn print_as_text(recording: &Recording, path: &Path, bytes: usize) -> Result<(), Failure> {
     print(&describe(recording, path, bytes).map_err(|e| Failure(e.to_string()))?)
 }
 

@@ -1,4 +1,4 @@
-//! `palpate inspect --device`: which virtual coupling is stable on an object, and by how much.
+//! `palpate inspect --device`: stable virtual couplings on an object, and their margins.
 
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
@@ -14,10 +14,10 @@ use palpate_scene::{ANY_HAND, find_device_traits, find_grip};
 use serde_json::json;
 use std::fmt::Write;
 
-/// What is asked of a device's coupling.
+/// Options of the stability analysis.
 #[derive(Args)]
 pub struct StabilityArguments {
-    /// Tell which virtual coupling is stable with this device, and by how much: touch, omega.3 or inverse3
+    /// Show which virtual couplings are stable with this device, and their margins: touch, omega.3 or inverse3
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// Steps of the scene, and updates of the device, per second [Hz]
@@ -29,16 +29,16 @@ pub struct StabilityArguments {
         allow_negative_numbers = true
     )]
     rate: f64,
-    /// What a link adds from a motion to the force that answers it, there and back [s]
+    /// Round-trip delay of a link, from a motion to its force [s]
     #[arg(long, value_name = "S", default_value_t = 0.0, requires = "device", allow_negative_numbers = true)]
     delay: f64,
-    /// The hand that holds it: firm, light or fingertip; left out: all of them, and none (the worst counts)
+    /// Grip of the hand: firm, light or fingertip; without it the worst of all, and of no hand
     #[arg(long, value_name = "GRIP", requires = "device")]
     grip: Option<String>,
-    /// Where, in the body frame [m]; left out: the stiffest place of the surface
+    /// Contact point in the body frame [m]; without it the stiffest point of the surface
     #[arg(long, value_name = "X,Y,Z", requires = "device", allow_hyphen_values = true)]
     point: Option<String>,
-    /// Radius of the patch that the touch is spread over [m]
+    /// Radius of the contact patch [m]
     #[arg(long, value_name = "M", default_value_t = 0.0, requires = "device", allow_negative_numbers = true)]
     patch: f64,
 }
@@ -47,11 +47,11 @@ pub struct StabilityArguments {
 const TABLE: [f64; 12] =
     [10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0, 50_000.0];
 
-/// Stiffer [N/m] is no coupling.
+/// Upper bound of the search [N/m].
 const STIFFEST: f64 = 1e6;
 
-/// Everything that is told.
-struct Found {
+/// Result of the analysis.
+struct Analysis {
     traits: Traits,
     hands: Vec<&'static str>,
     timing: LoopTiming,
@@ -62,13 +62,13 @@ struct Found {
     table: Vec<(f64, Option<[f64; 2]>)>,
     unstable_from: Option<f64>,
     default: Option<DefaultCoupling>,
-    /// Damping of the device's own that would make the default passive with any hand.
+    /// Device damping with which the default is passive with any hand [N·s/m].
     passive: Option<f64>,
 }
 
 impl StabilityArguments {
-    /// Tell it, if it is asked for. Says whether it was.
-    pub fn tell(&self, recording: &Recording, as_json: bool) -> Result<bool, Failure> {
+    /// Prints the analysis if a device is given; returns whether one is.
+    pub fn print_if_given(&self, recording: &Recording, as_json: bool) -> Result<bool, Failure> {
         let Some(device) = &self.device else { return Ok(false) };
         let found = self.find(recording, find_device_traits(device).map_err(Failure)?)?;
         if as_json {
@@ -79,7 +79,7 @@ impl StabilityArguments {
         Ok(true)
     }
 
-    fn find(&self, recording: &Recording, traits: Traits) -> Result<Found, Failure> {
+    fn find(&self, recording: &Recording, traits: Traits) -> Result<Analysis, Failure> {
         let fail = |what: String| Err(Failure(what));
         let Self { rate, delay, patch, .. } = *self;
         if !(50.0..=10_000.0).contains(&rate) {
@@ -107,7 +107,7 @@ impl StabilityArguments {
         let within_step = place.within_step(timing.step_s);
         let default = default_coupling(&loops, within_step);
         let needs = |found: &DefaultCoupling| loops[0].damping_for_passivity(found.coupling);
-        Ok(Found {
+        Ok(Analysis {
             traits,
             hands: hands.iter().map(|(name, _)| *name).collect(),
             timing,
@@ -142,7 +142,7 @@ impl StabilityArguments {
     }
 }
 
-impl Found {
+impl Analysis {
     fn text(&self) -> Result<String, std::fmt::Error> {
         let mut out = String::new();
         let LoopTiming { step_s, delay_updates } = self.timing;
@@ -235,7 +235,7 @@ impl Found {
     }
 }
 
-/// A gain to three digits, as a scene takes it.
+/// Gain with three digits.
 fn gain(value: f64) -> String {
     match value {
         0.0 => "0.0".into(),

@@ -1,4 +1,4 @@
-//! `palpate record`: mesh in, recording out.
+//! `palpate record`: from a mesh to a recording.
 
 mod node_selection;
 mod table;
@@ -22,8 +22,8 @@ use table::{TableArguments, TableCommand};
 
 /// Record the impulse responses of an elastic body by finite elements
 ///
-/// Reads or makes a tetrahedral mesh, finds its lowest elastic modes and the static compliance of what they miss,
-/// measures how far that is from the unreduced model, and writes one file that `palpate run` can use.
+/// Reads or makes a tetrahedral mesh, computes its lowest elastic modes and the residual compliance, certifies the error
+/// against the unreduced model, and writes one recording for `palpate run`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "Examples:
   palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 -o cube.palp
@@ -66,7 +66,7 @@ pub struct Arguments {
         conflicts_with = "damping_ratio"
     )]
     pub rayleigh: Option<Vec<f64>>,
-    /// The same damping ratio for every mode; without it and --rayleigh nothing is damped
+    /// Damping ratio of every mode; without it and --rayleigh nothing is damped
     #[arg(long, value_name = "ZETA", allow_negative_numbers = true)]
     pub damping_ratio: Option<f64>,
     /// Elastic modes to keep: more for faster events (see `bandwidth` in the certificate)
@@ -75,13 +75,13 @@ pub struct Arguments {
     /// Order of the elements; 1 locks for Poisson's ratios near 0.5
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
-    /// Multiply the file's coordinates to come to metres: 0.001 for a file in mm
+    /// Scale from the file's units to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
     /// Fix nodes: a named group of the mesh, a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale, or the words of --touchable; may be repeated. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
     #[arg(long, value_name = "GROUP|CONDITION")]
     pub fix: Vec<String>,
-    /// Make nodes that lie on the same point one node
+    /// Merge nodes at the same point
     #[arg(long)]
     pub merge_nodes: bool,
     /// Residual compliance: auto, whole, none, or a cut-off radius in metres
@@ -140,9 +140,9 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         (None, Some(store)) if arguments.json => inspect::print_store_as_json(&store, &[]),
         (written, store) => {
             if let Some((output, bytes)) = written {
-                inspect::print_for_person(&recorded.recording, output, bytes)?;
+                inspect::print_as_text(&recorded.recording, output, bytes)?;
             }
-            store.map_or(Ok(()), |store| inspect::print_store_for_person(&store, &[]))
+            store.map_or(Ok(()), |store| inspect::print_store_as_text(&store, &[]))
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Choosing nodes by words: what is fixed, touchable, observed.
+//! Selection of nodes by text: fixed, touchable, observed.
 //!
 //! `all`, `surface`, `region:NAME`, `nodes:1,5-9` (numbers in the input mesh, from 0), a named group of the mesh, or a
 //! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold.
@@ -8,16 +8,16 @@ use palpate_fem::discretisation::Discretisation;
 use palpate_fem::material::region_text;
 use palpate_fem::mesh::{Mesh, boundary};
 
-/// Nodes of a mesh that a text chooses.
+/// Nodes of a mesh, selected by a text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
     /// Ascending.
     pub mesh_nodes: Vec<u32>,
-    /// Whether `surface` is one of the parts: then mid-edge nodes must lie on it, too.
+    /// Whether `surface` is one of the conditions: then mid-edge nodes must lie on it, too.
     surface: bool,
 }
 
-/// What a text chooses; `option` names it in errors.
+/// Nodes that a text selects; `option` names it in errors.
 pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failure> {
     let mut chosen = vec![true; mesh.nodes.len()];
     let parts: Vec<&str> = text.split('&').map(str::trim).collect();
@@ -38,7 +38,7 @@ pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failur
     Ok(Selection { mesh_nodes, surface: parts.contains(&"surface") })
 }
 
-/// Nodes of a discretisation that any of some selections chooses, ascending.
+/// Nodes of a discretisation in the union of selections, ascending.
 pub fn union(discretisation: &Discretisation, selections: &[Selection]) -> Vec<u32> {
     let mut chosen = vec![false; discretisation.nodes.len()];
     let mut on_surface = vec![false; discretisation.nodes.len()];
@@ -52,7 +52,7 @@ pub fn union(discretisation: &Discretisation, selections: &[Selection]) -> Vec<u
     (0..chosen.len() as u32).filter(|&node| chosen[node as usize]).collect()
 }
 
-/// Which nodes one part chooses; `None` when it is not understood.
+/// Membership by node for one condition; `None` when it is not understood.
 fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
     let mut holds = vec![false; mesh.nodes.len()];
     if let Some(group) = mesh.groups.iter().find(|group| group.name == part) {

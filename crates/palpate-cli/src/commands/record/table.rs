@@ -27,19 +27,19 @@ pub struct TableArguments {
     /// Step [s]: how long the unit force is held, and the time between samples
     #[arg(long, value_name = "S", default_value_t = 1e-3, allow_negative_numbers = true, requires = "dense")]
     pub step: f64,
-    /// What a sample is: the end of the step (exact), or the mean of its middle and end (as in the paper, not passive)
+    /// Sample: displacement at the end of the step (exact), or the mean of its middle and end (as in the paper, not passive)
     #[arg(long, value_enum, default_value_t = SamplingOption::End, requires = "dense")]
     pub sampling: SamplingOption,
-    /// How it is computed: from the modes and residual compliance, or by time integration of the whole mesh
+    /// Method: from the modes and residual compliance, or by time integration of the whole mesh
     #[arg(long, value_enum, default_value_t = MethodOption::ClosedForm, requires = "dense")]
     pub method: MethodOption,
     /// Integration steps per sample of --method transient
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000), requires = "dense")]
     pub substeps: u32,
-    /// Where force may enter: surface, all, region:NAME, nodes:1,5-9, a group of the mesh, or a condition such as 'x<0.01'; parts joined by & must all hold; may be repeated
+    /// Touchable nodes, where force may enter: surface, all, region:NAME, nodes:1,5-9, a group of the mesh, or a condition such as 'x<0.01'; parts joined by & must all hold; may be repeated
     #[arg(long, value_name = "NODES", default_value = "surface", requires = "dense")]
     pub touchable: Vec<String>,
-    /// Whose displacement is recorded: the same words
+    /// Observed nodes, whose displacement is recorded: as --touchable
     #[arg(long, value_name = "NODES", default_value = "surface", requires = "dense")]
     pub observed: Vec<String>,
     /// Number format
@@ -59,16 +59,16 @@ pub struct TableArguments {
     pub limit_memory: Option<u64>,
 }
 
-/// See [`Sampling`].
+/// Option of [`Sampling`].
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SamplingOption {
-    /// The end of the step.
+    /// End of the step.
     End,
-    /// The mean of middle and end.
+    /// Mean of middle and end.
     Mean,
 }
 
-/// See [`Method`].
+/// Option of [`Method`].
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MethodOption {
     /// From modes and residual compliance.
@@ -77,7 +77,7 @@ pub enum MethodOption {
     Transient,
 }
 
-/// See [`Number`].
+/// Option of [`Number`].
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NumberOption {
     /// Single precision.
@@ -86,7 +86,7 @@ pub enum NumberOption {
     F64,
 }
 
-/// See [`Compression`].
+/// Option of [`Compression`].
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CompressionOption {
     /// Zstandard after byte shuffling.
@@ -95,9 +95,9 @@ pub enum CompressionOption {
     None,
 }
 
-/// A shard's worth of numbers [bytes], and columns that are enough to compute at full speed.
+/// Size of a shard [bytes], and the number of columns from which on computing is no faster.
 const SHARD_BYTES: u64 = 256 << 20;
-const MOST_COLUMNS: u64 = 48;
+const MAX_COLUMNS: u64 = 48;
 
 fn part(text: &str) -> Result<Part, String> {
     let numbers =
@@ -128,7 +128,7 @@ fn memory(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A table to be recorded, checked as far as can be before the body is computed.
+/// Options of a table, checked before the body is computed.
 pub struct TableCommand<'a> {
     arguments: &'a TableArguments,
     location: Location,
@@ -167,7 +167,7 @@ impl<'a> TableCommand<'a> {
         }))
     }
 
-    /// How much of a recording the table needs; `also_recording` when one is written beside it.
+    /// Part of a recording that the table needs; `also_recording` when one is written beside it.
     pub fn extent(&self, also_recording: bool) -> Extent {
         match (also_recording, self.arguments.method) {
             (true, _) => Extent::Whole,
@@ -200,7 +200,7 @@ impl<'a> TableCommand<'a> {
         let store = TableStore::create(&self.location, content, || recorder.gravity())?;
         let part = arguments.shard.unwrap_or(Part::ALL);
         let missing = store.missing(part)?;
-        check_standing(&store, part, &missing, progress)?;
+        check_existing(&store, part, &missing, progress)?;
         let at_once = self.shards_at_once(&store, &recorder)?;
 
         let columns: usize = missing.iter().map(|&shard| store.columns_of(shard).len()).sum();
@@ -234,7 +234,7 @@ impl<'a> TableCommand<'a> {
             NumberOption::F64 => Number::F64,
         };
         let column_bytes = (recorder.column_length() * number.bytes()) as u64;
-        let mut columns_per_shard = (SHARD_BYTES / column_bytes.max(1)).clamp(1, MOST_COLUMNS);
+        let mut columns_per_shard = (SHARD_BYTES / column_bytes.max(1)).clamp(1, MAX_COLUMNS);
         if columns_per_shard > 3 {
             // Whole nodes.
             columns_per_shard -= columns_per_shard % 3;
@@ -292,7 +292,7 @@ impl<'a> TableCommand<'a> {
         }
     }
 
-    /// How many shards are computed at once, so that every core has a block of columns; refuses work that would go beyond
+    /// Number of shards that are computed at once, so that every core has a block of columns; refuses work that would go beyond
     /// the limit, or beyond the memory that there is.
     fn shards_at_once(&self, store: &TableStore, recorder: &TableRecorder<'_>) -> Result<usize, Failure> {
         let content = store.content();
@@ -336,8 +336,8 @@ fn used_bytes() -> u64 {
     4096 * resident.unwrap_or(0)
 }
 
-/// What stands already must be sound before more is added.
-fn check_standing(
+/// Checks the shards that exist before others are added.
+fn check_existing(
     store: &TableStore,
     part: Part,
     missing: &[usize],

@@ -1,4 +1,4 @@
-//! `palpate run`: a scene, headless, as fast as it goes or in real time.
+//! `palpate run`: a scene without a viewer, offline or in real time.
 
 mod outputs;
 mod realtime;
@@ -23,7 +23,7 @@ pub use summary::{Summary, percentile_us};
 /// Run a scene and write forces, contacts, motion and energies
 ///
 /// Devices hold points of the objects or touch them, and follow their paths; objects fall on planes and meet obstacles.
-/// Out come the forces on the hands, every contact, the motion and the deformation, step by step.
+/// The results are the forces on the hands, all contacts, the motion and the deformation, by step.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "A scene (docs/scene.md has every key):
   step = 0.001
@@ -47,27 +47,27 @@ pub use summary::{Summary, percentile_us};
   sphere = { radius = 0.02 }        # or box, capsule, mesh
   position = [0.0, 0.2, 0.0]        # or path = { file = \"ball.csv\" }")]
 pub struct Arguments {
-    /// The scene file
+    /// Scene file
     pub scene: PathBuf,
-    /// How long [s]; by default to the end of the longest path, in real time with real or linked devices until Ctrl-C
+    /// Duration [s]; by default to the end of the longest path, in real time with real or linked devices until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// What it should leave
+    /// Outputs
     #[command(flatten)]
     pub outputs: OutputArguments,
-    /// In real time
+    /// Real time
     #[command(flatten)]
     pub realtime: RealtimeArguments,
 }
 
-/// Longest run [s] without a path to tell: long enough to see a fall.
+/// Duration without paths [s]: long enough for a fall.
 const DEFAULT_DURATION_S: f64 = 1.0;
 
-/// Runs of more steps than this (a second of work) show a bar on a terminal.
+/// Number of steps (a second of work) above which a progress bar is shown.
 const PROGRESS_FROM: usize = 200_000;
 
-/// More steps than this are a slip of the keyboard (a day at 1 kHz).
-const MOST_STEPS: f64 = 1e8;
+/// Upper bound of the number of steps: a day at 1 kHz.
+const MAX_STEPS: f64 = 1e8;
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.outputs.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
 }
 
-/// Run a scene to its end.
+/// Runs a scene offline to its end.
 pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure> {
     for SceneDevice { name, path, simulated, real, pointer, .. } in &scene.devices {
         if *pointer {
@@ -123,12 +123,12 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     outputs.finish(&state)
 }
 
-/// Pointers are of pages.
+/// Failure for a pointer, which needs the viewer.
 fn pointer_without_page(name: &str) -> Failure {
     Failure(format!("the device {name:?} is a pointer of the viewer: open the scene with palpate serve"))
 }
 
-/// How many steps: as many as asked for, or to the end of the longest path.
+/// Number of steps: for the given duration, or to the end of the longest path.
 fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let step_s = scene.model.parameters().step_s;
     let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
@@ -141,9 +141,9 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
             "the duration is {duration} s, expected at least one step of {step_s} s"
         )));
     }
-    if steps > MOST_STEPS {
+    if steps > MAX_STEPS {
         return Err(Failure(format!(
-            "{duration} s are {steps} steps of {step_s} s, at most {MOST_STEPS} are run at once"
+            "{duration} s are {steps} steps of {step_s} s, at most {MAX_STEPS} are run at once"
         )));
     }
     Ok(steps as usize)
@@ -158,8 +158,8 @@ fn move_input(scene: &Scene, time: f64, input: &mut Input) {
     }
 }
 
-/// A step that could not be solved ends the run of a scene with nothing but held points: its numbers would be those of an
-/// object let go. Where things touch it is counted instead, since the next step may be solved.
+/// Ends the run of a scene of held points at an unsolved step, in which the object would be released. In scenes with contacts
+/// unsolved steps are counted instead, since the next may be solved.
 fn check_status(scene: &Scene, input: &Input, state: &State) -> Result<(), Failure> {
     let output = state.output();
     let moves = output.objects.iter().all(|o| o.energy.stored().is_finite() && o.pose.position.is_finite());
@@ -187,7 +187,7 @@ fn check_status(scene: &Scene, input: &Input, state: &State) -> Result<(), Failu
     )))
 }
 
-/// The hand that is farthest from the point that it holds, and by how much [m]. A coupling lets its hand be elsewhere.
+/// Device without a coupling that is farthest from its held point, with the distance [m].
 fn farthest_hand<'s>(scene: &'s Scene, input: &Input, state: &State) -> Option<(f64, &'s str)> {
     let apart = |(device, hand): (&'s SceneDevice, &DeviceInput)| {
         let DeviceMode::Held(Grasp { object, point }) = device.mode else { return None };

@@ -3,10 +3,9 @@
 
 use super::realtime_report::{json, text};
 use super::{Arguments, count_steps};
-use crate::commands::serve::warn_of_stores;
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
-use crate::terminal::{notify, print, print_json};
+use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{Pose, State};
@@ -27,7 +26,7 @@ use std::time::{Duration, Instant};
 /// Options of a run in real time.
 #[derive(Args, Debug, Clone, Default)]
 pub struct RealtimeArguments {
-    /// Run by the clock, with a force process, a deformation process and a haptic update for each device
+    /// Run in real time, with a force process, a deformation process and a haptic update per device
     #[arg(long)]
     pub realtime: bool,
     /// Write a log (MCAP) that `palpate replay` repeats bit for bit, and that Foxglove opens
@@ -36,19 +35,19 @@ pub struct RealtimeArguments {
     /// Updates of each device per second [Hz]
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
     pub device_rate: f64,
-    /// Pictures per second that the deformation process makes; 0 for none
+    /// Rate of the deformation process [Hz]; 0 for none
     #[arg(long, value_name = "HZ", default_value_t = 60.0, allow_negative_numbers = true)]
     pub pictures: f64,
-    /// The core that the force process stays on, counted from 0; by default the last one
+    /// Core of the force process, from 0; by default the last one
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
-    /// Where devices with `linked = true` are waited for, which `palpate device` brings
+    /// Address for devices with `linked = true`, which `palpate device` connects
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7402")]
     pub listen: Option<SocketAddr>,
-    /// A file with the secret that both ends of a link know; needed between machines
+    /// File with the shared secret of the links; needed between machines
     #[arg(long, value_name = "FILE")]
     pub secret: Option<PathBuf>,
-    /// Leave the passivity controllers out
+    /// Without passivity controllers
     #[arg(long)]
     pub not_passive: bool,
 }
@@ -96,7 +95,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     if let Some(device) = scene.devices.iter().find(|device| device.pointer) {
         return Err(super::pointer_without_page(&device.name));
     }
-    // Hands without a path have no end but Ctrl-C.
+    // Devices without a path end with Ctrl-C only.
     let endless = arguments.duration.is_none() && scene.devices.iter().any(|device| device.path.is_none());
     let steps = if endless { None } else { Some(count_steps(scene, arguments)? as u64) };
     let log = options.log.as_deref().map(|path| begin_log(scene, path)).transpose()?;

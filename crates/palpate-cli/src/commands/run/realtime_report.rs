@@ -109,7 +109,7 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     if let Some(steal_time_s) = report.steal_time_s.filter(|steal_time_s| *steal_time_s > 0.0) {
         let share = 100.0 * steal_time_s / report.wall_s;
         out += &format!(
-            "  stolen       {steal_time_s:.2} s of its core ({share:.2} %) went to something else on the machine below this one\n"
+            "  steal time   {steal_time_s:.2} s of its core ({share:.2} %): the hypervisor ran something else\n"
         );
     }
     for (device, own) in here() {
@@ -124,7 +124,7 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     let parameters = scene.model.parameters();
     if !parameters.obstacles.is_empty() {
         out += &format!(
-            "  contacts     objects meet obstacles at {} places at most (max_contact_samples)\n",
+            "  contacts     at most {} contact samples of an object on an obstacle (max_contact_samples)\n",
             parameters.max_contact_samples
         );
     }

@@ -22,8 +22,8 @@ pub struct Summary {
     unsolved_steps: usize,
     dropping_steps: usize,
     /// Largest number of contacts in a step, and largest contact force [N].
-    most_contacts: usize,
-    most_contact_force: f64,
+    max_contacts: usize,
+    max_contact_force: f64,
     start_energy: f64,
     /// Compute time of each step [ns], sorted.
     times_ns: Vec<u32>,
@@ -42,8 +42,8 @@ impl Summary {
             status: StepStatus::default(),
             unsolved_steps: 0,
             dropping_steps: 0,
-            most_contacts: 0,
-            most_contact_force: 0.0,
+            max_contacts: 0,
+            max_contact_force: 0.0,
             start_energy: start.energy.stored(),
             times_ns: Vec::with_capacity(steps),
             index: None,
@@ -64,9 +64,9 @@ impl Summary {
         all.dropped_contacts = all.dropped_contacts.max(now.dropped_contacts);
         self.unsolved_steps += usize::from(now.unsolved_islands > 0);
         self.dropping_steps += usize::from(now.dropped_contacts > 0);
-        self.most_contacts = self.most_contacts.max(output.contacts.len());
+        self.max_contacts = self.max_contacts.max(output.contacts.len());
         let forces = output.contacts.iter().map(|contact| contact.force.length());
-        self.most_contact_force = forces.fold(self.most_contact_force, f64::max);
+        self.max_contact_force = forces.fold(self.max_contact_force, f64::max);
     }
 
     /// Completes the summary after the last step.
@@ -130,7 +130,7 @@ impl Summary {
             "step_s": scene.model.parameters().step_s,
             "devices": devices,
             "objects": objects,
-            "contacts": { "most": self.most_contacts, "most_force_n": self.most_contact_force },
+            "contacts": { "count_max": self.max_contacts, "force_max_n": self.max_contact_force },
             "energy_j": {
                 "kinetic": energy.kinetic,
                 "elastic": energy.elastic,
@@ -151,7 +151,7 @@ impl Summary {
                 "max": self.time_us(1.0),
             },
             "solver": {
-                "held_point_miss_max_m": self.status.solver_residual_m,
+                "constraint_residual_max_m": self.status.solver_residual_m,
                 "iterations_max": self.status.iterations,
                 "dependent_rows": self.status.dependent_rows,
                 "dropped_contacts": self.status.dropped_contacts,
@@ -189,10 +189,10 @@ impl Summary {
                 1000.0 * deformation
             );
         }
-        if self.most_contacts > 0 {
+        if self.max_contacts > 0 {
             out += &format!(
                 "  contacts     {} at once at most, {:.5} N in one at most\n",
-                self.most_contacts, self.most_contact_force
+                self.max_contacts, self.max_contact_force
             );
         }
         out += &self.energy_line(scene);

@@ -1,7 +1,7 @@
 //! Logs of served scenes: one for each time that a scene begins anew.
 
 use crate::failure::Failure;
-use crate::terminal::notify;
+use crate::terminal::{notify, warn_of_stores};
 use palpate_export::{AtomicFile, check_target, check_writable};
 use palpate_haptics::log::LogSummary;
 use palpate_scene::SceneLog;
@@ -83,16 +83,6 @@ impl LogSeries {
     /// First failure of the series, if there was one.
     pub fn end(&self) -> Result<(), Failure> {
         self.lock().failure.take().map_or(Ok(()), |text| Err(Failure(text)))
-    }
-}
-
-/// Warns of stores of impulse responses, which logs do not carry.
-pub fn warn_of_stores(scene: &SceneLog) {
-    for store in scene.stores_left_out() {
-        notify(&format!(
-            "warning: {} is not taken into the log: a replay needs it where it is",
-            store.display()
-        ));
     }
 }
 

@@ -10,7 +10,6 @@ use crate::terminal::notify;
 use clap::Args;
 use indicatif::ProgressBar;
 use log_series::LogSeries;
-pub use log_series::warn_of_stores;
 use palpate_haptics::Scheduling;
 use palpate_render::LogFramePlayer;
 use palpate_scene::BUILT_IN_SCENES;
@@ -42,40 +41,40 @@ pub struct Arguments {
     /// The built-in scene to begin with: bounce, shake, pinch, stack, ball, slab
     #[arg(long, value_name = "ID", conflicts_with = "files")]
     scene: Option<String>,
-    /// How it is served
+    /// Server options
     #[command(flatten)]
     serving: Serving,
 }
 
-/// How a viewer is served.
+/// Options of the viewer's server.
 #[derive(Args, Debug, Clone, Default)]
 pub struct Serving {
     /// Address and port of the page [default: 127.0.0.1:7400, or a free port if that is taken]
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
-    /// What whoever comes from another machine must know; part of the address that is printed
+    /// Secret for access from other machines; part of the printed address
     #[arg(long, value_name = "TEXT")]
     token: Option<String>,
     /// Do not open a browser
     #[arg(long)]
     no_browser: bool,
-    /// The core that the force process stays on, counted from 0; by default the last one
+    /// Core of the force process, from 0; by default the last one
     #[arg(long, value_name = "CORE")]
     core: Option<usize>,
-    /// Log what happens in the scene (MCAP), for palpate replay, render and export, and for serve again. Each time that the scene
-    /// begins anew there is one more log: OUT.mcap, OUT-2.mcap, …
+    /// Log the scene (MCAP), for palpate replay, render, export and serve. Each time that the scene restarts a new log begins:
+    /// OUT.mcap, OUT-2.mcap, …
     #[arg(long, value_name = "OUT.mcap")]
     pub log: Option<PathBuf>,
-    /// Where recordings are kept between runs [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
+    /// Cache folder of recordings [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
 }
 
-/// The port of the page when none is asked for.
+/// Default port.
 const PORT: u16 = 7400;
 
-/// Pictures per second of a log.
-const PICTURES_HZ: f64 = 60.0;
+/// Frame rate of logs [Hz].
+const LOG_FRAMES_HZ: f64 = 60.0;
 
 /// Real-time priority of the force process.
 const PRIORITY: u8 = 80;
@@ -103,7 +102,7 @@ fn is_log(path: &Path) -> bool {
 
 fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
     let server = serving.bind()?;
-    let read = |(number, path): (usize, &PathBuf)| LogFramePlayer::read(path, number, PICTURES_HZ);
+    let read = |(number, path): (usize, &PathBuf)| LogFramePlayer::read(path, number, LOG_FRAMES_HZ);
     let logs: Result<Vec<LogFramePlayer>, _> = paths.iter().enumerate().map(read).collect();
     let logs = logs?;
     let frames = logs.iter().map(|log| log.frames.clone()).collect();
@@ -115,7 +114,7 @@ fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
     })
 }
 
-/// Serve the built-in scenes, one of them first.
+/// Serves the built-in scenes, beginning with one of them.
 pub fn serve_built_in(serving: &Serving, id: &str) -> Result<(), Failure> {
     serve_live(serving, |provider| {
         let bar =
@@ -155,7 +154,7 @@ impl Serving {
         Settings { listen, token: self.token.clone() }
     }
 
-    /// Listen where it was asked for, or at the usual port, or at a free one.
+    /// Binds the given address, or the default port, or a free one.
     pub fn bind(&self) -> Result<Server, Failure> {
         if let Some(listen) = self.listen {
             return Server::bind(&self.settings(listen)).map_err(Failure);
@@ -164,29 +163,29 @@ impl Serving {
         Server::bind(&here(PORT)).or_else(|_| Server::bind(&here(0))).map_err(Failure)
     }
 
-    /// Say where, open a browser, and answer until Ctrl-C.
-    pub fn serve(&self, server: Server, exhibit: ServedContent) -> Result<(), Failure> {
+    /// Prints the address, opens a browser, and serves until Ctrl-C.
+    pub fn serve(&self, server: Server, content: ServedContent) -> Result<(), Failure> {
         let mut address = format!("http://{}/", server.address().map_err(Failure)?);
         if let Some(token) = &self.token {
             address += &format!("?token={token}");
         }
-        // Before it is said: whoever is told may interrupt at once.
+        // Before the address is printed: its reader may interrupt at once.
         let stop = stop_on_interrupt();
         notify(&format!("open {address} in a browser (Ctrl-C ends it)"));
         if !self.no_browser {
             open_browser(&address);
         }
-        server.run(exhibit, stop).map_err(Failure)
+        server.run(content, stop).map_err(Failure)
     }
 }
 
-/// Where there is a screen; whoever has none opens the address elsewhere.
+/// Opens a browser where there is a screen.
 fn open_browser(address: &str) {
     let screen = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
     let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
     if screen || cfg!(target_os = "macos") {
         let quiet = Command::new(program).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        // A browser that does not open is opened by hand.
+        // The address is printed: a browser can be opened by hand.
         drop(quiet);
     }
 }
