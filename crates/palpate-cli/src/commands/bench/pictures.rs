@@ -26,8 +26,8 @@ pub fn case(recording: Arc<Recording>, form: FrameFormat, on_floor: bool) -> Cas
         FrameFormat::Modal => "modal",
         FrameFormat::Vertices => "vertices",
     };
-    let floor = if on_floor { " and it lies on a floor" } else { "" };
-    let label = format!("{nodes} surface nodes, a frame ({how}), 2 fingers{floor}");
+    let on_a_floor = if on_floor { " and it lies on a floor" } else { "" };
+    let label = format!("{nodes} surface nodes, a frame ({how}), 2 fingers{on_a_floor}");
     (label, Box::new(move |steps| frame_times(&recording, form, on_floor, steps)))
 }
 
@@ -62,7 +62,7 @@ fn frame_times(
         }
         step(&model, &mut state, &input);
         if number % STEPS_PER_FRAME == 0 {
-            snapshot.capture(number as u64, &input, &state);
+            snapshot.take(number as u64, &input, &state);
             let before = Instant::now();
             let frame = encoder.make(&snapshot, form);
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
