@@ -122,6 +122,11 @@ impl HapticUpdate {
         counts
     }
 
+    /// Force that the device holds [N, world].
+    pub fn held_force(&self) -> DVec3 {
+        self.held
+    }
+
     /// First failure of the device.
     pub fn failure(&self) -> Option<&Error> {
         self.failure.as_ref()

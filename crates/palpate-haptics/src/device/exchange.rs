@@ -100,16 +100,16 @@ impl DriverSide {
         self.samples.write(Sample { sequence: self.samples_sent, reading, fault });
     }
 
-    /// Commanded force [N]; zero if it is stale or not finite.
+    /// Commanded force at a time [N]; zero if it is stale or not finite.
     ///
     /// # Real time
-    /// No allocation or lock; reads the clock.
-    pub fn commanded_force(&mut self) -> DVec3 {
+    /// No allocation, lock or system call.
+    pub fn commanded_force(&mut self, now: Instant) -> DVec3 {
         let command = *self.commands.read();
         if command.sequence != self.seen {
-            (self.seen, self.seen_at) = (command.sequence, Instant::now());
+            (self.seen, self.seen_at) = (command.sequence, now);
         }
-        let fresh = self.seen_at.elapsed() <= STALE_AFTER;
+        let fresh = now.saturating_duration_since(self.seen_at) <= STALE_AFTER;
         if command.force.is_finite() && fresh { command.force } else { DVec3::ZERO }
     }
 }
@@ -128,12 +128,14 @@ mod tests {
         assert_eq!((sample.reading, sample.fault), (reading, 7));
         assert!(update.newest(1.019).is_some() && update.newest(1.021).is_none());
 
-        assert_eq!(driver.commanded_force(), DVec3::ZERO);
+        let now = Instant::now();
+        let later = |millis| now + Duration::from_millis(millis);
+        assert_eq!(driver.commanded_force(now), DVec3::ZERO);
         update.set_force(DVec3::Y);
-        assert_eq!(driver.commanded_force(), DVec3::Y);
-        std::thread::sleep(STALE_AFTER + Duration::from_millis(1));
-        assert_eq!(driver.commanded_force(), DVec3::ZERO, "the haptic update has stopped");
+        assert_eq!(driver.commanded_force(now), DVec3::Y);
+        assert_eq!(driver.commanded_force(later(20)), DVec3::Y);
+        assert_eq!(driver.commanded_force(later(21)), DVec3::ZERO, "the haptic update has stopped");
         update.set_force(DVec3::NAN);
-        assert_eq!(driver.commanded_force(), DVec3::ZERO);
+        assert_eq!(driver.commanded_force(later(21)), DVec3::ZERO);
     }
 }

@@ -308,7 +308,8 @@ impl Connection {
         let device = serde_json::Value::from(self.device.as_str()).to_string();
         loop {
             let (begun, ending) = (Instant::now(), self.ending());
-            let force = if ending { DVec3::ZERO } else { haply_from_ours(self.exchange.commanded_force()) };
+            let force =
+                if ending { DVec3::ZERO } else { haply_from_ours(self.exchange.commanded_force(begun)) };
             let [x, y, z] = force.to_array();
             let message = format!(
                 "{{{session}\"inverse3\":[{{\"device_id\":{device},\"commands\":{{\"set_cursor_force\":{{\"vector\":\

@@ -287,7 +287,7 @@ impl Servo {
     /// No allocation or lock except the library's.
     fn frame(&mut self) -> c_uint {
         let ending = self.flags.ending.load(Ordering::Acquire);
-        let force = if ending { DVec3::ZERO } else { self.exchange.commanded_force() };
+        let force = if ending { DVec3::ZERO } else { self.exchange.commanded_force(Instant::now()) };
         let (mut columns, mut buttons) = ([f64::NAN; 16], 0);
         // SAFETY: calls of a frame with an open device; a transform is 16 numbers, a force 3, and all outlive the calls.
         unsafe {

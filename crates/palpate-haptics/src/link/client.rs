@@ -3,6 +3,7 @@
 use super::identity::Secret;
 use super::lock;
 use super::messages::{Hello, Welcome, effort, motion_bytes};
+use super::sequence::SequenceFilter;
 use super::server::runtime;
 use super::transport::transport;
 use crate::error::{Error, LinkError};
@@ -138,23 +139,20 @@ impl Link {
 
     /// Connects, receives efforts until the link breaks, connects again.
     async fn keep_connected(self, mut efforts: Input<Effort>) {
-        // Sequence number of the newest effort. It goes on after an interruption, as the server's does.
-        let mut newest = 0;
         loop {
             match tokio::time::timeout(ATTEMPT_TIMEOUT, self.attempt()).await {
                 Ok(Ok(connection)) => {
                     self.set(Some(connection.clone()), LinkState::Connected);
+                    // A restarted force process counts from 1.
+                    let mut filter = SequenceFilter::default();
                     while let Ok(bytes) = connection.read_datagram().await {
                         let Some(effort) = effort(&bytes, self.start.elapsed().as_secs_f64()) else {
                             continue;
                         };
-                        if effort.sequence > newest {
-                            newest = effort.sequence;
+                        if filter.is_newer(effort.sequence) {
                             efforts.write(effort);
                         }
                     }
-                    // A restarted force process counts from 1.
-                    newest = 0;
                     let why = connection.close_reason().map_or(String::new(), |reason| reason.to_string());
                     self.set(None, LinkState::Connecting(format!("the link broke: {why}")));
                 }

@@ -7,6 +7,7 @@
 mod client;
 mod identity;
 mod messages;
+mod sequence;
 mod server;
 mod transport;
 

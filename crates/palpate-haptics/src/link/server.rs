@@ -3,6 +3,7 @@
 use super::identity::Secret;
 use super::lock;
 use super::messages::{Hello, Welcome, effort_bytes, motion};
+use super::sequence::SequenceFilter;
 use super::transport::transport;
 use crate::clock::Clock;
 use crate::error::{Error, LinkError};
@@ -203,17 +204,16 @@ async fn serve(incoming: Incoming, slots: Arc<DeviceSlots>) {
     let DevicePort { motion: mut motions, effort: efforts } = port;
     let device = ConnectedDevice { efforts, connection: connection.clone(), sent: 0 };
     lock(&slots.connected).insert(name.clone(), device);
-    let mut newest = 0;
+    let mut filter = SequenceFilter::default();
     while let Ok(bytes) = connection.read_datagram().await {
         let Some(motion) = motion(&bytes, slots.start.elapsed().as_secs_f64()) else {
             add(&slots.counters.garbage);
             continue;
         };
-        if motion.sequence <= newest {
+        if !filter.is_newer(motion.sequence) {
             add(&slots.counters.old);
             continue;
         }
-        newest = motion.sequence;
         add(&slots.counters.motions);
         motions.send(motion);
     }

@@ -117,12 +117,12 @@ impl Seek for Disk {
 
 #[test]
 fn a_disk_that_is_full_ends_the_log_and_nothing_else() {
-    let session = session(Some(400));
-    let disk = Disk(Cursor::new(Vec::new()), 20_000);
+    let session = session(Some(150));
+    let disk = Disk(Cursor::new(Vec::new()), 10_000);
     let log = log_to(disk, &session);
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let (report, out) = session.run(Some(log), &stop, &steps, |_| ()).expect("it runs");
-    assert_eq!((report.steps, report.log), (400, None));
+    assert_eq!((report.steps, report.log), (150, None));
     let error = out.expect("there was a log").err().expect("it can't be written").to_string();
     assert!(error.starts_with("cannot write the log: ") && error.contains("no room is left"), "{error}");
 }
