@@ -368,7 +368,7 @@ proptest! {
         if merge {
             mesh.merge_coincident_nodes();
         }
-        if let Ok(mesh) = check(mesh) {
+        if let Ok(mesh) = mesh.checked() {
             prop_assert!(volumes(&mesh).all(|volume| volume > 0.0 && volume.is_finite()));
         }
     }

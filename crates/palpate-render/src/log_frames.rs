@@ -122,7 +122,7 @@ fn compute_frames(
     let (mut state, start) = (log.initial_state()?, log.initial_input()?);
     let mut snapshot = Snapshot::new(&log.scene.model, &state, &start);
     if steps.contains(0) {
-        builder.take(&snapshot);
+        builder.push(&snapshot);
     }
     progress.begin("steps", log.steps);
     let mut number = 0;
@@ -131,7 +131,7 @@ fn compute_frames(
         progress.advance(1);
         if steps.contains(number) {
             snapshot.capture(number, input, state);
-            builder.take(&snapshot);
+            builder.push(&snapshot);
         }
         if stop.load(Ordering::Relaxed) { Err(RenderError::ReplayInterrupted) } else { Ok(()) }
     })?;

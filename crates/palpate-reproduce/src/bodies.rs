@@ -25,7 +25,8 @@ pub fn damped_cube(
     damping: Damping,
     progress: &mut dyn Progress,
 ) -> Result<RecordedBody, ReproduceError> {
-    let parameters = RecordParameters { damping, extent: RecordExtent::NoCertificate, ..parameters(cells, modes) };
+    let parameters =
+        RecordParameters { damping, extent: RecordExtent::NoCertificate, ..parameters(cells, modes) };
     Ok(RecordedBody::new(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
 }
 

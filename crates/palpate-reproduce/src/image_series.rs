@@ -57,7 +57,7 @@ impl ImageRenderer {
             }
             Err(why) => {
                 let log = series.log.file_name().unwrap_or_default().to_string_lossy();
-                progress.remark(&format!("no pictures of {log}: {why}"));
+                progress.warn(&format!("no pictures of {log}: {why}"));
                 paragraph(&format!(
                     "Here a series of {} pictures is missing: {why}. The log is there, and shows the same: palpate serve {log}",
                     series.instants.len()

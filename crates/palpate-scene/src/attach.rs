@@ -3,7 +3,7 @@
 use crate::devices::RealDevice;
 use crate::error::{SceneError, SceneErrorKind};
 use palpate::DeviceMode;
-use palpate_haptics::device::{Device, Hand, Mount, PathDevice, SimulatedDevice, DeviceSpec};
+use palpate_haptics::device::{Device, DeviceSpec, Hand, Mount, PathDevice, SimulatedDevice};
 use palpate_haptics::{AttachedDevice, MotionPath, SafetyLimits};
 
 /// Device that follows a path, or whose simulated hand does.

@@ -1,6 +1,6 @@
 //! Devices by name: drivers of real devices, traits of simulated ones, grips of a hand.
 
-use palpate_haptics::device::{Driver, Hand, Mount, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Driver, Hand, Mount};
 
 /// Real device with its limits.
 #[derive(Debug, Clone)]

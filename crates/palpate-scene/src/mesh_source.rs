@@ -1,7 +1,9 @@
 //! Mesh sources: primitives as text (`box:…`, `sphere:…`) and mesh files.
 
 use crate::error::{SceneError, SceneErrorKind};
-use palpate_fem::mesh::{Mesh, MeshError, SurfaceMesh, ball_mesh, box_mesh, read_gmsh, read_obj, read_stl, read_vtk};
+use palpate_fem::mesh::{
+    Mesh, MeshError, SurfaceMesh, ball_mesh, box_mesh, read_gmsh, read_obj, read_stl, read_vtk,
+};
 use std::path::Path;
 
 /// Makes a primitive, or reads a mesh file of tetrahedra.

@@ -81,8 +81,7 @@ impl RecordingRecipe {
         mesh.scale(self.scale).map_err(|error| refused(&error))?;
         let parameters = self.parameters(mesh.regions.len());
         let recorded = record(mesh, &parameters, &mut WithoutRemarks(progress));
-        recorded
-            .map_err(|error| refused(&format!("{}: {error}", source_name(&self.source))))
+        recorded.map_err(|error| refused(&format!("{}: {error}", source_name(&self.source))))
     }
 
     /// Recording from a cache folder, if it is there.

@@ -4,7 +4,7 @@ use crate::error::SceneError;
 use crate::file::{Relocated, RunMode, read_relocated_scene};
 use crate::scene::Scene;
 use palpate::{DeviceMode, Input, State, step};
-use palpate_haptics::log::{SceneNames, LogReader};
+use palpate_haptics::log::{LogReader, SceneNames};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};

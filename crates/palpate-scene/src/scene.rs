@@ -5,7 +5,7 @@ use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, SceneLabels};
 use palpate_haptics::MotionPath;
-use palpate_haptics::device::{Hand, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::log::SceneNames;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -34,7 +34,12 @@ impl ElasticMaterial {
     ///
     /// # Errors
     /// As [`palpate_fem::record`].
-    pub fn free_body(&self, mesh: Mesh, order: ElementOrder, modes: usize) -> Result<Arc<Recording>, RecordError> {
+    pub fn free_body(
+        &self,
+        mesh: Mesh,
+        order: ElementOrder,
+        modes: usize,
+    ) -> Result<Arc<Recording>, RecordError> {
         recorded_once(mesh, &self.parameters(order, modes))
     }
 

@@ -55,8 +55,8 @@ fn fingerprint(mesh: &Mesh, parameters: &RecordParameters) -> u64 {
 #[cfg(test)]
 mod tests {
     use crate::PAPER_MATERIAL;
-    use palpate_fem::mesh::box_mesh;
     use palpate_fem::ElementOrder;
+    use palpate_fem::mesh::box_mesh;
     use std::sync::Arc;
 
     #[test]

@@ -66,7 +66,9 @@ impl Retired {
                 "text" => &mut texts,
                 "name" => &mut names,
                 _ => {
-                    return Err(fail(format!("begins with {kind:?}, expected word, text, name, in or allow")));
+                    return Err(fail(format!(
+                        "begins with {kind:?}, expected word, text, name, in or allow"
+                    )));
                 }
             };
             // ASCII boundaries: those of Unicode would cost seconds.

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::terminal::{print, print_json};
 use clap::Args;
 use palpate_haptics::Error;
-use palpate_haptics::device::{Driver, DiscoveredDevice, DeviceSpec, discover};
+use palpate_haptics::device::{DeviceSpec, DiscoveredDevice, Driver, discover};
 use serde_json::json;
 
 /// List haptic devices, with the reason where one is not available

@@ -10,7 +10,7 @@ use palpate::{
     Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Obstacle, Pose, Recording, Shape, State, Twist, step,
 };
-use palpate_haptics::log::{LogWriter, SceneNames, LogReader};
+use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;

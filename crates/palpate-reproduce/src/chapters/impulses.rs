@@ -9,8 +9,8 @@ use crate::progress::StageProgress;
 use crate::surface_picture::{Frame, Picture, View, colour_bar};
 use glam::{DMat3, DVec3};
 use palpate::Sampling;
-use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 use palpate_fem::RecordedBody;
+use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 
 /// Steps of the integration [s]; the force is held for `HELD` of them, the paper's step of 2 ms.
 const STEP_S: f64 = 0.5e-3;
@@ -84,8 +84,7 @@ pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<
     let surface = body.surface_nodes();
     let top = |p: &DVec3| p.y > 0.05 - 1e-9;
     let centre = body.nearest_node(DVec3::new(0.0, 0.05, 0.0));
-    let on_top: Vec<usize> =
-        (0..body.nodes().len()).filter(|&node| top(&body.nodes()[node])).collect();
+    let on_top: Vec<usize> = (0..body.nodes().len()).filter(|&node| top(&body.nodes()[node])).collect();
     // Downward: 1 N on the middle node; 1 N over the whole face, the same on each of its nodes.
     let mut loads = vec![vec![0.0; body.dofs()]; 2];
     loads[0][3 * centre + 1] = -1.0;
@@ -241,12 +240,7 @@ fn pictures(body: &RecordedBody, surface: &[u32], wave: &Wave, caption: &str) ->
 }
 
 /// Every shown moment and node: where it is at rest and how far it has moved.
-fn frames_csv(
-    name: &str,
-    body: &RecordedBody,
-    surface: &[u32],
-    wave: &Wave,
-) -> DataFile {
+fn frames_csv(name: &str, body: &RecordedBody, surface: &[u32], wave: &Wave) -> DataFile {
     let rows = SHOWN_MS.iter().flat_map(|&ms| {
         let frame = &wave.frames[(ms * 1e-3 / STEP_S).round() as usize - 1];
         surface.iter().zip(frame).map(move |(&node, u)| {

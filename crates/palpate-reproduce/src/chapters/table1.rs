@@ -7,8 +7,8 @@ use crate::options::Effort;
 use crate::page::{Section, code, paragraph, table};
 use crate::progress::StageProgress;
 use palpate::Sampling;
-use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use palpate_fem::RecordedBody;
+use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use std::time::Instant;
 
 /// The paper's sampling: 500 samples in 1 s; a tenth of them is timed, since every sample costs the same.
@@ -95,12 +95,7 @@ pub fn chapter(
         finding(
             "nodes of the cube: all, on the surface; tetrahedra",
             "2197, 866; 8640",
-            format!(
-                "{}, {}; {}",
-                body.nodes().len(),
-                surface.len(),
-                body.element_count()
-            ),
+            format!("{}, {}; {}", body.nodes().len(), surface.len(), body.element_count()),
         ),
         finding(
             "recording one degree of freedom",

@@ -7,7 +7,7 @@ use crate::devices::ANY_HAND;
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::{Coupling, DeviceParameters, ModelObject};
-use palpate_haptics::device::{Hand, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::stability::{
     ClosedLoop, LoopTiming, PointResponse, default_coupling, normal_at, stiffest_point,
 };

@@ -6,7 +6,7 @@ use crate::devices::{MAX_FORCE_N, RealDevice, find_device_traits, find_driver, f
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::Pose;
-use palpate_haptics::device::{Hand, Mount, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Hand, Mount};
 use palpate_haptics::unit_quaternion;
 
 /// Real device of an entry, if it has one.
@@ -63,7 +63,10 @@ fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> 
 }
 
 /// Simulated device and hand of an entry.
-pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(DeviceSpec, Hand), SceneError> {
+pub(super) fn read_simulated(
+    source: &Source,
+    entry: &SimulatedEntry,
+) -> Result<(DeviceSpec, Hand), SceneError> {
     let traits = find_device_traits(entry.device.get_ref());
     let traits = traits
         .or_else(|what| source.fail(entry.device.span(), SceneErrorKind::UnknownValue, "device", what))?;

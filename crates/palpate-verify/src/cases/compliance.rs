@@ -25,15 +25,14 @@ pub fn points() -> Result<Vec<Check>, VerifyError> {
     let parameters = undamped(2000.0, 0.49, 110.0, ElementOrder::Linear, 100);
     let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
     let unreduced = body.unreduced();
-    let nodes =
-        TABLE.map(|(_, position, ..)| body.nearest_node(DVec3::from_array(position)));
+    let nodes = TABLE.map(|(_, position, ..)| body.nearest_node(DVec3::from_array(position)));
     let mut loads = vec![vec![0.0; body.dofs()]; 9];
     for (place, axis) in (0..3).flat_map(|place| (0..3).map(move |axis| (place, axis))) {
         loads[3 * place + axis][3 * nodes[place] + axis] = 1.0;
     }
     let displacements = unreduced.static_displacements(&loads);
-    let truncated = unreduced
-        .truncated_response(&nodes, STEP_S, BLOCKS, &mut SilentProgress).map_err(numerics)?;
+    let truncated =
+        unreduced.truncated_response(&nodes, STEP_S, BLOCKS, &mut SilentProgress).map_err(numerics)?;
     let mut checks = Vec::new();
     for (place, (name, _, static_m_n, instantaneous_m_n)) in TABLE.into_iter().enumerate() {
         let row = 3 * nodes[place] + 1;

@@ -5,8 +5,8 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Collider, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
-use palpate_fem::mesh::{ball_mesh, box_mesh};
 use palpate_fem::ElementOrder;
+use palpate_fem::mesh::{ball_mesh, box_mesh};
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at};
 use std::sync::Arc;
 

@@ -9,8 +9,8 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, State, step};
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::ElementOrder;
+use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, floor, object_at, scene};
 
 const LENGTH: f64 = 0.1;

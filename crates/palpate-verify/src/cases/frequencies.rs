@@ -60,7 +60,8 @@ pub fn continuum() -> Result<Vec<Check>, VerifyError> {
     compare(&mut checks, 0.3, &table)?;
 
     let exact = hz(PI * SQRT_2);
-    for (order, expected, [coarse, fine]) in [(ElementOrder::Linear, 2.0, [8, 16]), (ElementOrder::Quadratic, 4.0, [4, 8])]
+    for (order, expected, [coarse, fine]) in
+        [(ElementOrder::Linear, 2.0, [8, 16]), (ElementOrder::Quadratic, 4.0, [4, 8])]
     {
         let error =
             |cells| -> Result<f64, VerifyError> { Ok((lame_mode(cells, order)? / exact - 1.0).abs()) };

@@ -79,8 +79,11 @@ fn stiffness(cells: u32) -> Result<Vec<f64>, VerifyError> {
     let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
     let fixed = (0..mesh.nodes.len()).filter(|&node| mesh.nodes[node].y < -0.499 * SIZE[1]);
     let fixed_nodes = fixed.map(|node| node as u32).collect();
-    let parameters =
-        RecordParameters { fixed_nodes, extent: RecordExtent::NoModes, ..CALM.parameters(ElementOrder::Quadratic, 1) };
+    let parameters = RecordParameters {
+        fixed_nodes,
+        extent: RecordExtent::NoModes,
+        ..CALM.parameters(ElementOrder::Quadratic, 1)
+    };
     let body = recorded(mesh, &parameters)?;
     let kernels = PLACES.map(|at| kernel(&body, place(at)));
     let mut loads = vec![vec![0.0; body.dofs()]; PLACES.len()];

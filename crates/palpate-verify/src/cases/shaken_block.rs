@@ -7,8 +7,8 @@ use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Pose, State, SurfacePoint, Twist, step,
 };
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::ElementOrder;
+use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{recorded, undamped};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

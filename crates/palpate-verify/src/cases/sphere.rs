@@ -12,8 +12,8 @@
 use crate::check::Check;
 use crate::error::VerifyError;
 use crate::modal::{frequencies_hz, lowest, mean};
-use palpate_fem::mesh::ball_mesh;
 use palpate_fem::ElementOrder;
+use palpate_fem::mesh::ball_mesh;
 use palpate_testkit::undamped;
 use std::f64::consts::TAU;
 
@@ -79,7 +79,9 @@ pub fn free_vibrations() -> Result<Vec<Check>, VerifyError> {
     ];
     let shear_speed = (YOUNG / (2.0 * (1.0 + POISSON)) / DENSITY).sqrt();
     let mut checks = Vec::new();
-    for (order, layers, allowed) in [(ElementOrder::Linear, [6, 12], 0.025), (ElementOrder::Quadratic, [3, 6], 0.016)] {
+    for (order, layers, allowed) in
+        [(ElementOrder::Linear, [6, 12], 0.025), (ElementOrder::Quadratic, [3, 6], 0.016)]
+    {
         let modes = |layers: u32| -> Result<Vec<f64>, VerifyError> {
             let parameters = undamped(YOUNG, POISSON, DENSITY, order, 27);
             let body = lowest(ball_mesh(RADIUS, layers)?, &parameters)?;

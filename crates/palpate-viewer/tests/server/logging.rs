@@ -4,7 +4,7 @@ use super::client::{TestServer, mode_shapes, recording, scene};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, State, step};
 use palpate_haptics::Scheduling;
-use palpate_haptics::log::{LogSummary, LogWriter, SceneNames, LogReader};
+use palpate_haptics::log::{LogReader, LogSummary, LogWriter, SceneNames};
 use palpate_viewer::{
     Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, ProgressCallback,
     SceneError, SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,

@@ -75,8 +75,8 @@ impl NodeCompliance {
 mod tests {
     use super::super::{Response, ResponseForm, ResponseView};
     use super::*;
-    use crate::response::ContactPoints;
     use crate::recording::Recording;
+    use crate::response::ContactPoints;
     use crate::surface::SurfacePoint;
     use alloc::sync::Arc;
     use glam::DVec3;

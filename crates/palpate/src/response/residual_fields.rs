@@ -72,9 +72,9 @@ fn answer(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::recording::Recording;
-    use crate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart};
     use crate::spatial::{Pose, Twist};
     use crate::state::State;
+    use crate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart};
     use alloc::sync::Arc;
     use alloc::vec;
 

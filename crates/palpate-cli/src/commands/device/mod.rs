@@ -8,9 +8,11 @@ use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json};
 use clap::Args;
 use palpate::DeviceMode;
-use palpate_haptics::device::{Hand, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::link::{LinkClient, LinkState};
-use palpate_haptics::{AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_haptic_update};
+use palpate_haptics::{
+    AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_haptic_update,
+};
 use palpate_scene::{attach_path, attach_real, find_device_traits, find_grip, read_path};
 use real::RealArguments;
 use serde_json::json;
@@ -109,7 +111,9 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     // The path begins with the connection.
     let found = start.elapsed().as_secs_f64();
     let attached = match source {
-        Source::Path(path, simulated) => attach_path(path.delayed_by(found), simulated, mode, rate, passivity),
+        Source::Path(path, simulated) => {
+            attach_path(path.delayed_by(found), simulated, mode, rate, passivity)
+        }
         Source::Real(attached) => *attached,
     };
     let update = attached.update(port);

@@ -5,10 +5,10 @@ use crate::terminal::{print, print_json};
 use clap::Args;
 use glam::DVec3;
 use palpate::{Coupling, Recording, SurfacePoint};
-use palpate_haptics::device::{Hand, DeviceSpec};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::stability::{
-    ClosedLoop, DefaultCoupling, StiffnessLimit, LoopTiming, PointResponse, default_coupling, normal_at,
-    stable_damping, stiffest_point, critical_stiffness,
+    ClosedLoop, DefaultCoupling, LoopTiming, PointResponse, StiffnessLimit, critical_stiffness,
+    default_coupling, normal_at, stable_damping, stiffest_point,
 };
 use palpate_scene::{ANY_HAND, find_device_traits, find_grip};
 use serde_json::json;
@@ -193,7 +193,9 @@ impl Analysis {
         )?;
         let why = match limit {
             StiffnessLimit::Object => "the object: stiffer would not be felt, it is 10/R[0]",
-            StiffnessLimit::Loop => "rate, delay, device and hand: twice the gains, and twice as late, must be stable",
+            StiffnessLimit::Loop => {
+                "rate, delay, device and hand: twice the gains, and twice as late, must be stable"
+            }
         };
         writeln!(out, "  limited by   {why}")?;
         let (needs, has) = (self.passive.unwrap_or(0.0), self.traits.damping_n_s_m);

@@ -11,7 +11,9 @@ use node_selection::select;
 use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
 use palpate_fem::mesh::Mesh;
-use palpate_fem::{ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, materials_from_toml};
+use palpate_fem::{
+    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, materials_from_toml,
+};
 use palpate_scene::{read_mesh, source_name};
 use std::path::{Path, PathBuf};
 use table::{TableArguments, TableCommand};

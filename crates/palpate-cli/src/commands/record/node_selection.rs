@@ -4,8 +4,8 @@
 //! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold.
 
 use crate::failure::Failure;
-use palpate_fem::mesh::{Mesh, Region};
 use palpate_fem::RecordedBody;
+use palpate_fem::mesh::{Mesh, Region};
 
 /// Nodes of a mesh, selected by a text.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,7 +180,12 @@ mod tests {
     fn the_surface_of_quadratic_elements_has_no_node_inside() {
         let mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
         let parameters = RecordParameters {
-            materials: vec![Material { region: String::new(), young_pa: 1e4, poisson: 0.3, density_kg_m3: 1e3 }],
+            materials: vec![Material {
+                region: String::new(),
+                young_pa: 1e4,
+                poisson: 0.3,
+                density_kg_m3: 1e3,
+            }],
             order: ElementOrder::Quadratic,
             modes: 1,
             damping: Damping::Ratio(0.0),

@@ -304,9 +304,8 @@ impl<'a> TableCommand<'a> {
                 needed(1) as f64 / 1e9
             )));
         }
-        let room = |shards: u64| {
-            palpate_fem::check_memory(needed(shards).saturating_sub(used_bytes()) as f64)
-        };
+        let room =
+            |shards: u64| palpate_fem::check_memory(needed(shards).saturating_sub(used_bytes()) as f64);
         room(1).map_err(|e| Failure(e.to_string()))?;
         let wanted = (block_width(columns) * rayon::current_num_threads()).div_ceil(columns as usize) as u64;
         let fits = |&shards: &u64| needed(shards) <= limit && room(shards).is_ok();

@@ -10,8 +10,8 @@ use palpate_scene::{
     SettingsChange, attach_path, attach_real,
 };
 use palpate_viewer::{
-    MaterialDescription, PhysicsSettings, ProgressCallback, SceneProvider, SceneSummary, SharedTrajectory,
-    Upload, ViewerDevice, ViewerScene,
+    MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -59,9 +59,12 @@ impl LibraryProvider {
         })
     }
 
-    /// Scene of a result, with errors as text.
-    fn provided<E: Into<Failure>>(&self, opened: Result<OpenedScene, E>) -> Result<ViewerScene, palpate_viewer::SceneError> {
-        opened.map_err(Into::into).and_then(|opened| self.viewer_scene(opened)).map_err(|failure| failure.0)
+    /// Scene of the viewer, with the provider's error.
+    fn provided<E: Into<Failure>>(&self, opened: Result<OpenedScene, E>) -> Result<ViewerScene, SceneError> {
+        opened
+            .map_err(Into::into)
+            .and_then(|opened| self.viewer_scene(opened))
+            .map_err(|failure| failure.0.into())
     }
 }
 
@@ -75,11 +78,11 @@ impl SceneProvider for LibraryProvider {
         BUILT_IN_SCENES.iter().map(summary).collect()
     }
 
-    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, palpate_viewer::SceneError> {
+    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
         self.provided(self.library.open_built_in(id, &mut ProgressFn::new(tell)))
     }
 
-    fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, palpate_viewer::SceneError> {
+    fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, SceneError> {
         let coupling = settings
             .coupling
             .map(|coupling| palpate::Coupling { stiffness: coupling.stiffness, damping: coupling.damping });
@@ -97,12 +100,12 @@ impl SceneProvider for LibraryProvider {
         object: usize,
         material: MaterialDescription,
         tell: ProgressCallback,
-    ) -> Result<ViewerScene, palpate_viewer::SceneError> {
+    ) -> Result<ViewerScene, SceneError> {
         let progress = &mut ProgressFn::new(tell);
         self.provided(self.library.change_material(object, uniform(material), progress))
     }
 
-    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, palpate_viewer::SceneError> {
+    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
         let Upload { name, bytes, scale, material, modes } = upload;
         let upload = MeshUpload { name, bytes, scale, material: uniform(material), modes };
         self.provided(self.library.record_upload(upload, &mut ProgressFn::new(tell)))

@@ -12,9 +12,9 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use glam::DVec3;
 use palpate::{Recording, SurfacePoint};
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::ElementOrder;
-use palpate_haptics::device::{Hand, DeviceSpec};
+use palpate_fem::mesh::box_mesh;
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::stability::{ClosedLoop, LoopTiming, PointResponse};
 use palpate_testkit::ElasticMaterial;
 use rayon::prelude::*;
@@ -78,8 +78,9 @@ fn standing_block(young: f64) -> Result<Arc<Recording>, VerifyError> {
         density_kg_m3: 1000.0,
         stiffness_damping_s: 2.0 * DAMPED / omega,
     };
-    Ok(material
-        .fixed_body(box_mesh(SIZE, [4, 2, 4])?, ElementOrder::Quadratic, 40, |node| node.y < -0.499 * SIZE[1])?)
+    Ok(material.fixed_body(box_mesh(SIZE, [4, 2, 4])?, ElementOrder::Quadratic, 40, |node| {
+        node.y < -0.499 * SIZE[1]
+    })?)
 }
 
 impl Cell {

@@ -4,7 +4,7 @@ use super::{Cell, DEPTH, HAND};
 use crate::error::{VerifyError, numerics};
 use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp};
-use palpate_haptics::device::{Device, Mount, Reading, SimulatedDevice, DeviceSpec};
+use palpate_haptics::device::{Device, DeviceSpec, Mount, Reading, SimulatedDevice};
 use palpate_haptics::{
     Columns, DevicePort, Effort, ForcePort, ForceProcess, HapticUpdate, Motion, MotionPath,
     PassivityController, Safety, SafetyLimits, port,
@@ -121,7 +121,8 @@ fn run(cell: &Cell, setup: &Setup) -> Result<LoopRun, VerifyError> {
     let mut process = ForceProcess::new(model, vec![(scene_port, setup.mode)], Vec::new(), 1.0);
     let path = MotionPath::parse(&setup.path, Columns::Position).map_err(numerics)?;
     let truth = Arc::new(Mutex::new((DVec3::ZERO, 0.0)));
-    let device = ObservedDevice { device: SimulatedDevice::new(setup.traits, HAND, path), truth: truth.clone() };
+    let device =
+        ObservedDevice { device: SimulatedDevice::new(setup.traits, HAND, path), truth: truth.clone() };
     let controller = PassivityController::new(setup.traits.mass_kg, setup.traits.resolution_m, step_s);
     let controller = setup.controlled.then_some(controller);
     let safety = Safety::new(setup.limits);
@@ -170,7 +171,8 @@ pub fn diverges(cell: &Cell, stiffness: f64) -> Result<bool, VerifyError> {
         format!("{t},{},{},{}\n", p.x, p.y, p.z)
     };
     let path = row(0.0, DVec3::ZERO) + &row(0.02, DVec3::ZERO) + &row(0.03, DVec3::new(1.0, 0.8, 0.6));
-    let traits = DeviceSpec { friction_n: 0.0, resolution_m: 0.0, force_n: f64::INFINITY, ..DeviceSpec::TOUCH };
+    let traits =
+        DeviceSpec { friction_n: 0.0, resolution_m: 0.0, force_n: f64::INFINITY, ..DeviceSpec::TOUCH };
     let setup = Setup {
         coupling: Coupling { stiffness, damping: cell.damping() },
         traits,

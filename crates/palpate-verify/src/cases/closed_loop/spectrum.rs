@@ -75,7 +75,8 @@ pub fn disagreements(cell: &Cell) -> u32 {
         };
         for share in SHARES {
             let coupling = Coupling { stiffness: share * most, damping: cell.damping() };
-            let stable = spectral_radius(cell, place, coupling) < 1.0 + cell.timing().step_s / SLOWEST_GROWTH_S;
+            let stable =
+                spectral_radius(cell, place, coupling) < 1.0 + cell.timing().step_s / SLOWEST_GROWTH_S;
             differ += u32::from(stable != closed.is_stable(coupling));
         }
     }
