@@ -50,9 +50,9 @@ pub enum ViewerDevice {
     /// Pointer of a page, inactive until one claims it.
     Pointer,
     /// Path in simulation time.
-    Following(MotionPath, DeviceMode),
+    Path(MotionPath, DeviceMode),
     /// Device on this machine.
-    Here(DeviceOpener),
+    Local(DeviceOpener),
 }
 
 /// Mesh file uploaded by a page.

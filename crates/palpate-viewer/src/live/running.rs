@@ -29,7 +29,7 @@ const CYCLES: usize = 16_384;
 
 /// Whether a scene may resume from another state: no device follows a path, and no obstacle moves.
 pub(super) fn is_resumable(scene: &ViewerScene) -> bool {
-    let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Following(..));
+    let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Path(..));
     let moves = |pose: &SharedTrajectory| pose(0.0) != pose(1.0) || pose(0.0) != pose(0.37);
     !scene.devices.iter().any(follows_path) && !scene.obstacle_trajectories.iter().any(moves)
 }
@@ -60,8 +60,8 @@ impl DeviceInputs {
                 pointer_ports.push((index, device_port));
                 Ok(SessionDevice::Linked(force_port, DeviceMode::Touch))
             }
-            ViewerDevice::Following(path, mode) => Ok(SessionDevice::Following(path.clone(), *mode)),
-            ViewerDevice::Here(open) => open().map(SessionDevice::Here),
+            ViewerDevice::Path(path, mode) => Ok(SessionDevice::Following(path.clone(), *mode)),
+            ViewerDevice::Local(open) => open().map(SessionDevice::Here),
         };
         let devices = scene.devices.iter().enumerate().map(open).collect::<Result<_, SceneError>>()?;
         Ok(Self { devices, pointer_ports })
