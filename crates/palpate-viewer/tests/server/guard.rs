@@ -44,11 +44,19 @@ fn beyond_loopback_a_token_is_required() {
     let listen = ([0, 0, 0, 0], 0).into();
     let refused = Server::bind(&Settings { listen, token: None }).expect_err("no token");
     assert!(matches!(refused, ServerError::MissingToken(address) if address == listen), "{refused}");
+    assert_eq!(
+        refused.to_string(),
+        "0.0.0.0:0 can be reached from other machines: give a token of 8 characters or more (--token), without which \
+         nobody gets in"
+    );
     assert!(Server::bind(&Settings { listen, token: Some("short".into()) }).is_err());
     assert!(Server::bind(&Settings { listen, token: Some("long enough".into()) }).is_ok());
     let served = TestServer::live();
     let taken = Server::bind(&Settings { listen: served.address, token: None }).expect_err("taken");
     assert!(matches!(taken, ServerError::AddressInUse(address) if address == served.address), "{taken}");
+    let text =
+        format!("something listens at {} already: stop it, or take another port (--listen)", served.address);
+    assert_eq!(taken.to_string(), text);
 }
 
 #[test]
