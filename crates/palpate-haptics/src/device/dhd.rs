@@ -231,14 +231,14 @@ impl ForceDimension {
         let result =
             unsafe { dhdGetPosition(&raw mut position.x, &raw mut position.y, &raw mut position.z, id) };
         if result < 0 {
-            return Err(self.dhd.call_error("tell the position"));
+            return Err(self.dhd.call_error("read the position"));
         }
         let mut orientation = None;
         if self.wrist {
             let mut rows = [[f64::NAN; 3]; 3];
             // SAFETY: the device is open; the matrix outlives the call.
             if unsafe { dhdGetOrientationFrame(&raw mut rows, id) } < 0 {
-                return Err(self.dhd.call_error("tell the orientation"));
+                return Err(self.dhd.call_error("read the orientation"));
             }
             orientation = handle_orientation(DMat3::from_cols_array_2d(&rows).transpose(), ours_from_dhd);
         }

@@ -332,7 +332,7 @@ impl Device for OpenHaptics {
                 Err(DeviceError::Silent { driver: "openhaptics", reason }.into())
             }
             Some(sample) if sample.fault != hd::SUCCESS && !Self::is_force_fault(sample.fault) => {
-                Err(self.functions.call_error("the device does not tell where it is", sample.fault))
+                Err(self.functions.call_error("the device reports no position", sample.fault))
             }
             Some(sample) => Ok(sample.reading),
         }

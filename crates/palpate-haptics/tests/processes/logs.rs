@@ -57,7 +57,7 @@ fn log_from(state: State, model: &Arc<Model>, steps: u64) -> Vec<u8> {
 }
 
 #[test]
-fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
+fn a_log_replays_bit_for_bit_and_reports_the_first_difference() {
     let bytes = log(STEPS);
     let reader = LogReader::new(&bytes).expect("a log");
     assert_eq!(reader.metadata().expect("facts")["scene"], "a.toml");
@@ -90,7 +90,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
 }
 
 #[test]
-fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
+fn a_log_of_a_resumed_scene_begins_at_its_initial_state() {
     let model = model(1, 300.0);
     let press = |number: u32| {
         let place = DVec3::new(half_width(&model) + 0.004 - 2e-5 * f64::from(number), 1e-3, 0.0);
@@ -123,11 +123,11 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
     assert_eq!(differs, 400, "from rest it would be another motion");
     let unknown = SceneNames { objects: vec!["other".into()], ..SceneNames::default() };
     let error = reader.start(&unknown).expect_err("there is none of that name").to_string();
-    assert_eq!(error, "the log does not tell how \"other\" begins");
+    assert_eq!(error, "the log has no initial state of \"other\"");
 }
 
 #[test]
-fn what_is_no_log_or_half_of_one_is_refused_in_words() {
+fn files_that_are_no_log_or_half_of_one_are_refused() {
     // Few steps: the file is short, and every 11th byte of it is tried.
     let bytes = log(20);
     let error = |bytes: &[u8]| match LogReader::new(bytes) {
