@@ -150,3 +150,30 @@ fn files_that_are_no_log_or_half_of_one_are_refused() {
         error(&wrong);
     }
 }
+
+#[test]
+fn logs_of_every_form_open_with_their_start_and_inputs() {
+    let names = SceneNames {
+        objects: vec!["block".into()],
+        devices: vec!["left".into(), "right".into()],
+        obstacles: vec!["box".into(), "rail".into()],
+    };
+    let forms = [
+        // Form, bytes, whether it has initial states, whether it has held points.
+        ("v1", &include_bytes!("../../../../data/logs/v1/held_and_simulated.mcap")[..], false, false),
+        ("v2", &include_bytes!("../../../../data/logs/v2/held_and_simulated.mcap")[..], false, true),
+        ("v3", &include_bytes!("../../../../data/logs/v3/held_and_simulated.mcap")[..], true, true),
+    ];
+    for (form, bytes, has_start, has_held_points) in forms {
+        let reader = LogReader::new(bytes).expect("a log");
+        assert_eq!(reader.metadata().expect("metadata")["scene"], "held_and_simulated.toml", "{form}");
+        assert_eq!(reader.files().expect("files").len(), 5, "{form}");
+        assert_eq!(reader.start(&names).expect("readable").is_some(), has_start, "{form}");
+        assert_eq!(reader.step_count(), 250, "{form}");
+        let inputs = reader.logged_steps().map(|logged| {
+            logged.and_then(|logged| logged.input(&names, &[DeviceMode::Touch; 2])).expect("an input")
+        });
+        let held = |input: &Input| matches!(input.devices[0].mode, DeviceMode::Held(_));
+        assert_eq!(inputs.filter(held).count(), if has_held_points { 250 } else { 0 }, "{form}");
+    }
+}
