@@ -157,7 +157,7 @@ impl Dhd {
     /// Description of an open device.
     fn describe(&self, index: usize, id: c_char) -> DiscoveredDevice {
         let mut serial: c_ushort = 0;
-        // SAFETY: the device is open; the serial's place outlives the call.
+        // SAFETY: the device is open; the memory for the serial outlives the call.
         let (name, has_serial, force_n) = unsafe {
             let name = text((self.functions.dhdGetSystemName)(id));
             let has_serial = (self.functions.dhdGetSerialNumber)(&raw mut serial, id) >= 0;
@@ -227,7 +227,7 @@ impl ForceDimension {
     fn read_open(&self, id: c_char) -> Result<Reading, Error> {
         let Functions { dhdGetPosition, dhdGetButtonMask, dhdGetOrientationFrame, .. } = self.dhd.functions;
         let mut position = DVec3::NAN;
-        // SAFETY: the device is open; the numbers' places outlive the call.
+        // SAFETY: the device is open; the memory for the numbers outlives the call.
         let result =
             unsafe { dhdGetPosition(&raw mut position.x, &raw mut position.y, &raw mut position.z, id) };
         if result < 0 {

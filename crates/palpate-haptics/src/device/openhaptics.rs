@@ -198,7 +198,7 @@ impl Functions {
             return Err(DeviceError::NoDevice { driver: "openhaptics", message }.into());
         }
         let mut force = f64::NAN;
-        // SAFETY: the device is open and current; a force is one number, whose place outlives the call.
+        // SAFETY: the device is open and current; a force is one number, whose memory outlives the call.
         let (name, serial) = unsafe {
             (self.hdGetDoublev)(hd::NOMINAL_MAX_CONTINUOUS_FORCE, &raw mut force);
             (
