@@ -32,7 +32,7 @@ pub enum Error {
         reason: String,
     },
     /// A thread panicked.
-    #[error("the thread of the {purpose} has ended by a bug")]
+    #[error("the thread of the {purpose} panicked: a bug")]
     ThreadPanic {
         /// Purpose of the thread.
         purpose: String,
@@ -244,13 +244,13 @@ pub enum LogError {
     #[error("it is an MCAP file, but no log of palpate's")]
     NotPalpate,
     /// The initial state of an object is missing.
-    #[error("the log does not tell how {object:?} begins")]
+    #[error("the log has no initial state of {object:?}")]
     StartMissing {
         /// Object.
         object: String,
     },
     /// A step lacks a device or an obstacle.
-    #[error("step {step} of the log does not tell of {name:?}")]
+    #[error("step {step} of the log has no {name:?}")]
     PartMissing {
         /// Step, from 1.
         step: u64,

@@ -106,7 +106,7 @@ impl Safety {
     }
 
     /// Safe force [N] for a wanted force [N] of an age [s], at a speed of the hand [m/s], `dt_s` [s] after the last update.
-    /// Whatever comes in, it is finite, at most `force_n`, and within the slew-rate limit of the last one, unless it goes to zero.
+    /// The result is finite for any input, at most `force_n`, and within the slew-rate limit of the last one, unless it goes to zero.
     ///
     /// # Real time
     /// No allocation, lock or system call.

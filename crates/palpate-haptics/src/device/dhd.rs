@@ -157,7 +157,7 @@ impl Dhd {
     /// Description of an open device.
     fn describe(&self, index: usize, id: c_char) -> DiscoveredDevice {
         let mut serial: c_ushort = 0;
-        // SAFETY: the device is open; the serial's place outlives the call.
+        // SAFETY: the device is open; the memory for the serial outlives the call.
         let (name, has_serial, force_n) = unsafe {
             let name = text((self.functions.dhdGetSystemName)(id));
             let has_serial = (self.functions.dhdGetSerialNumber)(&raw mut serial, id) >= 0;
@@ -227,18 +227,18 @@ impl ForceDimension {
     fn read_open(&self, id: c_char) -> Result<Reading, Error> {
         let Functions { dhdGetPosition, dhdGetButtonMask, dhdGetOrientationFrame, .. } = self.dhd.functions;
         let mut position = DVec3::NAN;
-        // SAFETY: the device is open; the numbers' places outlive the call.
+        // SAFETY: the device is open; the memory for the numbers outlives the call.
         let result =
             unsafe { dhdGetPosition(&raw mut position.x, &raw mut position.y, &raw mut position.z, id) };
         if result < 0 {
-            return Err(self.dhd.call_error("tell the position"));
+            return Err(self.dhd.call_error("read the position"));
         }
         let mut orientation = None;
         if self.wrist {
             let mut rows = [[f64::NAN; 3]; 3];
             // SAFETY: the device is open; the matrix outlives the call.
             if unsafe { dhdGetOrientationFrame(&raw mut rows, id) } < 0 {
-                return Err(self.dhd.call_error("tell the orientation"));
+                return Err(self.dhd.call_error("read the orientation"));
             }
             orientation = handle_orientation(DMat3::from_cols_array_2d(&rows).transpose(), ours_from_dhd);
         }

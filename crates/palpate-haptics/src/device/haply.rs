@@ -158,7 +158,7 @@ pub(super) fn open(which: &str, location: Option<&str>) -> Result<(DiscoveredDev
     let known = found.name.starts_with("inverse3");
     let force_n = if known { DeviceSpec::INVERSE_3.force_n } else { SafetyLimits::default().force_n };
     let (exchange, driver) = exchange();
-    let last_failure = Mutex::new("nothing has come yet".to_string());
+    let last_failure = Mutex::new("no state was received yet".to_string());
     let shared = Arc::new(Shared { ending: AtomicBool::new(false), last_failure });
     let device = found.serial.clone().unwrap_or_default();
     let connection = Connection { address, device, exchange: driver, shared: shared.clone() };
@@ -345,7 +345,7 @@ impl Device for Haply {
     fn read(&mut self, now_s: f64) -> Result<Reading, Error> {
         self.exchange.newest(now_s).map(|sample| sample.reading).ok_or_else(|| {
             let last = self.shared.last_failure.lock().unwrap_or_else(PoisonError::into_inner);
-            let reason = format!("nothing was told for {} ms; last: {last}", STALE_AFTER.as_millis());
+            let reason = format!("no reading for {} ms; last failure: {last}", STALE_AFTER.as_millis());
             DeviceError::Silent { driver: "haply", reason }.into()
         })
     }

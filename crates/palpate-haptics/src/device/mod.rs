@@ -184,8 +184,8 @@ mod tests {
     fn a_mount_transforms_positions_forwards_and_forces_back() {
         let quarter = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
         let mount = Mount { pose: Pose { position: DVec3::X, orientation: quarter }, scale: 2.0 };
-        let place = mount.world_from_device(DVec3::new(0.1, 0.0, 0.0));
-        assert!((place - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-15, "{place}");
+        let position = mount.world_from_device(DVec3::new(0.1, 0.0, 0.0));
+        assert!((position - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-15, "{position}");
         let force = mount.device_force(DVec3::Y);
         assert!((force - DVec3::X).length() < 1e-15, "{force}");
     }

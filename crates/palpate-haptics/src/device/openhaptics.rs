@@ -198,7 +198,7 @@ impl Functions {
             return Err(DeviceError::NoDevice { driver: "openhaptics", message }.into());
         }
         let mut force = f64::NAN;
-        // SAFETY: the device is open and current; a force is one number, whose place outlives the call.
+        // SAFETY: the device is open and current; a force is one number, whose memory outlives the call.
         let (name, serial) = unsafe {
             (self.hdGetDoublev)(hd::NOMINAL_MAX_CONTINUOUS_FORCE, &raw mut force);
             (
@@ -332,7 +332,7 @@ impl Device for OpenHaptics {
                 Err(DeviceError::Silent { driver: "openhaptics", reason }.into())
             }
             Some(sample) if sample.fault != hd::SUCCESS && !Self::is_force_fault(sample.fault) => {
-                Err(self.functions.call_error("the device does not tell where it is", sample.fault))
+                Err(self.functions.call_error("the device reports no position", sample.fault))
             }
             Some(sample) => Ok(sample.reading),
         }

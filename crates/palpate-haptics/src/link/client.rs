@@ -157,9 +157,7 @@ impl Link {
                     self.set(None, LinkState::Connecting(format!("the link broke: {why}")));
                 }
                 Ok(Err(state)) => self.set(None, state),
-                Err(_) => {
-                    self.set(None, LinkState::Connecting(format!("nobody answers at {}", self.address)))
-                }
+                Err(_) => self.set(None, LinkState::Connecting(format!("no reply from {}", self.address))),
             }
             tokio::time::sleep(RETRY_INTERVAL).await;
         }

@@ -48,8 +48,8 @@ pub(super) fn motion_bytes(motion: &Motion) -> [u8; MOTION] {
     bytes[0] = MOTION_TAG;
     bytes[1..9].copy_from_slice(&motion.sequence.to_le_bytes());
     let (p, q) = (motion.position, motion.orientation);
-    for (place, number) in bytes[9..].chunks_exact_mut(8).zip([p.x, p.y, p.z, q.x, q.y, q.z, q.w]) {
-        place.copy_from_slice(&number.to_le_bytes());
+    for (slot, number) in bytes[9..].chunks_exact_mut(8).zip([p.x, p.y, p.z, q.x, q.y, q.z, q.w]) {
+        slot.copy_from_slice(&number.to_le_bytes());
     }
     bytes[MOTION - 4..].copy_from_slice(&motion.buttons.to_le_bytes());
     bytes
@@ -75,9 +75,9 @@ pub(super) fn effort_bytes(effort: &Effort) -> [u8; EFFORT] {
     bytes[1..9].copy_from_slice(&effort.sequence.to_le_bytes());
     bytes[9..17].copy_from_slice(&effort.in_reply_to.to_le_bytes());
     let force = effort.force;
-    for (place, number) in bytes[17..].chunks_exact_mut(8).zip([force.x, force.y, force.z, effort.absorbed_j])
+    for (slot, number) in bytes[17..].chunks_exact_mut(8).zip([force.x, force.y, force.z, effort.absorbed_j])
     {
-        place.copy_from_slice(&number.to_le_bytes());
+        slot.copy_from_slice(&number.to_le_bytes());
     }
     bytes
 }

@@ -111,6 +111,8 @@ mod tests {
 
     #[test]
     fn a_bad_link_passes_only_newer_messages_and_a_cut_one_takes_the_force_away_in_40_ms() {
+        /// Beginning of the cut [ms].
+        const CUT_AT: u64 = 3000;
         let (device_port, device_side) = port();
         let (force_side, mut force_port) = port();
         let mut link = Link {
@@ -130,13 +132,12 @@ mod tests {
         let mut update =
             HapticUpdate::new(device, device_port, Mount::default(), Safety::new(limits), None, false);
 
-        let (mut last_motion, mut given, mut cut_at, mut gone_at) = (Motion::default(), 0.0, None, None);
+        let (mut last_motion, mut gone_at) = (Motion::default(), None);
         for tick in 1..=6000_u64 {
             let now_s = tick as f64 * 1e-3;
             // A cut of 400 ms in the middle.
-            let cut = (3000..3400).contains(&tick);
+            let cut = (CUT_AT..CUT_AT + 400).contains(&tick);
             (link.motions.cut, link.efforts.cut) = (cut, cut);
-            let before = update.counts().work_on_hand_j;
             update.cycle(now_s);
             link.tick(tick);
             let received = force_port.newest();
@@ -151,11 +152,6 @@ mod tests {
                 force,
                 absorbed_j,
             });
-            let held = (update.counts().work_on_hand_j - before).abs() > 0.0;
-            given += f64::from(u8::from(held));
-            if cut {
-                cut_at.get_or_insert(tick);
-            }
             if cut && gone_at.is_none() && update.held_force() == DVec3::ZERO {
                 gone_at = Some(tick);
             }
@@ -164,10 +160,10 @@ mod tests {
             }
         }
         // Under way for up to 12 ms, then the watchdog's 20 ms and 20 ms of ramp.
-        let took = gone_at.expect("it goes") - cut_at.expect("it was cut");
+        let took = gone_at.expect("it goes") - CUT_AT;
         assert!((20..=12 + 40 + 1).contains(&took), "{took} ms");
         assert_eq!(update.held_force().x, 0.5, "and it comes back by itself");
-        assert!(link.dropped > 500 && given > 0.0, "{} late or doubled messages", link.dropped);
+        assert!(link.dropped > 500, "{} late or doubled messages", link.dropped);
         let safety = update.counts().safety;
         assert!(safety.trips >= 1 && update.counts().force_max_n <= 0.5 + 1e-9, "{safety:?}");
     }

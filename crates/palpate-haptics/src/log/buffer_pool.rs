@@ -42,7 +42,7 @@ impl<T> PoolProducer<T> {
             return;
         };
         fill(&mut buffer);
-        // Never full: there are as many places as buffers.
+        // Never full: there are as many slots as buffers.
         self.missed += u64::from(self.filled.push(buffer).is_err());
     }
 
@@ -57,7 +57,7 @@ impl<T> PoolConsumer<T> {
     pub fn consume<E>(&mut self, mut take: impl FnMut(&T) -> Result<(), E>) -> Result<(), E> {
         while let Ok(buffer) = self.filled.pop() {
             take(&buffer)?;
-            // Never full: there are as many places as buffers.
+            // Never full: there are as many slots as buffers.
             let _ = self.empty.push(buffer);
         }
         Ok(())

@@ -189,9 +189,9 @@ mod tests {
         wall.metadata.mass.mass_kg = 1e15;
         wall.metadata.mass.inertia_kg_m2 = [[1e15, 0.0, 0.0], [0.0, 1e15, 0.0], [0.0, 0.0, 1e15]];
         let (point, _) = wall.surface.nearest(DVec3::X).expect("a surface");
-        let place = PointResponse::new(&wall, &point, 0.0, DVec3::X);
+        let response = PointResponse::new(&wall, &point, 0.0, DVec3::X);
         let spec = DeviceSpec { mass_kg, damping_n_s_m, ..DeviceSpec::TOUCH };
-        ClosedLoop::new(&place, spec, None, LoopTiming { step_s, delay_updates })
+        ClosedLoop::new(&response, spec, None, LoopTiming { step_s, delay_updates })
     }
 
     #[test]
@@ -236,15 +236,21 @@ mod tests {
     }
 
     /// Growth of a loop that is simulated in time: its mean square at the end over that at the middle.
-    fn grows(place: &PointResponse, hand: Hand, timing: LoopTiming, coupling: Coupling, steps: usize) -> f64 {
+    fn grows(
+        response: &PointResponse,
+        hand: Hand,
+        timing: LoopTiming,
+        coupling: Coupling,
+        steps: usize,
+    ) -> f64 {
         let (h, delay) = (timing.step_s, timing.delay_updates as usize);
         let rate = coupling.damping / h;
         let sum = coupling.stiffness + rate;
         // Implicit midpoint rule with small steps: the second route to the exact maps.
         const PARTS: u32 = 400;
         let dt = h / f64::from(PARTS);
-        let swings: Vec<[f64; 3]> = place.oscillators().collect();
-        let mut modes = vec![[0.0_f64, 0.0]; swings.len()];
+        let oscillators: Vec<[f64; 3]> = response.oscillators().collect();
+        let mut modes = vec![[0.0_f64, 0.0]; oscillators.len()];
         let fly = |[mut q, mut v]: [f64; 2], omega: f64, zeta: f64, p: f64| {
             for _ in 0..PARTS {
                 let (c, k) = (2.0 * zeta * omega, omega * omega);
@@ -261,14 +267,17 @@ mod tests {
         let zeta = 0.5 * (hand.damping_n_s_m + traits.damping_n_s_m) / (mass * omega);
         let (mut device, mut stretch) = ([1e-3_f64, 0.0], 0.0);
         let mut line = vec![0.0; delay];
-        let within = place.instantaneous_compliance(h);
+        let within = response.instantaneous_compliance(h);
         let (mut first, mut second) = (0.0_f64, 0.0_f64);
         for step in 0..steps {
-            let free: Vec<[f64; 2]> =
-                modes.iter().zip(&swings).map(|(m, [omega, zeta, _])| fly(*m, *omega, *zeta, 0.0)).collect();
-            let there: f64 = free.iter().zip(&swings).map(|(m, s)| m[0] * s[2].sqrt()).sum();
+            let free: Vec<[f64; 2]> = modes
+                .iter()
+                .zip(&oscillators)
+                .map(|(m, [omega, zeta, _])| fly(*m, *omega, *zeta, 0.0))
+                .collect();
+            let there: f64 = free.iter().zip(&oscillators).map(|(m, s)| m[0] * s[2].sqrt()).sum();
             let force = (device[0] - there - rate / sum * stretch) / (within + 1.0 / sum);
-            for (mode, [omega, zeta, gain]) in modes.iter_mut().zip(&swings) {
+            for (mode, [omega, zeta, gain]) in modes.iter_mut().zip(&oscillators) {
                 *mode = fly(*mode, *omega, *zeta, gain.sqrt() * force);
             }
             stretch = (force + rate * stretch) / sum;
@@ -286,18 +295,18 @@ mod tests {
 
     #[test]
     fn what_is_stable_settles_and_what_is_not_grows() {
-        let place = response();
+        let response = response();
         let hand = Hand::FINGERTIP;
         for (step_s, link) in [(1e-3, 0.0), (2e-3, 0.0), (1e-3, 0.005)] {
             let timing = LoopTiming::new(step_s, link);
-            let closed = ClosedLoop::new(&place, DeviceSpec::TOUCH, Some(hand), timing);
+            let closed = ClosedLoop::new(&response, DeviceSpec::TOUCH, Some(hand), timing);
             let damping = 0.2;
             let ranges = closed.stable_stiffness(damping, 1e6);
             let [_, most] = *ranges.last().expect("some stiffness is stable");
             for (share, stable) in [(0.9, true), (1.1, false)] {
                 let coupling = Coupling { stiffness: share * most, damping };
                 assert_eq!(closed.is_stable(coupling), stable);
-                let grows = grows(&place, hand, timing, coupling, 3000);
+                let grows = grows(&response, hand, timing, coupling, 3000);
                 assert_eq!(grows < 1.0, stable, "{step_s} {link} {share}: {grows}, {ranges:?}");
             }
         }
@@ -305,21 +314,21 @@ mod tests {
 
     #[test]
     fn default_gains_have_their_margin_and_are_softer_the_later_the_answer() {
-        let place = response();
+        let response = response();
         let mut last = f64::INFINITY;
         for link in [0.0, 0.005, 0.02, 0.05] {
             let timing = LoopTiming::new(1e-3, link);
             let hands = [None, Some(Hand::FINGERTIP), Some(Hand::LIGHT), Some(Hand::FIRM)];
-            let loops = hands.map(|hand| ClosedLoop::new(&place, DeviceSpec::TOUCH, hand, timing));
-            let found =
-                default_coupling(&loops, place.instantaneous_compliance(1e-3)).expect("a soft one always is");
+            let loops = hands.map(|hand| ClosedLoop::new(&response, DeviceSpec::TOUCH, hand, timing));
+            let found = default_coupling(&loops, response.instantaneous_compliance(1e-3))
+                .expect("a soft one always is");
             assert!(
                 found.margins.gain > 1.9 && found.margins.delay_s > 0.9 * timing.age_s(),
                 "{link}: {found:?}"
             );
             assert!(
                 found.coupling.stiffness <= last
-                    && found.coupling.stiffness <= 10.0 / place.instantaneous_compliance(1e-3)
+                    && found.coupling.stiffness <= 10.0 / response.instantaneous_compliance(1e-3)
             );
             let twice =
                 Coupling { stiffness: 1.9 * found.coupling.stiffness, damping: 1.9 * found.coupling.damping };

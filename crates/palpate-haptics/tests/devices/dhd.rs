@@ -18,7 +18,7 @@ fn open(standin: &Standin, which: &str) -> Box<dyn Device> {
 }
 
 #[test]
-fn what_is_there_is_told_with_its_serial_and_force() {
+fn connected_devices_are_listed_with_serial_number_and_force() {
     let standin = Standin::new("libdhd");
     standin.function::<Number>("standin_plug")(2);
     standin.function::<StiffnessLimit>("standin_limit")(7.5);
@@ -36,7 +36,7 @@ fn what_is_there_is_told_with_its_serial_and_force() {
 }
 
 #[test]
-fn places_forces_turns_and_buttons_are_in_our_frame() {
+fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let standin = Standin::new("libdhd");
     standin.function::<Number>("standin_plug")(2);
     let mut device = open(&standin, "1");
@@ -139,7 +139,7 @@ fn a_fault_takes_the_force_away_by_its_ramp_and_gives_it_back_by_itself() {
     assert_eq!(it.update.counts().safety.trips, 1);
     assert!(it.update.counts().failed >= 10, "{:?}", it.update.counts());
     let why = it.update.failure().expect("why").to_string();
-    assert_eq!(why, "dhd: can't tell the position: communication error");
+    assert_eq!(why, "dhd: can't read the position: communication error");
     assert!((it.run(400) - 1.0).abs() < 1e-9, "it comes back");
 }
 
@@ -162,7 +162,7 @@ fn a_device_that_is_pulled_out_is_found_again_and_gives_force_after_a_press_only
 }
 
 #[test]
-fn numbers_that_are_none_never_reach_the_hand() {
+fn numbers_that_are_not_finite_never_reach_the_hand() {
     let mut it = Loop::new();
     it.run(1);
     it.press();

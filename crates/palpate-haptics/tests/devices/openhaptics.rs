@@ -17,7 +17,7 @@ fn at(x: f64, y: f64, z: f64) -> [f64; 16] {
     [0., 1., 0., 0., -1., 0., 0., 0., 0., 0., 1., 0., x, y, z, 1.]
 }
 
-/// One library serves a process, with one scheduler: tests that share a process take turns.
+/// Lock for tests that share a process: the library has one scheduler.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn standin() -> (MutexGuard<'static, ()>, Standin) {
@@ -29,7 +29,7 @@ fn open(standin: &Standin, which: &str) -> Hand {
 }
 
 #[test]
-fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() {
+fn connected_devices_are_listed_with_serial_number_and_continuous_force() {
     let (_alone, standin) = standin();
     let found = Driver::OpenHaptics.find(Some(standin.place())).expect("a device");
     assert_eq!(format!("{}, {:?} N", found[0], found[0].force_n), "0: Touch (2016-015-00123), Some(0.88) N");
@@ -43,7 +43,7 @@ fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() 
 }
 
 #[test]
-fn places_forces_turns_and_buttons_are_in_our_frame() {
+fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let (_alone, standin) = standin();
     standin.function::<Transform>("standin_transform")(0, &at(10.0, 20.0, -30.0));
     standin.function::<Press>("standin_press")(0, 0b10);
@@ -115,7 +115,7 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
     until("motors are warm", || hand.set_force(DVec3::X) == warm);
     hand.next();
     fault(0x0302);
-    let gone = "openhaptics: the device does not tell where it is: Communication error (error 0x0302)";
+    let gone = "openhaptics: the device reports no position: Communication error (error 0x0302)";
     until("it is pulled out", || hand.read() == Err(gone.to_string()));
     assert_eq!(hand.set_force(DVec3::X), Ok(()));
     assert_eq!(standin.force(0), [0.0; 3]);
@@ -128,7 +128,7 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
 }
 
 #[test]
-fn numbers_that_are_none_are_told_and_never_pushed() {
+fn numbers_that_are_not_finite_are_read_and_never_commanded() {
     let (_alone, standin) = standin();
     let mut hand = open(&standin, "0");
     standin.function::<Transform>("standin_transform")(0, &[f64::NAN; 16]);

@@ -1,4 +1,4 @@
-//! From a device to an object and back: a session with a stand-in that presses a body.
+//! Session in which a device (a stand-in) presses a body.
 
 #[path = "../processes/scenes.rs"]
 #[allow(dead_code)]

@@ -1,4 +1,5 @@
-//! Links between processes, through a wire that loses, delays, doubles and cuts.
+//! Links between processes over QUIC, through a wire that loses, delays, duplicates and cuts. QUIC's own time can't be simulated; what
+//! a link does with late and duplicate messages is tested in simulated time in `link/sequence.rs`.
 
 use glam::DVec3;
 use palpate_haptics::device::{Device, DeviceSpec, Mount, Reading};
@@ -12,18 +13,18 @@ use std::time::{Duration, Instant};
 
 const LOCALHOST: &str = "127.0.0.1:0";
 
-/// How often the wire faults: in a thousand datagrams.
+/// Faults of the wire, per thousand datagrams.
 #[derive(Default)]
 struct Faults {
     lost: AtomicU32,
     doubled: AtomicU32,
-    /// Up to so many ms late, each on its own.
+    /// Largest delay of a datagram [ms].
     late_ms: AtomicU32,
     cut: AtomicBool,
     over: AtomicBool,
 }
 
-/// Passes datagrams between a client and a server; gives where the client should send to.
+/// Wire between a client and a server. Returns the address that the client should send to, and the thread.
 fn wire(server: SocketAddr, faults: Arc<Faults>) -> (SocketAddr, std::thread::JoinHandle<()>) {
     let front = UdpSocket::bind(LOCALHOST).expect("a socket");
     let back = UdpSocket::bind(LOCALHOST).expect("a socket");
@@ -76,12 +77,12 @@ fn wire(server: SocketAddr, faults: Arc<Faults>) -> (SocketAddr, std::thread::Jo
     (address, thread)
 }
 
-/// A device that stands still and writes down what it is pushed with.
-struct Witness {
+/// Device that stands still and records its forces.
+struct ForceRecorder {
     pushes: Arc<Mutex<Vec<(f64, DVec3)>>>,
 }
 
-impl Device for Witness {
+impl Device for ForceRecorder {
     fn spec(&self) -> DeviceSpec {
         DeviceSpec::TOUCH
     }
@@ -96,7 +97,7 @@ impl Device for Witness {
     }
 }
 
-/// A force process that answers every motion with 1 N, until it is over.
+/// Force process that replies to every motion with 1 N until `over` is set.
 fn force_process(mut port: ForcePort, clock: Clock, over: Arc<AtomicBool>) -> std::thread::JoinHandle<u64> {
     std::thread::spawn(move || {
         let mut tick = clock.next_after(0);
@@ -123,7 +124,7 @@ fn limits() -> SafetyLimits {
 }
 
 #[test]
-fn a_force_goes_away_when_the_link_is_cut_and_comes_back_by_itself() {
+fn a_force_ramps_down_when_the_link_is_cut_and_comes_back_by_itself() {
     let start = Instant::now();
     let clock = Clock::new(start, 1e-3);
     let secret = Secret::new("only for this test").expect("long enough");
@@ -137,7 +138,7 @@ fn a_force_goes_away_when_the_link_is_cut_and_comes_back_by_itself() {
     let forces = force_process(force_port, clock, over.clone());
     let (port, client) = LinkClient::new(address, &secret, "finger", start).expect("a socket");
     let pushes = Arc::new(Mutex::new(Vec::new()));
-    let device = Box::new(Witness { pushes: pushes.clone() });
+    let device = Box::new(ForceRecorder { pushes: pushes.clone() });
     let mut update = HapticUpdate::new(device, port, Mount::default(), Safety::new(limits()), None, false);
     let mut tick = clock.next_after(0);
     // Update until the force is as it should be; gives when [s]. The time bounds a failure, not a success.
@@ -195,7 +196,7 @@ fn a_force_goes_away_when_the_link_is_cut_and_comes_back_by_itself() {
     wire.join().expect("no panic");
 }
 
-/// The state of a client once it is no longer seeking for the first time, or has found nobody.
+/// State of a client that has connected or was refused.
 fn settled(client: &LinkClient) -> LinkState {
     for _ in 0..600 {
         match client.state() {
@@ -207,7 +208,7 @@ fn settled(client: &LinkClient) -> LinkState {
 }
 
 #[test]
-fn strangers_are_refused_in_words_and_garbage_is_passed_over() {
+fn clients_with_another_secret_are_refused_and_garbage_is_dropped() {
     let start = Instant::now();
     let secret = Secret::new("only for this test").expect("long enough");
     let (device_port, mut force_port) = port();

@@ -57,7 +57,7 @@ fn log_from(state: State, model: &Arc<Model>, steps: u64) -> Vec<u8> {
 }
 
 #[test]
-fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
+fn a_log_replays_bit_for_bit_and_reports_the_first_difference() {
     let bytes = log(STEPS);
     let reader = LogReader::new(&bytes).expect("a log");
     assert_eq!(reader.metadata().expect("facts")["scene"], "a.toml");
@@ -90,7 +90,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
 }
 
 #[test]
-fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
+fn a_log_of_a_resumed_scene_begins_at_its_initial_state() {
     let model = model(1, 300.0);
     let press = |number: u32| {
         let place = DVec3::new(half_width(&model) + 0.004 - 2e-5 * f64::from(number), 1e-3, 0.0);
@@ -123,11 +123,11 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
     assert_eq!(differs, 400, "from rest it would be another motion");
     let unknown = SceneNames { objects: vec!["other".into()], ..SceneNames::default() };
     let error = reader.start(&unknown).expect_err("there is none of that name").to_string();
-    assert_eq!(error, "the log does not tell how \"other\" begins");
+    assert_eq!(error, "the log has no initial state of \"other\"");
 }
 
 #[test]
-fn what_is_no_log_or_half_of_one_is_refused_in_words() {
+fn files_that_are_no_log_or_half_of_one_are_refused() {
     // Few steps: the file is short, and every 11th byte of it is tried.
     let bytes = log(20);
     let error = |bytes: &[u8]| match LogReader::new(bytes) {
@@ -148,5 +148,32 @@ fn what_is_no_log_or_half_of_one_is_refused_in_words() {
         let mut wrong = bytes.clone();
         wrong[at] ^= 0x55;
         error(&wrong);
+    }
+}
+
+#[test]
+fn logs_of_every_form_open_with_their_start_and_inputs() {
+    let names = SceneNames {
+        objects: vec!["block".into()],
+        devices: vec!["left".into(), "right".into()],
+        obstacles: vec!["box".into(), "rail".into()],
+    };
+    let forms = [
+        // Form, bytes, whether it has initial states, whether it has held points.
+        ("v1", &include_bytes!("../../../../data/logs/v1/held_and_simulated.mcap")[..], false, false),
+        ("v2", &include_bytes!("../../../../data/logs/v2/held_and_simulated.mcap")[..], false, true),
+        ("v3", &include_bytes!("../../../../data/logs/v3/held_and_simulated.mcap")[..], true, true),
+    ];
+    for (form, bytes, has_start, has_held_points) in forms {
+        let reader = LogReader::new(bytes).expect("a log");
+        assert_eq!(reader.metadata().expect("metadata")["scene"], "held_and_simulated.toml", "{form}");
+        assert_eq!(reader.files().expect("files").len(), 5, "{form}");
+        assert_eq!(reader.start(&names).expect("readable").is_some(), has_start, "{form}");
+        assert_eq!(reader.step_count(), 250, "{form}");
+        let inputs = reader.logged_steps().map(|logged| {
+            logged.and_then(|logged| logged.input(&names, &[DeviceMode::Touch; 2])).expect("an input")
+        });
+        let held = |input: &Input| matches!(input.devices[0].mode, DeviceMode::Held(_));
+        assert_eq!(inputs.filter(held).count(), if has_held_points { 250 } else { 0 }, "{form}");
     }
 }

@@ -1,4 +1,4 @@
-//! Devices that fall silent.
+//! Silent devices.
 
 use super::scenes::{STEP_S, half_width, model, process};
 use glam::DVec3;
@@ -6,7 +6,7 @@ use palpate::DeviceMode;
 use palpate_haptics::{Effort, Motion};
 
 #[test]
-fn a_device_that_falls_silent_is_away_and_comes_back_while_the_object_goes_on() {
+fn a_silent_device_is_inactive_and_comes_back_while_the_object_moves_on() {
     let model = model(1, 300.0);
     let edge = half_width(&model) + 0.004;
     let (mut force, mut ports) = process(&model);
