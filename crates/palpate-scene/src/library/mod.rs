@@ -327,7 +327,8 @@ impl SceneLibrary {
         };
         let path = recipe.record_cached(&folder, progress).map_err(without_folder)?;
         let recording = read_recording(&path)?;
-        let lowest = recording.surface.positions.iter().map(|place| place.y).fold(f64::INFINITY, f64::min);
+        let lowest =
+            recording.surface.positions.iter().map(|position| position.y).fold(f64::INFINITY, f64::min);
         let height = recording.surface.diagonal() * 0.1 - lowest;
         let text = format!(
             "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"object\"\nrecording = {:?}\nposition = [0.0, {height:?}, 0.0]\n\
