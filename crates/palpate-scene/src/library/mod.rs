@@ -94,18 +94,16 @@ impl Current {
     fn add_recipes(&mut self, scene: &Scene) -> Vec<bool> {
         let objects = self.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
         let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
-        let files = objects
-            .iter()
-            .map(|object| folder.join(object.get("recording").and_then(Value::as_str).unwrap_or_default()));
-        let mut files = files.fuse();
-        let mut has_recipe = |recording| {
-            let Some(file) = files.next() else { return false };
+        let file =
+            |object: &Value| folder.join(object.get("recording").and_then(Value::as_str).unwrap_or_default());
+        let recordings = scene.model.recordings().zip(objects.iter().map(file));
+        let has_recipe = recordings.map(|(recording, file)| {
             if let Some(recipe) = RecordingRecipe::of(recording) {
                 self.recipes.entry(file.clone()).or_insert(recipe);
             }
             self.recipes.contains_key(&file)
-        };
-        scene.model.recordings().map(|recording| has_recipe(recording)).collect()
+        });
+        has_recipe.collect()
     }
 }
 
