@@ -38,12 +38,15 @@ macro_rules! from_display {
 from_display!(
     palpate::Error,
     palpate_fem::mesh::MeshError,
-    palpate_fem::record::RecordError,
+    palpate_fem::RecordError,
     palpate_fem::table::TableError,
     palpate_haptics::Error,
+    palpate_reproduce::ReproduceError,
     palpate_scene::ReplayError,
     palpate_scene::SceneError,
     palpate_store::StoreError,
+    palpate_verify::UnknownCase,
+    palpate_verify::VerifyError,
 );
 
 impl From<RenderError> for Failure {

@@ -7,10 +7,7 @@ mod commands;
 mod failure;
 mod interrupt;
 mod progress;
-mod report;
-mod reproduction;
 mod terminal;
-mod verification;
 
 pub use failure::Failure;
 

@@ -1,6 +1,6 @@
 //! Library of scenes: pointers are added, settings change the text, and the last scene stays when a change is refused.
 
-use palpate_scene::{SceneErrorKind, SceneLibrary, SettingsChange, Silent};
+use palpate_scene::{SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
 use tempfile::TempDir;
 
 const RECORDING: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
@@ -36,7 +36,7 @@ fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
     let again = library.change_settings(&SettingsChange::default()).expect("the last scene");
     assert_eq!(again.scene.model.parameters().gravity.y, -1.6);
 
-    let error = library.open_built_in("nothing", &mut Silent).err().expect("a refusal");
+    let error = library.open_built_in("nothing", &mut SilentProgress).err().expect("a refusal");
     assert_eq!(error.kind, SceneErrorKind::UnknownValue);
     assert_eq!(
         error.to_string(),

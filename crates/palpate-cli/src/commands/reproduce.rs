@@ -2,11 +2,9 @@
 
 use crate::failure::Failure;
 use crate::progress::Bars;
-use crate::report::{Page, code, paragraph};
-use crate::reproduction::{Desk, Effort, Finding, Part, chapters, findings_table};
 use crate::terminal::print;
 use clap::{Args, ValueEnum};
-use palpate_export::write_atomically;
+use palpate_reproduce::{Effort, Options, Part};
 use std::path::PathBuf;
 
 /// Make the paper's table and figures again, and measure what it claims
@@ -36,7 +34,7 @@ pub struct Arguments {
     steps: u32,
     /// These parts only, with commas between them
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PARTS")]
-    only: Vec<Part>,
+    only: Vec<PartOption>,
     /// The browser that draws pictures; by default the first of chromium, chromium-browser, google-chrome, chrome that is found
     #[arg(long, value_name = "PROGRAM")]
     browser: Option<PathBuf>,
@@ -44,42 +42,53 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn reproduce(arguments: &Arguments) -> Result<(), Failure> {
-    let output = &arguments.output;
-    std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
-    let effort = Effort {
-        cells: arguments.cells,
-        columns: arguments.columns as usize,
-        steps: arguments.steps as usize,
+    let program = std::env::current_exe()
+        .map_err(|e| Failure(format!("palpate can't be run in a process of its own: {e}")))?;
+    let parts = if arguments.only.is_empty() { PartOption::value_variants() } else { &arguments.only };
+    let options = Options {
+        output: arguments.output.clone(),
+        program,
+        browser: arguments.browser.clone(),
+        effort: Effort {
+            cells: arguments.cells,
+            columns: arguments.columns as usize,
+            steps: arguments.steps as usize,
+        },
+        parts: parts.iter().map(|part| part.part()).collect(),
     };
-    let mut progress = Bars::new();
-    let parts = if arguments.only.is_empty() { Part::value_variants() } else { &arguments.only };
-    let desk = Desk { output, browser: arguments.browser.as_deref(), effort };
-    let chapters = chapters(&desk, parts, &mut progress)?;
-    progress.finish();
-    for file in chapters.iter().flat_map(|chapter| &chapter.data) {
-        write_atomically(&output.join(&file.name), file.text.as_bytes())?;
-    }
-    let page = Page {
-        title: "The paper's elastic cube, reproduced".into(),
-        intro: intro(
-            arguments.cells,
-            &chapters.iter().flat_map(|chapter| chapter.findings.clone()).collect::<Vec<_>>(),
-        ),
-        sections: chapters.into_iter().map(|chapter| chapter.section).collect(),
-    };
-    let report = output.join("report.html");
-    write_atomically(&report, page.html().as_bytes())?;
+    let report = palpate_reproduce::reproduce(&options, &mut Bars::new())?;
     print(&format!("{}\n", report.display()))
 }
 
-/// What the page is about, and the table of what was found.
-fn intro(cells: u32, findings: &[Finding]) -> String {
-    let text = paragraph(&format!(
-        "What “A Study on Haptic Interaction and Simulation of Motion and DeformationSnapshot of Elastic Object” reports of its cube \
-         (side 0.1 m, E = 2000 Pa, ν = 0.49, ρ = 110 kg/m³), measured with palpate {} by the command below. The paper states \
-         no damping; here α = 2 1/s, β = 2·10⁻⁴ s where nothing else is said. The numbers behind the figures lie beside this page as CSV, the runs of figure 5 as \
-         logs that palpate serve and palpate replay read.",
-        env!("CARGO_PKG_VERSION")
-    ));
-    text + &code(&format!("palpate reproduce --cells {cells} -o DIR")) + &findings_table(findings)
+/// A part of the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PartOption {
+    /// Table 1.
+    Recording,
+    /// Figures 2 and 3, and the arrival of the wave.
+    Impulses,
+    /// Passivity of the samples.
+    Passivity,
+    /// Both forms of the response, both ways of recording.
+    Agreement,
+    /// Section 2.5.
+    Cost,
+    /// Figure 5(a).
+    Fall,
+    /// Figure 5(b).
+    Shake,
+}
+
+impl PartOption {
+    fn part(self) -> Part {
+        match self {
+            Self::Recording => Part::Recording,
+            Self::Impulses => Part::Impulses,
+            Self::Passivity => Part::Passivity,
+            Self::Agreement => Part::Agreement,
+            Self::Cost => Part::Cost,
+            Self::Fall => Part::Fall,
+            Self::Shake => Part::Shake,
+        }
+    }
 }

@@ -1,11 +1,10 @@
-//! `palpate verify`: computed against what must come out.
+//! `palpate verify`: cases with known answers.
 
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
-use crate::verification::{CASES, Check};
 use clap::Args;
+use palpate_verify::{CaseResult, Check, Event, run, select};
 use serde_json::{Value, json};
-use std::time::Instant;
 
 /// Compute cases with known answers and show the errors and orders of convergence
 ///
@@ -23,35 +22,17 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
-    let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
-    if let Some(unknown) = arguments.cases.iter().find(|name| !names.contains(&name.as_str())) {
-        return Err(Failure(format!("there is no case {unknown:?}; the cases are {}", names.join(", "))));
-    }
-    let chosen =
-        |name: &str| arguments.cases.is_empty() || arguments.cases.iter().any(|wanted| wanted == name);
-    let (mut passed, mut failed, mut cases) = (0, 0, Vec::new());
-    for case in CASES.iter().filter(|case| chosen(case.name)) {
-        let before = Instant::now();
-        if !arguments.json {
-            print(&format!("\n{}: {}\n", case.name, case.about))?;
-        }
-        let checks = (case.run)()?;
-        for check in &checks {
-            *if check.passed() { &mut passed } else { &mut failed } += 1;
-            if !arguments.json {
-                print(&line(check))?;
-            }
-        }
-        let seconds = before.elapsed().as_secs_f64();
-        cases.push(json!({
-            "name": case.name,
-            "about": case.about,
-            "seconds": seconds,
-            "passed": checks.iter().all(Check::passed),
-            "checks": checks.iter().map(to_json).collect::<Vec<Value>>(),
-        }));
-    }
+    let cases = select(&arguments.cases)?;
+    let results = run(&cases, |event| match event {
+        _ if arguments.json => Ok(()),
+        Event::CaseStarted(case) => print(&format!("\n{}: {}\n", case.name, case.about)),
+        Event::CaseFinished(result) => print(&result.checks.iter().map(line).collect::<String>()),
+    })?;
+    let checks = || results.iter().flat_map(|result| &result.checks);
+    let passed = checks().filter(|check| check.passed()).count();
+    let failed = checks().count() - passed;
     if arguments.json {
+        let cases: Vec<Value> = results.iter().map(case_to_json).collect();
         print_json(
             &json!({ "passed": failed == 0, "checks_passed": passed, "checks_failed": failed, "cases": cases }),
         )?;
@@ -66,24 +47,32 @@ fn line(check: &Check) -> String {
     let order = check
         .order
         .map_or(String::new(), |[observed, expected]| format!(", order {observed:.2} (expected {expected})"));
-    let numbers = if check.expected == 0.0 {
-        format!("{:.2e} (at most {:.1e})", check.computed, check.allowed)
+    let Check { quantity, measured, expected, error, tolerance, .. } = check;
+    let numbers = if *expected == 0.0 {
+        format!("{measured:.2e} (at most {tolerance:.1e})")
     } else {
-        format!(
-            "{:.6} for {:.6}, error {:.1e} (at most {:.1e})",
-            check.computed, check.expected, check.error, check.allowed
-        )
+        format!("{measured:.6} for {expected:.6}, error {error:.1e} (at most {tolerance:.1e})")
     };
-    format!("  {mark} {:<58} {numbers}{order}\n", check.quantity)
+    format!("  {mark} {quantity:<58} {numbers}{order}\n")
 }
 
-fn to_json(check: &Check) -> Value {
+fn case_to_json(result: &CaseResult) -> Value {
+    json!({
+        "name": result.case.name,
+        "about": result.case.about,
+        "seconds": result.elapsed.as_secs_f64(),
+        "passed": result.passed(),
+        "checks": result.checks.iter().map(check_to_json).collect::<Vec<Value>>(),
+    })
+}
+
+fn check_to_json(check: &Check) -> Value {
     json!({
         "quantity": check.quantity,
-        "computed": check.computed,
+        "computed": check.measured,
         "expected": check.expected,
         "error": check.error,
-        "allowed": check.allowed,
+        "allowed": check.tolerance,
         "order_observed": check.order.map(|[observed, _]| observed),
         "order_expected": check.order.map(|[_, expected]| expected),
         "passed": check.passed(),

@@ -4,11 +4,9 @@ use super::{Case, touch::FINGER, touch::HALF};
 use crate::failure::Failure;
 use crate::terminal::notify;
 use glam::DVec3;
-use palpate::{
-    DeviceInput, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, Shape,
-    State, Twist, step,
-};
+use palpate::{DeviceInput, Input, Model, ModelParameters, Obstacle, Pose, Recording, State, step};
 use palpate_haptics::Snapshot;
+use palpate_testkit::{GRAVITY_M_S2, floor, object_at};
 use palpate_viewer::{FrameEncoder, FrameFormat};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -28,8 +26,8 @@ pub fn case(recording: Arc<Recording>, form: FrameFormat, on_floor: bool) -> Cas
         FrameFormat::Modal => "modal",
         FrameFormat::Vertices => "vertices",
     };
-    let floor = if on_floor { " and it lies on a floor" } else { "" };
-    let label = format!("{nodes} surface nodes, a frame ({how}), 2 fingers{floor}");
+    let on_a_floor = if on_floor { " and it lies on a floor" } else { "" };
+    let label = format!("{nodes} surface nodes, a frame ({how}), 2 fingers{on_a_floor}");
     (label, Box::new(move |steps| frame_times(&recording, form, on_floor, steps)))
 }
 
@@ -41,16 +39,13 @@ fn frame_times(
 ) -> Result<Vec<u32>, Failure> {
     let mut parameters = ModelParameters { devices: vec![FINGER; 2], ..ModelParameters::default() };
     if on_floor {
-        parameters.gravity = DVec3::Y * -9.81;
+        parameters.gravity = DVec3::Y * -GRAVITY_M_S2;
         parameters.max_contact_samples = 48;
-        parameters.obstacles = vec![Obstacle {
-            shape: Shape::Plane { normal: DVec3::Y },
-            pose: Pose { position: DVec3::Y * -HALF, ..Pose::IDENTITY },
-            friction: 0.5,
-        }];
+        let pose = Pose { position: DVec3::Y * -HALF, ..Pose::IDENTITY };
+        parameters.obstacles = vec![Obstacle { pose, ..floor(0.5) }];
     }
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let model = Arc::new(Model::new(parameters, vec![ModelObject::new(recording.clone(), start)])?);
+    let object = object_at(recording, DVec3::ZERO, DVec3::ZERO);
+    let model = Arc::new(Model::new(parameters, vec![object])?);
     let mut state = State::new(&model);
     let mut encoder = FrameEncoder::new(model.clone(), 1);
     let obstacles: Vec<Pose> = model.parameters().obstacles.iter().map(|obstacle| obstacle.pose).collect();
@@ -67,9 +62,9 @@ fn frame_times(
         }
         step(&model, &mut state, &input);
         if number % STEPS_PER_FRAME == 0 {
-            snapshot.take(number as u64, &input, &state);
+            snapshot.capture(number as u64, &input, &state);
             let before = Instant::now();
-            let frame = encoder.make(&snapshot, form);
+            let frame = encoder.encode(&snapshot, form);
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
             bytes += frame.len();
         }

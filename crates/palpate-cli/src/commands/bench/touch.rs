@@ -2,18 +2,14 @@
 
 use super::{Case, frames, timed_step};
 use crate::failure::Failure;
-use glam::{DMat3, DVec3};
-use palpate::{
-    DeviceInput, DeviceParameters, Input, ModalBasis, Model, ModelObject, ModelParameters, NearField,
-    ObjectStart, Obstacle, Pose, Recording, ResidualCompliance, Shape, State, Surface, Twist,
-};
+use glam::DVec3;
+use palpate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, Recording, State};
+use palpate_testkit::{GRAVITY_M_S2, finger, floor, start_at, subdivided_near_field};
 use palpate_viewer::FrameFormat;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Typical finger.
-pub const FINGER: DeviceParameters =
-    DeviceParameters { tip_radius: 0.005, patch_radius: 0.004, friction: 0.6, coupling: None };
+pub const FINGER: DeviceParameters = finger(0.005, 0.004, 0.6);
 
 /// Half the side of the cubes [m].
 pub const HALF: f64 = 0.05;
@@ -39,7 +35,7 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     let mut recording = finer;
     for refinement in 0..=REFINEMENTS {
         if refinement > 0 {
-            recording = Arc::new(refined(&recording));
+            recording = Arc::new(subdivided_near_field(&recording));
         }
         fingers(recording.clone(), false);
     }
@@ -75,10 +71,6 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
     cases.into_iter()
 }
 
-fn at_height(y: f64) -> ObjectStart {
-    ObjectStart { pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY }, twist: Twist::ZERO }
-}
-
 /// Compute times of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it [ns].
 fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters {
@@ -88,7 +80,7 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
         ],
         ..ModelParameters::default()
     };
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(0.0))])?;
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])?;
     let mut state = State::new(&model);
     // A free cube between sliding fingers slips away in the end.
     let steps = if sliding { steps.min(4000) } else { steps };
@@ -124,7 +116,7 @@ fn floor_steps(
     let parameters = on_a_floor(max_contact_samples);
     let cube = |number: usize| {
         let above = height + number as f64 * (2.0 * HALF + height);
-        ModelObject::new(recording.clone(), at_height(HALF + above))
+        ModelObject::new(recording.clone(), start_at(DVec3::Y * (HALF + above)))
     };
     let model = Model::new(parameters, (0..cubes).map(cube).collect())?;
     let mut state = State::new(&model);
@@ -142,9 +134,13 @@ fn floor_steps(
 
 /// Parameters with gravity and a floor.
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
-    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
-    let gravity = DVec3::Y * -9.81;
-    ModelParameters { gravity, obstacles: vec![floor], max_contact_samples, ..ModelParameters::default() }
+    let gravity = DVec3::Y * -GRAVITY_M_S2;
+    ModelParameters {
+        gravity,
+        obstacles: vec![floor(0.5)],
+        max_contact_samples,
+        ..ModelParameters::default()
+    }
 }
 
 /// Compute times of steps in which two fingers press a cube on a floor by 3 mm and push it [ns].
@@ -154,7 +150,7 @@ fn moving_steps(
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
     let parameters = ModelParameters { devices: vec![FINGER; 2], ..on_a_floor(max_contact_samples) };
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), at_height(HALF))])?;
+    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::Y * HALF))])?;
     let mut state = State::new(&model);
     // Settling, then pressing, then pushing.
     let (settled, moved) = (1000, 1500);
@@ -184,77 +180,4 @@ fn damped(cube: &Recording) -> Recording {
     let modes = &mut cube.modes;
     modes.damping_ratios = modes.angular_frequencies.iter().map(|omega| 0.5 * 2e-3 * omega).collect();
     cube
-}
-
-/// Copy with every surface triangle split in four: modes and residual compliance are interpolated linearly, for fine surfaces
-/// without finite elements.
-fn refined(coarse: &Recording) -> Recording {
-    let surface = &coarse.surface;
-    let m = coarse.modes.len();
-    // Nodes at the ends of the edge that a new node halves.
-    let mut parents: Vec<[u32; 2]> = (0..surface.positions.len() as u32).map(|n| [n, n]).collect();
-    let mut middles = HashMap::new();
-    let mut triangles = Vec::with_capacity(4 * surface.triangles.len());
-    for &[a, b, c] in &surface.triangles {
-        let mut middle = |i: u32, j: u32| {
-            *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                parents.push([i, j]);
-                parents.len() as u32 - 1
-            })
-        };
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-    }
-    let mean =
-        |of: &[u32; 2], value: &dyn Fn(usize) -> DVec3| (value(of[0] as usize) + value(of[1] as usize)) * 0.5;
-    let positions: Vec<DVec3> = parents.iter().map(|of| mean(of, &|n| surface.positions[n])).collect();
-    let mut mode_shapes = Vec::with_capacity(3 * positions.len() * m);
-    for [a, b] in &parents {
-        for axis in 0..3 {
-            let (a, b) = (coarse.modes.row(*a as usize, axis), coarse.modes.row(*b as usize, axis));
-            mode_shapes.extend(a.iter().zip(b).map(|(x, y)| 0.5 * (x + y)));
-        }
-    }
-    let source_nodes = (0..positions.len() as u32).collect();
-    let surface = Surface { positions, triangles, source_nodes };
-    let residual = near_field(&surface, &parents, &coarse.residual);
-    let modes = ModalBasis { mode_shapes, ..coarse.modes.clone() };
-    Recording { metadata: coarse.metadata.clone(), surface, modes, residual, gravity: None }
-}
-
-/// Residual compliance between the new nodes, within a few edges.
-fn near_field(surface: &Surface, parents: &[[u32; 2]], coarse: &ResidualCompliance) -> ResidualCompliance {
-    let radius = 3.0 * surface.mean_edge();
-    let cell = |p: DVec3| (p / radius).floor().to_array().map(|x| x as i64);
-    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    for (node, p) in surface.positions.iter().enumerate() {
-        cells.entry(cell(*p)).or_default().push(node as u32);
-    }
-    let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
-    for (i, p) in surface.positions.iter().enumerate() {
-        let [x, y, z] = cell(*p);
-        let around =
-            (-1..=1).flat_map(|dx| (-1..=1).flat_map(move |dy| (-1..=1).map(move |dz| [dx, dy, dz])));
-        let mut others: Vec<u32> = around
-            .filter_map(|[dx, dy, dz]| cells.get(&[x + dx, y + dy, z + dz]))
-            .flatten()
-            .copied()
-            .filter(|&j| (surface.positions[j as usize] - *p).length() < radius)
-            .collect();
-        others.sort_unstable();
-        for j in others {
-            let mut block = DMat3::ZERO;
-            for a in parents[i] {
-                for b in parents[j as usize] {
-                    block += coarse.block(a as usize, b as usize) * 0.25;
-                }
-            }
-            let distance = (surface.positions[j as usize] - *p).length();
-            block *= NearField::taper(distance / radius);
-            near.nodes.push(j);
-            near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
-        }
-        near.offsets.push(near.nodes.len() as u32);
-    }
-    ResidualCompliance::NearField(near)
 }

@@ -11,7 +11,6 @@ use crate::terminal::{notify, print};
 use clap::Args;
 use palpate::Recording;
 use palpate_export::write_atomically;
-use palpate_fem::record::RecordParameters;
 use palpate_scene::{
     BUILT_IN_SCENES, RecordingRecipe, RunMode, cache_folder, paper_cube as paper_recipe, read_scene,
 };
@@ -53,11 +52,6 @@ const SQUEEZE_M: f64 = 0.003;
 /// Recipe of the paper's cube with a number of cells a side.
 fn cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
     RecordingRecipe { source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"), modes, ..paper_recipe() }
-}
-
-/// Parameters of its recording.
-pub fn paper_cube(cells: u32, modes: usize) -> RecordParameters {
-    cube_recipe(cells, modes).parameters(1)
 }
 
 /// Runs the command.

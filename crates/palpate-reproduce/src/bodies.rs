@@ -1,0 +1,62 @@
+//! The paper's cube as it is measured.
+
+use crate::error::ReproduceError;
+use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
+use palpate_fem::mesh::box_mesh;
+use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
+use palpate_fem::{Progress, RecordExtent, RecordParameters, RecordedBody};
+use palpate_scene::{RecordingRecipe, paper_cube};
+
+/// Parameters of the paper's cube.
+fn parameters(cells: u32, modes: usize) -> RecordParameters {
+    let source = format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}");
+    RecordingRecipe { source, modes, ..paper_cube() }.parameters(1)
+}
+
+/// The paper's cube with a number of cells along each side, without certificate.
+pub fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<RecordedBody, ReproduceError> {
+    damped_cube(cells, modes, parameters(cells, modes).damping, progress)
+}
+
+/// The cube with another damping.
+pub fn damped_cube(
+    cells: u32,
+    modes: usize,
+    damping: Damping,
+    progress: &mut dyn Progress,
+) -> Result<RecordedBody, ReproduceError> {
+    let parameters =
+        RecordParameters { damping, extent: RecordExtent::NoCertificate, ..parameters(cells, modes) };
+    Ok(RecordedBody::new(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
+}
+
+/// A table in closed form of a free body, end of step, in memory; `change` maps every number of it.
+pub fn table_in_memory(
+    body: &RecordedBody,
+    step_s: f64,
+    samples: usize,
+    touchable_nodes: Vec<u32>,
+    change: impl Fn(f64) -> f64,
+) -> Result<ImpulseResponse, ReproduceError> {
+    let parameters = TableParameters {
+        step_s,
+        samples,
+        sampling: Sampling::End,
+        method: TableMethod::ClosedForm,
+        touchable_nodes,
+        observed_nodes: body.surface_nodes(),
+    };
+    let recorder = TableRecorder::new(body, &parameters)?;
+    let touchable_dofs = recorder.touchable_dofs();
+    let columns = recorder.columns(0..touchable_dofs.len(), COLUMN_BLOCK, &|_| {});
+    let values: Vec<f64> = columns.into_iter().flatten().map(change).collect();
+    Ok(ImpulseResponse {
+        step_s,
+        samples,
+        sampling: Sampling::End,
+        touchable_dofs,
+        observed_dofs: recorder.observed_dofs(),
+        gravity: None,
+        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length())),
+    })
+}

@@ -1,0 +1,68 @@
+//! Options of a reproduction.
+
+use std::path::PathBuf;
+
+/// A part that can be made by itself; in the order of the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Table 1: size of the model and cost of recording.
+    Recording,
+    /// Figures 2 and 3: impulse responses, and the arrival of the wave.
+    Impulses,
+    /// Passivity of the samples.
+    Passivity,
+    /// Agreement of both forms of the response, and of both ways of recording.
+    Agreement,
+    /// Cost of direct convolution (section 2.5).
+    Cost,
+    /// Figure 5(a): a fall.
+    Fall,
+    /// Figure 5(b): two devices that shake the cube.
+    Shake,
+}
+
+impl Part {
+    /// All parts, in the order of the paper.
+    pub const ALL: [Self; 7] = [
+        Self::Recording,
+        Self::Impulses,
+        Self::Passivity,
+        Self::Agreement,
+        Self::Cost,
+        Self::Fall,
+        Self::Shake,
+    ];
+}
+
+/// Thoroughness of the measurements.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Cells along a side of the cube; the paper's has 12.
+    pub cells: u32,
+    /// Columns of the table that are timed.
+    pub columns: usize,
+    /// Steps that are timed per point of a curve.
+    pub steps: usize,
+}
+
+/// Options of [`reproduce`](crate::reproduce).
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Folder of the report and its numbers.
+    pub output: PathBuf,
+    /// The program `palpate`, which runs scenes and devices in processes of their own.
+    pub program: PathBuf,
+    /// The browser that draws images; by default the first known one.
+    pub browser: Option<PathBuf>,
+    /// Thoroughness of the measurements.
+    pub effort: Effort,
+    /// Parts to make; they come in the order of the paper.
+    pub parts: Vec<Part>,
+}
+
+impl Options {
+    /// Folder of the scenes that are run, with all that they need.
+    pub(crate) fn scenes(&self) -> PathBuf {
+        self.output.join("scenes")
+    }
+}

@@ -1,0 +1,81 @@
+//! Elastic materials, and bodies that are recorded of one.
+
+use crate::recording_cache::recorded_once;
+use glam::DVec3;
+use palpate::{Damping, Material, Recording};
+use palpate_fem::mesh::Mesh;
+use palpate_fem::{ElementOrder, RecordError, RecordExtent, RecordParameters, ResidualChoice};
+use std::sync::Arc;
+
+/// An isotropic linear-elastic material with stiffness-proportional damping C = βK.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ElasticMaterial {
+    /// Young's modulus E [Pa].
+    pub young_pa: f64,
+    /// Poisson's ratio ν.
+    pub poisson: f64,
+    /// Density ρ [kg/m³].
+    pub density_kg_m3: f64,
+    /// β [s].
+    pub stiffness_damping_s: f64,
+}
+
+impl ElasticMaterial {
+    /// Parameters of a recording without certificate.
+    pub fn parameters(&self, order: ElementOrder, modes: usize) -> RecordParameters {
+        RecordParameters {
+            damping: Damping::Rayleigh { alpha: 0.0, beta: self.stiffness_damping_s },
+            extent: RecordExtent::NoCertificate,
+            ..undamped(self.young_pa, self.poisson, self.density_kg_m3, order, modes)
+        }
+    }
+
+    /// A body that moves freely.
+    ///
+    /// # Errors
+    /// As [`palpate_fem::record`].
+    pub fn free_body(
+        &self,
+        mesh: Mesh,
+        order: ElementOrder,
+        modes: usize,
+    ) -> Result<Arc<Recording>, RecordError> {
+        recorded_once(mesh, &self.parameters(order, modes))
+    }
+
+    /// A body whose nodes are fixed where `fixed` holds for their position [m].
+    ///
+    /// # Errors
+    /// As [`palpate_fem::record`].
+    pub fn fixed_body(
+        &self,
+        mesh: Mesh,
+        order: ElementOrder,
+        modes: usize,
+        fixed: impl Fn(DVec3) -> bool,
+    ) -> Result<Arc<Recording>, RecordError> {
+        let fixed_nodes = (0..mesh.nodes.len()).filter(|&node| fixed(mesh.nodes[node]));
+        let fixed_nodes = fixed_nodes.map(|node| node as u32).collect();
+        recorded_once(mesh, &RecordParameters { fixed_nodes, ..self.parameters(order, modes) })
+    }
+}
+
+/// Parameters of an undamped body of one material: E [Pa], ν, ρ [kg/m³].
+pub fn undamped(
+    young_pa: f64,
+    poisson: f64,
+    density_kg_m3: f64,
+    order: ElementOrder,
+    modes: usize,
+) -> RecordParameters {
+    RecordParameters {
+        materials: vec![Material { region: String::new(), young_pa, poisson, density_kg_m3 }],
+        order,
+        modes,
+        damping: Damping::Ratio(0.0),
+        residual: ResidualChoice::Automatic,
+        fixed_nodes: Vec::new(),
+        source: "verification".into(),
+        extent: RecordExtent::Full,
+    }
+}
