@@ -147,10 +147,7 @@ fn collect(
                     )));
                 }
                 if last.elapsed() > TIMEOUT {
-                    return Err(RenderError::Browser(format!(
-                        "the browser has drawn nothing for {} s: it may lack WebGL 2; try another with --browser",
-                        TIMEOUT.as_secs()
-                    )));
+                    return Err(RenderError::BrowserTimeout { seconds: TIMEOUT.as_secs() });
                 }
             }
         }

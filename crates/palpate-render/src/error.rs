@@ -18,7 +18,7 @@ pub enum RenderError {
     Export(#[from] ExportError),
     /// No browser was found.
     #[error(
-        "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one with --browser"
+        "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one"
     )]
     NoBrowser,
     /// A browser cannot be started.
@@ -28,6 +28,12 @@ pub enum RenderError {
         path: PathBuf,
         /// Error of the operating system, where there is one.
         reason: Option<io::Error>,
+    },
+    /// The browser drew nothing for too long.
+    #[error("the browser has drawn nothing for {seconds} s: it may lack WebGL 2; try another")]
+    BrowserTimeout {
+        /// Time that was waited [s].
+        seconds: u64,
     },
     /// The browser stopped working.
     #[error("{0}")]

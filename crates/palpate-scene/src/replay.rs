@@ -207,10 +207,10 @@ fn unpack(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Result<(Scene,
         // Only the file name is used: nothing is written outside of the folder.
         let file = name.file_name().map_or_else(|| "file".into(), |name| name.to_os_string());
         let own = folder.path().join(at.to_string());
-        let place = own.join(file);
-        let written = std::fs::create_dir(&own).and_then(|()| std::fs::write(&place, data));
-        written.map_err(|source| ReplayError::Io { action: "unpack", path: place.clone(), source })?;
-        relocated.insert(name, place);
+        let stored = own.join(file);
+        let written = std::fs::create_dir(&own).and_then(|()| std::fs::write(&stored, data));
+        written.map_err(|source| ReplayError::Io { action: "unpack", path: stored.clone(), source })?;
+        relocated.insert(name, stored);
     }
     Ok((read_relocated_scene(scene, &relocated, RunMode::RealTime)?, folder))
 }

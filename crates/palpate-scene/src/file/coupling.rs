@@ -77,7 +77,7 @@ pub(super) fn choose_default(
     let held = device.attach.as_ref().map(|attach| attach.get_ref());
     let touched = objects.iter().zip(object_names);
     let touched = touched.filter(|(_, name)| held.is_none_or(|attach| *name == attach.object.get_ref()));
-    let places = touched.filter_map(|(object, _)| {
+    let points = touched.filter_map(|(object, _)| {
         let recording = &*object.recording;
         let point = match held {
             Some(attach) => recording.surface.nearest(DVec3::from_array(attach.point.get_ref().0))?.0,
@@ -87,7 +87,7 @@ pub(super) fn choose_default(
         Some(PointResponse::new(recording, &point, parameters.patch_radius, normal))
     });
     let gives = |place: &PointResponse| place.instantaneous_compliance(step_s);
-    let Some(place) = places.min_by(|a, b| gives(a).total_cmp(&gives(b))) else { return Ok(None) };
+    let Some(place) = points.min_by(|a, b| gives(a).total_cmp(&gives(b))) else { return Ok(None) };
     let one = |hand: &Option<Hand>| ClosedLoop::new(&place, traits, *hand, timing);
     let loops: Vec<ClosedLoop> = hands.iter().map(one).collect();
     let Some(found) = default_coupling(&loops, gives(&place)) else {

@@ -121,12 +121,12 @@ fn read_mesh(
     name: &str,
     remarks: &mut Vec<String>,
 ) -> Result<ObstacleMesh, SceneError> {
-    let place = entry.file.span();
+    let span = entry.file.span();
     let path = source.stored_path(entry.file.get_ref());
     let scale = Quantity { key: "scale", unit: "", below: LARGEST };
     let scale = entry.scale.as_ref().map_or(Ok(1.0), |number| source.positive(number, scale))?;
     let mut mesh = mesh_source::read_surface(&path)
-        .or_else(|error| source.fail(place.clone(), SceneErrorKind::Mesh, "mesh", error))?;
+        .or_else(|error| source.fail(span.clone(), SceneErrorKind::Mesh, "mesh", error))?;
     mesh.positions.iter_mut().for_each(|position| *position *= scale);
     if mesh.volume() < 0.0 {
         remarks.push(format!(
@@ -136,6 +136,6 @@ fn read_mesh(
         mesh.flip_orientation();
     }
     ObstacleMesh::new(mesh.positions, mesh.triangles).or_else(|error| {
-        source.fail(place, SceneErrorKind::Mesh, "mesh", format!("{}: {error}", path.display()))
+        source.fail(span, SceneErrorKind::Mesh, "mesh", format!("{}: {error}", path.display()))
     })
 }

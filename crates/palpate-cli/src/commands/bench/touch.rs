@@ -1,6 +1,6 @@
 //! Steps with contacts: fingers on meshes of different resolution, a cube on a floor.
 
-use super::{Case, pictures, timed_step};
+use super::{Case, frames, timed_step};
 use crate::failure::Failure;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, Recording, State};
@@ -40,8 +40,8 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         fingers(recording.clone(), false);
     }
     for form in [FrameFormat::Modal, FrameFormat::Vertices] {
-        cases.push(pictures::case(recording.clone(), form, false));
-        cases.push(pictures::case(cube.clone(), form, true));
+        cases.push(frames::case(recording.clone(), form, false));
+        cases.push(frames::case(cube.clone(), form, true));
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),

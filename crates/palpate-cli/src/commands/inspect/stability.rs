@@ -55,7 +55,7 @@ struct Analysis {
     traits: DeviceSpec,
     hands: Vec<&'static str>,
     timing: LoopTiming,
-    place: DVec3,
+    position: DVec3,
     normal: DVec3,
     within_step: f64,
     at_rest: f64,
@@ -99,7 +99,7 @@ impl StabilityArguments {
                 ANY_HAND.into_iter().filter(|(_, known)| *known == Some(hand)).collect()
             }
         };
-        let point = self.place(recording, timing.step_s)?;
+        let point = self.contact_point(recording, timing.step_s)?;
         let normal = normal_at(&recording.surface, &point);
         let place = PointResponse::new(recording, &point, patch, normal);
         let one = |(_, hand): &(&str, Option<Hand>)| ClosedLoop::new(&place, traits, *hand, timing);
@@ -111,7 +111,7 @@ impl StabilityArguments {
             traits,
             hands: hands.iter().map(|(name, _)| *name).collect(),
             timing,
-            place: recording.surface.rest_position(&point),
+            position: recording.surface.rest_position(&point),
             normal,
             within_step,
             at_rest: place.static_compliance(),
@@ -122,7 +122,7 @@ impl StabilityArguments {
         })
     }
 
-    fn place(&self, recording: &Recording, step_s: f64) -> Result<SurfacePoint, Failure> {
+    fn contact_point(&self, recording: &Recording, step_s: f64) -> Result<SurfacePoint, Failure> {
         let nowhere = || Failure("the recording has no surface that can be touched".to_string());
         let Some(text) = &self.point else {
             return stiffest_point(recording, self.patch, step_s).ok_or_else(nowhere);
@@ -146,7 +146,7 @@ impl Analysis {
     fn text(&self) -> Result<String, std::fmt::Error> {
         let mut out = String::new();
         let LoopTiming { step_s, delay_updates } = self.timing;
-        let [p, n] = [self.place, self.normal].map(|v| format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z));
+        let [p, n] = [self.position, self.normal].map(|v| format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z));
         writeln!(out, "{} at {p}, pressed along {n}", self.traits.kind)?;
         writeln!(
             out,
@@ -215,7 +215,7 @@ impl Analysis {
             "hands": self.hands,
             "rate_hz": 1.0 / self.timing.step_s,
             "delay_updates": self.timing.delay_updates,
-            "point_m": self.place.to_array(),
+            "point_m": self.position.to_array(),
             "normal": self.normal.to_array(),
             "compliance_within_step_m_per_n": self.within_step,
             "compliance_at_rest_m_per_n": self.at_rest,

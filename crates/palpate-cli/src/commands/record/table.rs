@@ -138,7 +138,7 @@ pub struct TableCommand<'a> {
 impl<'a> TableCommand<'a> {
     /// Check the options that ask for a table; none if no table is wanted.
     pub fn new(arguments: &'a TableArguments, mesh: &Mesh) -> Result<Option<Self>, Failure> {
-        let Some(place) = &arguments.dense else { return Ok(None) };
+        let Some(output) = &arguments.dense else { return Ok(None) };
         let (step, duration) = (arguments.step, arguments.duration);
         if !(step > 0.0 && step <= 1.0) {
             return Err(Failure(format!("--step is {step} s, expected above 0 and at most 1")));
@@ -149,7 +149,7 @@ impl<'a> TableCommand<'a> {
                 "--duration is {duration} s, expected at least one --step of {step} s, and at most 1e8 of them"
             )));
         }
-        let location = Location::parse(place);
+        let location = Location::parse(output);
         if location.folder().is_some_and(|folder| folder.is_file()) {
             return Err(Failure(format!("cannot write {location}: it is a file, and a store is a folder")));
         }

@@ -182,9 +182,9 @@ fn watch(
                 bar.finish_and_clear();
             });
         }
-        let mut pictures = DeformationProcess::new(session.model.clone());
-        let ran = session.run(log, stop, &done, |moment| {
-            pictures.cycle(moment);
+        let mut deformation = DeformationProcess::new(session.model.clone());
+        let ran = session.run(log, stop, &done, |snapshot| {
+            deformation.cycle(snapshot);
         });
         over.store(true, Ordering::Relaxed);
         let (report, out) = ran?;
