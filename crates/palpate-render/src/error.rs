@@ -2,6 +2,7 @@
 
 use palpate_export::ExportError;
 use palpate_scene::ReplayError;
+use palpate_viewer::ServerError;
 use std::io;
 use std::path::PathBuf;
 
@@ -32,8 +33,11 @@ pub enum RenderError {
     #[error("{0}")]
     Browser(String),
     /// The viewer's server.
-    #[error("{0}")]
-    Server(String),
+    #[error(transparent)]
+    Server(#[from] ServerError),
+    /// The thread of the viewer's server panicked.
+    #[error("the server has ended by a bug")]
+    ServerPanic,
     /// There is no temporary folder for the browser.
     #[error("cannot make a folder for the browser: {0}")]
     TemporaryFolder(io::Error),

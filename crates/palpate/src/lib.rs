@@ -25,25 +25,31 @@
 #![no_std]
 extern crate alloc;
 
+mod collision;
 mod contact;
-mod deformation;
+mod device;
 mod energy;
 mod error;
+mod io;
 mod motion;
+mod object;
 mod obstacle;
 mod recording;
 mod response;
 mod scene;
+mod snapshot;
 mod spatial;
 mod state;
 mod step;
 mod surface;
 
-pub use contact::{Collider, Grasp};
-pub use deformation::{DeformationSnapshot, ResidualFieldCache};
+pub use collision::{Collider, Grasp};
+pub use device::{Coupling, DeviceParameters};
 pub use energy::EnergyLedger;
 pub use error::Error;
+pub use io::{ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, StepStatus};
 pub use motion::RigidIntegrator;
+pub use object::ObjectStart;
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     Certificate, CertificateEvent, Column, ColumnsInMemory, Damping, FORMAT_VERSION, GravityResponse,
@@ -51,13 +57,9 @@ pub use recording::{
     Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
 pub use response::{OscillatorState, ResponseForm, SampledOscillator};
-pub use scene::{
-    Coupling, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, RigidCompliance,
-};
+pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};
+pub use snapshot::{DeformationSnapshot, ResidualFieldCache};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
-pub use state::{
-    ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, ObjectSnapshot, Output, State,
-    StepStatus,
-};
+pub use state::{ObjectSnapshot, State};
 pub use step::step;
 pub use surface::{Surface, SurfacePoint};

@@ -3,7 +3,8 @@
 use crate::error::Error;
 use crate::spatial::Pose;
 use crate::surface::{
-    Bands, Bounds, Still, Surface, SurfaceTree, Visit, area_normal, at_weights, nearest_on_triangle,
+    Bands, Bounds, DeformationBound, RigidNodes, SphereTree, Surface, area_normal, at_weights,
+    nearest_on_triangle,
 };
 use alloc::format;
 use alloc::sync::Arc;
@@ -55,7 +56,7 @@ pub enum Shape {
 #[derive(Debug, Clone)]
 pub struct ObstacleMesh {
     surface: Surface,
-    tree: SurfaceTree,
+    tree: SphereTree,
     bounds: Bounds,
     /// Angle-weighted normals of the nodes.
     normals: Vec<DVec3>,
@@ -110,7 +111,7 @@ impl ObstacleMesh {
         }
         let source_nodes = (0..positions.len() as u32).collect();
         let surface = Surface { positions, triangles, source_nodes };
-        let tree = SurfaceTree::new(&surface.positions, &surface.triangles);
+        let tree = SphereTree::new(&surface.positions, &surface.triangles);
         let bounds = tree.bounds(&surface.triangles, |_, _| Bands::default(), |_| 0.0);
         let radius = surface.radius();
         let mut owners = vec![0; surface.positions.len()];
@@ -126,18 +127,18 @@ impl ObstacleMesh {
     }
 
     /// Give the triangles in spheres (centre, radius) that `near` takes, with their corners.
-    fn walk(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(u32, [DVec3; 3])) {
+    fn traverse(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(u32, [DVec3; 3])) {
         let place = |n: usize| self.surface.positions[n];
-        self.tree.walk(
-            (&self.bounds, &Visit::STILL),
-            &mut Still(&self.surface),
+        self.tree.traverse(
+            (&self.bounds, &DeformationBound::STILL),
+            &mut RigidNodes(&self.surface),
             |_, _, centre, radius| near(centre, radius),
             |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
         );
     }
 
     fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
-        self.walk(&near, |t, places| {
+        self.traverse(&near, |t, places| {
             for (node, place) in self.surface.triangles[t as usize].into_iter().zip(places) {
                 // A node belongs to one of its triangles.
                 if self.owners[node as usize] == t && near(place, 0.0) {
@@ -153,7 +154,7 @@ impl ObstacleMesh {
         }
         // However far: which side it is on counts. (least distance, nearest point, normal that tells the side).
         let best = core::cell::Cell::new((f64::INFINITY, DVec3::ZERO, DVec3::ZERO));
-        self.walk(
+        self.traverse(
             |centre, radius| (p - centre).length() - radius < best.get().0 + 1e-12,
             |t, places| {
                 let weights = nearest_on_triangle(places, p);
@@ -199,22 +200,22 @@ impl Shape {
                 from_core(DVec3::Y * p.y.clamp(-half_length, *half_length), *radius)
             }
             Self::Box { half_extents } => {
-                let beyond = p.abs() - *half_extents;
+                let half_space = p.abs() - *half_extents;
                 let sign =
                     DVec3::new(libm::copysign(1.0, p.x), libm::copysign(1.0, p.y), libm::copysign(1.0, p.z));
-                let outside = beyond.max(DVec3::ZERO);
+                let outside = half_space.max(DVec3::ZERO);
                 let distance = outside.length();
                 if distance > 0.0 {
                     (distance, outside / distance * sign)
                 } else {
-                    let axis = if beyond.x >= beyond.y && beyond.x >= beyond.z {
+                    let axis = if half_space.x >= half_space.y && half_space.x >= half_space.z {
                         DVec3::X
-                    } else if beyond.y >= beyond.z {
+                    } else if half_space.y >= half_space.z {
                         DVec3::Y
                     } else {
                         DVec3::Z
                     };
-                    (beyond.dot(axis), axis * sign)
+                    (half_space.dot(axis), axis * sign)
                 }
             }
             Self::Mesh(mesh) => return mesh.signed_distance(p, most),
@@ -252,7 +253,7 @@ impl Shape {
         Some(weights)
     }
 
-    /// Visit the corners of the shape that spheres (centre, radius) hold, where `near` takes these; all in the shape's
+    /// DeformationBound the corners of the shape that spheres (centre, radius) hold, where `near` takes these; all in the shape's
     /// frame.
     ///
     /// # Real time

@@ -30,14 +30,14 @@ impl Pose {
         self.orientation.inverse() * (point_in_world - self.position)
     }
 
-    /// What takes points of this frame to another: quicker for many points than by way of the world.
+    /// Map from this frame to another; cheaper for many points than by way of the world.
     pub(crate) fn seen_from(&self, other: &Self) -> DAffine3 {
         let rotation = DMat3::from_quat(other.orientation.inverse() * self.orientation);
         DAffine3::from_mat3_translation(rotation, other.body_from_world(self.position))
     }
 
-    /// How far a point at the end of an arm [m] can go on the way to another pose, at most [m].
-    pub(crate) fn way(&self, to: &Self, arm: f64) -> f64 {
+    /// Upper bound of the motion of a point at the end of an arm [m] between this pose and another [m].
+    pub(crate) fn motion_bound(&self, to: &Self, arm: f64) -> f64 {
         (to.position - self.position).length() + self.orientation.angle_between(to.orientation) * arm
     }
 }

@@ -173,7 +173,7 @@ fn open(service: &Service) -> Hand {
 /// Push until the service has the force.
 fn push(hand: &mut Hand, service: &Service, force: DVec3, theirs: [f64; 3]) {
     until("the force arrives", || {
-        hand.push(force).expect("it pushes");
+        hand.set_force(force).expect("it pushes");
         service.force() == theirs
     });
 }
@@ -184,7 +184,7 @@ fn what_is_there_is_told() {
     let found = Driver::Haply.find(Some(&service.place())).expect("a device");
     assert_eq!(found.iter().map(ToString::to_string).collect::<Vec<_>>(), ["0: inverse3 (049D)"]);
     let device = Driver::Haply.open("049D", Some(&service.address.to_string())).expect("by its name").1;
-    assert_eq!((device.traits().kind, device.traits().force_n), ("haply", 10.0));
+    assert_eq!((device.spec().kind, device.spec().force_n), ("haply", 10.0));
     drop(device);
     service.set(|world| world.basis = "XZY");
     let turned = Driver::Haply.open("0", Some(&service.place())).err().expect("other axes").to_string();

@@ -71,8 +71,8 @@ impl Hand {
         next.expect("it was waited for")
     }
 
-    pub fn push(&mut self, force: DVec3) -> Result<(), String> {
-        self.device.push(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    pub fn set_force(&mut self, force: DVec3) -> Result<(), String> {
+        self.device.set_force(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
     }
 }
 

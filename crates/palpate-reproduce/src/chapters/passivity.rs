@@ -14,11 +14,10 @@ use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::page::{Section, figure, paragraph, table};
 use crate::progress::StageProgress;
-use faer::Mat;
 use glam::DVec3;
 use palpate::{Damping, OscillatorState, SampledOscillator};
-use palpate_fem::record::Recorded;
-use palpate_fem::reference::{LoadedMode, Reference};
+use palpate_fem::reference::LoadedMode;
+use palpate_fem::{RecordedBody, SilentProgress};
 use std::f64::consts::TAU;
 
 /// The paper's step, and its window of 1 s.
@@ -73,17 +72,17 @@ impl Port {
 }
 
 /// The port of one node and direction: the kept modes and what stands for the others.
-fn port(body: &Recorded, node: usize, axis: usize, damping: Damping) -> Result<Port, ReproduceError> {
+fn port(body: &RecordedBody, node: usize, axis: usize, damping: Damping) -> Result<Port, ReproduceError> {
     let failed = |e: &dyn std::fmt::Display| ReproduceError::Measurement(format!("passivity: {e}"));
-    let mut loads = Mat::zeros(body.system.discretisation.dofs(), 3);
-    (0..3).for_each(|a| loads[(3 * node + a, a)] = 1.0);
-    let mut silent = palpate_fem::progress::Silent;
-    let reference = Reference::new(&body.system, &body.modes, loads, STEP_S, BLOCKS, &mut silent)
+    let unreduced = body.unreduced();
+    let truncated = unreduced
+        .truncated_response(&[node], STEP_S, BLOCKS, &mut SilentProgress)
+        .and_then(|response| response.modes(0, BLOCKS))
         .map_err(|e| failed(&e))?;
-    let left_out = reference.left_out(&body.system, 0, BLOCKS).map_err(|e| failed(&e))?;
-    let kept = body.modes.squares.iter().enumerate();
-    let kept = kept.map(|(i, &square)| (square, body.modes.shapes[(3 * node + axis, i)]));
-    let others = left_out.iter().map(|LoadedMode { square, gain }| (*square, gain[axis]));
+    let modes = unreduced.kept_modes();
+    let kept = modes.squared_frequencies().iter().enumerate();
+    let kept = kept.map(|(i, &square)| (square, modes.shape(i)[3 * node + axis]));
+    let others = truncated.iter().map(|LoadedMode { square, gain }| (*square, gain[axis]));
     let mode = |(square, gain): (f64, f64)| (square, gain * gain, damping.ratio(square.sqrt()));
     Ok(Port(kept.chain(others).map(mode).collect()))
 }
@@ -163,11 +162,11 @@ impl Tested {
 }
 
 /// The test over single modes, and over the middle of the top face.
-pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
+pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     progress.begin("passivity", 1);
     let light = Damping::Rayleigh { alpha: 2.0, beta: 0.0 };
     let usual = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
-    let node = body.system.discretisation.node_at(DVec3::new(0.0, 0.05, 0.0));
+    let node = body.nearest_node(DVec3::new(0.0, 0.05, 0.0));
     let whole = port(body, node, 1, light)?;
     let of_modes = recipes(|hertz| single(hertz, light), &single(11.65, usual));
     let of_cube = recipes(|_| whole.clone(), &whole);

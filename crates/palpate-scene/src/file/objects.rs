@@ -6,7 +6,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::recording_file::read_recording;
 use glam::{DQuat, DVec3};
 use palpate::{ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
-use palpate_fem::certificate::DOUBTFUL;
+use palpate_fem::FORCE_ERROR_WARNING;
 use palpate_store::{Location, TableStore};
 use std::sync::Arc;
 
@@ -110,7 +110,7 @@ pub(super) fn doubtful_recordings<'a>(
     objects.iter().zip(names).filter_map(move |(object, name)| {
         let certificate = object.recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
-        (error > DOUBTFUL).then(|| {
+        (error > FORCE_ERROR_WARNING).then(|| {
             format!(
                 "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
                  recording): record it with more modes",

@@ -13,7 +13,7 @@ use crate::recording_file::read_recording;
 use crate::scene::{Scene, SceneDevice};
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube};
 use palpate::{Coupling, Damping, Material};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -316,7 +316,7 @@ impl SceneLibrary {
             source: source.display().to_string(),
             scale,
             material,
-            order: Order::Quadratic,
+            order: ElementOrder::Quadratic,
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
         };

@@ -8,8 +8,7 @@ use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
     Recording, State, Twist, step,
 };
-use palpate_fem::record::RecordParameters;
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::{RecordParameters, ResidualChoice};
 use palpate_testkit::{paper_cube_mesh, paper_cube_parameters, recorded, smoothstep};
 use std::sync::Arc;
 

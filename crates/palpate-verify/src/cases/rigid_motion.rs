@@ -7,14 +7,14 @@ use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Pose, Recording, State, Twist, inertia_in_world, step,
 };
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{Random, recorded, undamped};
 use std::sync::Arc;
 
 /// A brick with three different principal inertias.
 fn brick() -> Result<Arc<Recording>, VerifyError> {
-    let parameters = undamped(5e4, 0.3, 1000.0, Order::Quadratic, 30);
+    let parameters = undamped(5e4, 0.3, 1000.0, ElementOrder::Quadratic, 30);
     Ok(Arc::new(recorded(box_mesh([0.2, 0.12, 0.06], [3, 2, 2])?, &parameters)?.recording))
 }
 

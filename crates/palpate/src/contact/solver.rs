@@ -1,262 +1,257 @@
-//! The forces of all contacts that depend on one another: held points, touches, obstacles, pairs.
+//! Solver of the contact problem: held points, tips, obstacles and pairs together, island by island.
 //!
-//! With W [m/N] the Delassus operator (displacement at the end of the step per held force, from modes, residual
-//! compliance, rigid motion and virtual couplings), the sides of contact c end up apart by
+//! With W [m/N] the Delassus operator (see `problem`), the sides of contact c end up apart by
 //!
 //! ```text
-//! apart_c = free_c − Σ_d W_cd·f_d
+//! apart_c = b_c − Σ_d W_cd·f_d
 //! ```
 //!
-//! Sweeps over the contacts solve each one's law with the others' forces as they are (block Gauss-Seidel, see
-//! `cone`); the held points of an object are one block, solved by Cholesky's factors. W is not formed: every object
-//! keeps C between its points, and its rigid motion is carried along. Between sweeps everything is evaluated anew
-//! with the rotation that the forces cause, so that what is solved in the end are the equations of motion
-//! themselves and not their linear part.
+//! Projected block Gauss-Seidel: a sweep solves each contact's law with the other forces as they are (see `coulomb`); the
+//! held points of an island are one block, solved by Cholesky factors. Sweeps are accelerated by conjugate gradients.
+//! Between sweeps everything is evaluated exactly with the rotation that the forces cause, so that in the end the equations
+//! of motion are met, not their linearisation.
 
-use super::parts::{ROUND_OFF, larger};
-use super::{Contact, HeldSystem, Law, Other, Parts};
-use crate::state::StepStatus;
-use alloc::vec;
+use super::bilateral::BilateralSystem;
+use super::conjugate_gradients::ConjugateGradients;
+use super::islands::Islands;
+use super::problem::{ContactProblem, ROUND_OFF, larger};
+use crate::collision::{ContactLaw, OtherSide};
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// The equations of motion are met by repeating sweeps with the rotation of the last time, which gains a factor of
-/// about h·|ω| + strain each time; this many reach round-off for any motion a hand can make.
+/// Upper limit of exact evaluations: each reduces the residual of the rotation by a factor of about h·|ω| + strain.
 const MAX_ITERATIONS: u32 = 40;
 
-/// And this many reach it from where contacts are loose.
-const LAST_EVALUATIONS: u32 = 6;
+/// Upper limit of evaluations that end a step, from where contacts are loose.
+const MAX_FINAL_EVALUATIONS: u32 = 6;
 
-/// Sweeps over all evaluations together: far more than contacts that can be solved need.
+/// Upper limit of sweeps over all evaluations together.
 const MAX_SWEEPS: u32 = 300;
 
-/// A miss above this share of the reach is no solution: a hand or a body moves too far in a step.
+/// Residual beyond which held points count as unsolved, as a share of the reach.
 const UNSOLVED: f64 = 1e-9;
 
-/// Few contacts are solved to round-off. Many need not be better than [`CLOSE`], after so many visits than [`LOOSE`], and
-/// after very many than [`ROUGH`], as shares of the object's size: a face at rest on the floor is close at once, one that
-/// hits it gets loose, and two faces that hit each other, whose contacts repeat one another, are left rough.
+/// Islands of at most so many contacts are solved to round-off. Larger ones have a tolerance that grows with the number of
+/// contact visits [1]: [`CLOSE`], then [`LOOSE`], then [`ROUGH`], as shares of the object's size.
 const FEW: usize = 24;
 const VISITS: u32 = 600;
-/// The same where fewer places stand for many nodes, which is not more exact than [`LOOSE`] is.
-const HASTY_VISITS: u32 = 60;
+/// Visits after which a scene with contact samples, which are no more exact than that, is solved to [`LOOSE`].
+const VISITS_WITH_SAMPLES: u32 = 60;
 const MANY_VISITS: u32 = 20_000;
-const MOST_VISITS: u32 = 40_000;
+const MAX_VISITS: u32 = 40_000;
 const CLOSE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
 const ROUGH: f64 = 1e-4;
 
-/// A body that an evaluation turns by more than this [rad] answers its contacts differently.
-const TURNED: f64 = 0.01;
+/// Rotation within an evaluation [rad] from which contacts are linearised again.
+const RELINEARISE: f64 = 0.01;
 
-/// A body that turns by more than this [rad, Cayley] under the forces of a step has lost its solution.
-const WHIRL: f64 = 4.0;
+/// Rotation over a step [rad, Cayley vector] that counts as divergence.
+const DIVERGENCE: f64 = 4.0;
 
-/// Contacts that can't be met whole are met in part: with forces from so many sweeps that turn a body by at most this
-/// [rad] and deform it by this share of its radius; so many shares of them are tried, with so many evaluations each.
-const PART: f64 = 0.3;
-const PART_SWEEPS: u32 = 20;
-const PARTS: u32 = 4;
-const PART_EVALUATIONS: u32 = 20;
+/// Scaled fallback: forces after so many sweeps, scaled to rotate a body by at most this [rad] and deform it by this share of
+/// its radius; so many scales are tried, with so many evaluations each.
+const FALLBACK_CHANGE: f64 = 0.3;
+const FALLBACK_SWEEPS: u32 = 20;
+const FALLBACK_SCALES: u32 = 4;
+const FALLBACK_EVALUATIONS: u32 = 20;
 
-/// Buffers of the solver.
+/// Result of a solve, over all islands.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SolverReport {
+    /// Largest residual of a contact's law [m].
+    pub(crate) residual_m: f64,
+    /// Largest number of exact evaluations.
+    pub(crate) iterations: u32,
+    /// Held directions that depend on others.
+    pub(crate) dependent_rows: u32,
+    /// Islands whose contacts were not solved.
+    pub(crate) unsolved_islands: u32,
+}
+
+/// Solver with its buffers, made once.
 #[derive(Debug, Clone)]
 pub(crate) struct Solver {
-    /// After so many visits contacts need not be better than [`LOOSE`].
-    patience: u32,
-    system: HeldSystem,
+    /// Contact visits after which the tolerance is [`LOOSE`].
+    visits_until_loose: u32,
+    islands: Islands,
+    gradients: ConjugateGradients,
+    system: BilateralSystem,
     held: Vec<u32>,
-    /// Which group of objects each belongs to.
-    group: Vec<u32>,
-    /// Objects and contacts of the group that is being solved.
+    /// Objects and contacts of the island that is being solved.
     bodies: Vec<u32>,
     members: Vec<u32>,
 }
 
 impl Solver {
-    /// `thinned` says whether few places may stand for many nodes.
-    pub(crate) fn new(objects: usize, devices: usize, contacts: usize, thinned: bool) -> Self {
+    /// Solver for so many objects, devices and contacts; `uses_samples` says whether contact samples stand for nodes.
+    pub(crate) fn new(objects: usize, devices: usize, contacts: usize, uses_samples: bool) -> Self {
         Self {
-            patience: if thinned { HASTY_VISITS } else { VISITS },
-            system: HeldSystem::new(devices),
+            visits_until_loose: if uses_samples { VISITS_WITH_SAMPLES } else { VISITS },
+            islands: Islands::new(objects),
+            gradients: ConjugateGradients::new(objects),
+            system: BilateralSystem::new(devices),
             held: Vec::with_capacity(devices),
-            group: vec![0; objects],
             bodies: Vec::with_capacity(objects),
             members: Vec::with_capacity(contacts),
         }
     }
 
-    /// Find all forces. Contacts that can't be solved are met in part, if that is sound; if not, or where points are only
-    /// held, their objects move freely for the step.
+    /// Solve for all forces. An island that can't be solved gets a scaled solution, if that is sound; if not, or where points
+    /// are only held, its objects move freely for the step.
     ///
     /// # Real time
     /// Costs sweeps × contacts × contact points of an object.
-    pub(crate) fn solve(&mut self, parts: &mut Parts, status: &mut StepStatus) {
-        self.group_objects(parts);
-        parts.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
-        for first in 0..self.group.len() {
-            let Self { group, bodies, members, .. } = self;
-            if group[first] as usize != first {
+    pub(crate) fn solve(&mut self, problem: &mut ContactProblem) -> SolverReport {
+        let mut report = SolverReport::default();
+        self.islands.find(problem.contacts, problem.devices);
+        problem.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
+        for root in 0..problem.objects.len() {
+            if !self.islands.is_root(root) {
                 continue;
             }
-            bodies.clear();
-            bodies.extend((first as u32..group.len() as u32).filter(|&o| group[o as usize] == first as u32));
-            members.clear();
-            let mine = |c: &u32| group[parts.contacts[*c as usize].object] as usize == first;
-            members.extend((0..parts.contacts.len() as u32).filter(mine));
-            if members.is_empty() {
-                let own = &mut parts.objects[first];
+            self.islands.members(root, problem.contacts, &mut self.bodies, &mut self.members);
+            if self.members.is_empty() {
+                let own = &mut problem.states[root];
                 own.end = own.free;
             } else {
-                self.solve_group(parts, status);
+                self.solve_island(problem, &mut report);
             }
         }
-        parts.sum_on_devices();
+        problem.sum_on_devices();
+        report
     }
 
-    /// Objects that touch each other, or that one elastic coupling pulls at, are solved together.
-    fn group_objects(&mut self, parts: &Parts) {
-        let group = &mut self.group;
-        for (at, of) in group.iter_mut().enumerate() {
-            *of = at as u32;
-        }
-        let join = |group: &mut Vec<u32>, a: usize, b: usize| {
-            let (a, b) = (group[a], group[b]);
-            group.iter_mut().filter(|of| **of == a.max(b)).for_each(|of| *of = a.min(b));
-        };
-        for (at, contact) in parts.contacts.iter().enumerate() {
-            match contact.other {
-                Other::Object { number, .. } => join(group, contact.object, number),
-                Other::Device(device) if parts.devices[device].compliance > 0.0 => {
-                    let same = |c: &&Contact| c.other == contact.other;
-                    if let Some(earlier) = parts.contacts[..at].iter().find(same) {
-                        join(group, contact.object, earlier.object);
-                    }
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn solve_group(&mut self, parts: &mut Parts, status: &mut StepStatus) {
-        let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
-        let many = self.members.len() > FEW;
+    /// Start all objects of the island from their motion without contact force.
+    fn start(&mut self, problem: &mut ContactProblem) {
         for at in self.bodies.iter().map(|&at| at as usize) {
-            let radius = parts.model.objects[at].radius;
-            parts.objects[at].points.least_move = if many { 0.03 * CLOSE * radius } else { 0.0 };
-            parts.start(at);
-            reach = reach.max(parts.objects[at].reach(&parts.model.objects[at]));
-            size = size.min(radius);
+            problem.start(at);
+            self.gradients.start_object(at);
         }
-        self.linearise(parts);
-        for &member in &self.members {
-            if parts.contacts[member as usize].law != Law::Held {
-                parts.drop_noise(member as usize, self.accuracy(0, size));
-            }
-            let contact = parts.contacts[member as usize];
-            parts.apply(contact.object, contact.slot, contact.other, contact.force);
-        }
-        let dependent = self.factorise_held(parts);
-        status.dependent_rows += dependent as u32;
+    }
 
-        let touching = self.members.iter().any(|&c| parts.contacts[c as usize].law != Law::Held);
-        let tight = ROUND_OFF * reach;
-        let (mut least, mut first_miss) = (f64::INFINITY, f64::INFINITY);
+    fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
+        let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
+        let is_large = self.members.len() > FEW;
+        for at in self.bodies.iter().map(|&at| at as usize) {
+            let radius = problem.objects[at].radius;
+            problem.states[at].points.least_move = if is_large { 0.03 * CLOSE * radius } else { 0.0 };
+        }
+        self.start(problem);
+        for at in self.bodies.iter().map(|&at| at as usize) {
+            reach = reach.max(problem.states[at].reach(&problem.objects[at]));
+            size = size.min(problem.objects[at].radius);
+        }
+        self.linearise(problem);
+        for at in self.members.iter().map(|&member| member as usize) {
+            if !problem.contacts[at].is_held() {
+                problem.drop_warm_start_noise(at, self.tolerance(0, size));
+            }
+            let contact = problem.contacts[at];
+            problem.apply(&contact, contact.force);
+        }
+        let dependent = self.factorise_held(problem);
+        report.dependent_rows += dependent as u32;
+
+        let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
+        let round_off = ROUND_OFF * reach;
+        let (mut least, mut first_residual) = (f64::INFINITY, f64::INFINITY);
         let (mut iterations, mut visits, mut sweeps) = (0, 0, 0);
-        let mut rough = false;
-        let solved = loop {
-            let turned = self.evaluate(parts);
-            if turned > TURNED * size {
-                self.linearise(parts);
+        let mut is_rough = false;
+        let is_solved = loop {
+            let rotation = self.evaluate(problem);
+            if rotation > RELINEARISE * size {
+                self.linearise(problem);
             }
             iterations += 1;
-            let miss = larger(turned, self.sweep(parts, 0.1 * self.accuracy(visits, size).min(LOOSE * size)));
+            let enough = 0.1 * self.tolerance(visits, size).min(LOOSE * size);
+            let residual = larger(rotation, self.sweep(problem, enough));
             visits += self.members.len() as u32;
             if iterations == 1 {
-                first_miss = miss;
+                first_residual = residual;
             }
-            // Done at round-off, or near it when no more digits are gained, or as near as contacts need.
-            let stalled = miss > 0.5 * least && miss < 1e3 * tight;
-            let enough = touching && miss < self.accuracy(visits, size);
-            let worn = sweeps >= MAX_SWEEPS || visits >= MOST_VISITS;
-            let hopeless = touching && (worn || self.whirls(parts));
-            let spent = iterations == MAX_ITERATIONS || hopeless;
-            if miss <= tight || stalled || enough || spent || !miss.is_finite() {
-                status.iterations = status.iterations.max(iterations);
-                // Points that repeat others can't be met where their hands differ, and need not be.
-                let loose = self.accuracy(visits, size).max(LOOSE * size);
-                let allowed = if touching { loose } else { UNSOLVED * reach };
-                if miss <= allowed || dependent > 0 && miss <= first_miss {
-                    status.solver_residual_m = status.solver_residual_m.max(miss);
-                    // Rough is better than nothing, but not solved.
-                    rough = touching && (loose > LOOSE * size || miss > LOOSE * size);
+            // Converged: to round-off, or near it without further gain, or to the tolerance.
+            let stalls = residual > 0.5 * least && residual < 1e3 * round_off;
+            let is_within = touches && residual < self.tolerance(visits, size);
+            let is_exhausted = sweeps >= MAX_SWEEPS || visits >= MAX_VISITS;
+            let gives_up = touches && (is_exhausted || self.diverges(problem));
+            let is_last = iterations == MAX_ITERATIONS || gives_up;
+            if residual <= round_off || stalls || is_within || is_last || !residual.is_finite() {
+                report.iterations = report.iterations.max(iterations);
+                // Dependent held points can't be met where their devices differ, and need not be.
+                let loosest = self.tolerance(visits, size).max(LOOSE * size);
+                let allowed = if touches { loosest } else { UNSOLVED * reach };
+                if residual <= allowed || dependent > 0 && residual <= first_residual {
+                    report.residual_m = report.residual_m.max(residual);
+                    // A rough solution is used, and reported as unsolved.
+                    is_rough = touches && (loosest > LOOSE * size || residual > LOOSE * size);
                     break true;
                 }
-                status.solver_residual_m =
-                    status.solver_residual_m.max(if miss.is_finite() { miss } else { reach });
+                let finite = if residual.is_finite() { residual } else { reach };
+                report.residual_m = report.residual_m.max(finite);
                 break false;
             }
-            least = least.min(miss);
-            let goal = tight.max(0.02 * miss);
-            let mut last = 0.0;
-            // Held points alone are solved by the one sweep.
-            while touching && sweeps < MAX_SWEEPS && visits < MOST_VISITS {
+            least = least.min(residual);
+            let goal = round_off.max(0.02 * residual);
+            self.gradients.restart();
+            // Held points alone are solved by one sweep.
+            while touches && sweeps < MAX_SWEEPS && visits < MAX_VISITS {
                 sweeps += 1;
-                parts.remember(&self.bodies, &self.members);
-                let moved = self.sweep(parts, 0.1 * goal);
-                last = parts.accelerate(&self.bodies, &self.members, last);
+                self.gradients.remember(problem, &self.bodies, &self.members);
+                let moved = self.sweep(problem, 0.1 * goal);
+                self.gradients.accelerate(problem, &self.bodies, &self.members);
                 visits += self.members.len() as u32;
-                if moved <= goal.max(0.3 * self.accuracy(visits, size)) || !moved.is_finite() {
+                if moved <= goal.max(0.3 * self.tolerance(visits, size)) || !moved.is_finite() {
                     break;
                 }
             }
         };
-        if solved {
-            parts.drop_traces(&self.members);
+        if is_solved {
+            problem.project_forces(&self.members);
         } else {
-            status.unsolved_islands += 1;
-            if !(touching && self.solve_in_part(parts, tight)) {
-                parts.let_go(&self.bodies, &self.members);
+            report.unsolved_islands += 1;
+            if !(touches && self.solve_scaled(problem, round_off)) {
+                problem.release_forces(&self.bodies, &self.members);
             }
         }
-        // Contacts may be loose, the equations of motion under their forces not: energy counts on them.
-        (0..LAST_EVALUATIONS).any(|_| self.evaluate(parts) <= tight);
+        // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
+        (0..MAX_FINAL_EVALUATIONS).any(|_| self.evaluate(problem) <= round_off);
         for &object in &self.bodies {
-            parts.finish(object as usize);
+            problem.finish(object as usize);
         }
-        parts.end(&self.members);
-        // What the last sweep has moved comes on top of the miss that it saw.
-        rough |= solved && touching && parts.pushing_apart(&self.members) > 1.9 * LOOSE * size;
-        status.unsolved_islands += u32::from(rough);
+        problem.write_ends(&self.members);
+        // The last sweep's movement adds to the residual that it saw.
+        is_rough |= is_solved && touches && problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
+        report.unsolved_islands += u32::from(is_rough);
     }
 
-    /// Whether forces turn a body so far that nothing linear about it is of use.
-    fn whirls(&self, parts: &Parts) -> bool {
-        self.bodies.iter().any(|&at| parts.objects[at as usize].end.turn.length() > WHIRL)
+    /// Whether forces rotate a body so far that its linearisation is of no use.
+    fn diverges(&self, problem: &ContactProblem) -> bool {
+        self.bodies.iter().any(|&at| problem.states[at as usize].end.turn.length() > DIVERGENCE)
     }
 
-    /// What can't be met is met in part: the forces that linear terms about the free motion give, scaled down until the
-    /// equations of motion hold under them and contacts give no energy. Says whether such forces were found.
-    fn solve_in_part(&mut self, parts: &mut Parts, tight: f64) -> bool {
-        parts.let_go(&self.bodies, &self.members);
-        self.bodies.iter().for_each(|&at| parts.start(at as usize));
-        self.linearise(parts);
-        let mut last = 0.0;
-        for _ in 0..PART_SWEEPS {
-            parts.remember(&self.bodies, &self.members);
-            let moved = self.sweep(parts, 0.0);
-            last = parts.accelerate(&self.bodies, &self.members, last);
-            if moved <= tight {
+    /// Scaled fallback solution: the forces that the linearisation about the free motion gives, scaled down until the
+    /// equations of motion hold and contacts give no energy. Says whether such forces were found.
+    fn solve_scaled(&mut self, problem: &mut ContactProblem, round_off: f64) -> bool {
+        problem.release_forces(&self.bodies, &self.members);
+        self.start(problem);
+        self.linearise(problem);
+        self.gradients.restart();
+        for _ in 0..FALLBACK_SWEEPS {
+            self.gradients.remember(problem, &self.bodies, &self.members);
+            let moved = self.sweep(problem, 0.0);
+            self.gradients.accelerate(problem, &self.bodies, &self.members);
+            if moved <= round_off {
                 break;
             }
         }
-        let largest = self.bodies.iter().map(|&at| parts.change(at as usize)).fold(0.0, larger);
-        let mut share = (PART / largest).min(0.5);
-        for _ in 0..PARTS {
-            self.bodies.iter().for_each(|&at| parts.start(at as usize));
-            parts.scale_forces(&self.members, share);
-            let met = (0..PART_EVALUATIONS).any(|_| self.evaluate(parts) <= tight);
-            if met && parts.end(&self.members) >= 0.0 {
+        let largest = self.bodies.iter().map(|&at| problem.change(at as usize)).fold(0.0, larger);
+        let mut share = (FALLBACK_CHANGE / largest).min(0.5);
+        for _ in 0..FALLBACK_SCALES {
+            self.start(problem);
+            problem.scale_forces(&self.members, share);
+            let is_met = (0..FALLBACK_EVALUATIONS).any(|_| self.evaluate(problem) <= round_off);
+            if is_met && problem.write_ends(&self.members) >= 0.0 {
                 return true;
             }
             share = 0.25;
@@ -264,64 +259,64 @@ impl Solver {
         false
     }
 
-    /// A miss [m] that is small enough after so many visits.
-    fn accuracy(&self, visits: u32, size: f64) -> f64 {
-        let few = self.members.len() <= FEW;
+    /// Tolerance [m] after so many contact visits.
+    fn tolerance(&self, visits: u32, size: f64) -> f64 {
+        let is_small = self.members.len() <= FEW;
         size * match visits {
-            visits if visits > MANY_VISITS && !few => ROUGH,
-            visits if visits > self.patience => LOOSE,
-            _ if few => 0.0,
+            visits if visits > MANY_VISITS && !is_small => ROUGH,
+            visits if visits > self.visits_until_loose => LOOSE,
+            _ if is_small => 0.0,
             _ => CLOSE,
         }
     }
 
-    /// Everything under the present forces, with the rotation of the last time. Gives how far that is off [m].
-    fn evaluate(&self, parts: &mut Parts) -> f64 {
-        self.bodies.iter().map(|&object| parts.evaluate(object as usize)).fold(0.0, larger)
+    /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].
+    fn evaluate(&self, problem: &mut ContactProblem) -> f64 {
+        self.bodies.iter().map(|&object| problem.evaluate(object as usize)).fold(0.0, larger)
     }
 
-    /// The contacts' own W about the last evaluation.
-    fn linearise(&self, parts: &mut Parts) {
-        for &member in &self.members {
-            if parts.contacts[member as usize].law != Law::Held {
-                parts.linearise(member as usize);
+    /// Linearise all unilateral contacts about the last evaluation.
+    fn linearise(&self, problem: &mut ContactProblem) {
+        for at in self.members.iter().map(|&member| member as usize) {
+            if !problem.contacts[at].is_held() {
+                problem.linearise(at);
             }
         }
     }
 
-    /// Factors of the held points' W, object by object. Gives the number of dependent rows.
-    fn factorise_held(&mut self, parts: &Parts) -> usize {
+    /// Factorise the W of the held points. Gives the number of dependent rows.
+    fn factorise_held(&mut self, problem: &ContactProblem) -> usize {
         self.held.clear();
-        let is_held = |c: &&u32| parts.contacts[**c as usize].law == Law::Held;
+        let is_held = |c: &&u32| problem.contacts[**c as usize].is_held();
         self.held.extend(self.members.iter().filter(is_held));
         let Self { system, held, .. } = self;
         system.factorise(held.len(), |a, b| {
-            let (a, b) = (&parts.contacts[held[a] as usize], &parts.contacts[held[b] as usize]);
+            let (a, b) = (&problem.contacts[held[a] as usize], &problem.contacts[held[b] as usize]);
             let mut w = DMat3::ZERO;
-            if a.object == b.object {
-                w += parts.compliance(a.object, a.slot, b.slot);
+            if a.object() == b.object() {
+                w += problem.compliance(a.object(), a.slot, b.slot);
             }
-            if let (true, Other::Device(device)) = (a.other == b.other, a.other) {
-                w += DMat3::from_diagonal(DVec3::splat(parts.devices[device].compliance));
+            if let (true, OtherSide::Device(device)) = (a.other == b.other, a.other) {
+                w += DMat3::from_diagonal(DVec3::splat(problem.devices[device].compliance));
             }
             w
         })
     }
 
-    /// Solve every contact once with the others as they are, where that moves its sides by more than `enough` [m].
-    /// Gives the largest movement [m].
-    fn sweep(&mut self, parts: &mut Parts, enough: f64) -> f64 {
+    /// Gauss-Seidel sweep: solve every contact once, where that moves its sides by more than `enough` [m]. Gives the
+    /// largest movement [m].
+    fn sweep(&mut self, problem: &mut ContactProblem, enough: f64) -> f64 {
         let mut largest = 0.0_f64;
         let Self { system, held, members, .. } = self;
         if !held.is_empty() {
-            largest = system.solve(|point| parts.apart(&parts.contacts[held[point] as usize]));
+            largest = system.solve(|point| problem.apart(&problem.contacts[held[point] as usize]));
             for (at, &contact) in held.iter().enumerate() {
-                parts.add_force(contact as usize, system.force(at));
+                problem.add_force(contact as usize, system.force(at));
             }
         }
         for at in members.iter().map(|&at| at as usize) {
-            let Law::Touch { friction } = parts.contacts[at].law else { continue };
-            let moved = parts.solve_touch(at, friction, enough);
+            let ContactLaw::Unilateral { friction } = problem.contacts[at].law else { continue };
+            let moved = problem.solve_unilateral(at, friction, enough);
             largest = larger(largest, moved);
         }
         largest

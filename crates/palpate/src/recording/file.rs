@@ -1,7 +1,7 @@
 //! The recording file `*.palp`: a safetensors container.
 //!
 //! Little-endian tensors with names, and one metadata entry `palpate`: JSON of [`Metadata`] and
-//! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). Reading
+//! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). Footprint
 //! checks the hash, then every length, index and number, and allocates no more than the file's size.
 
 use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};

@@ -136,7 +136,7 @@ impl Recording {
             return fail(format!("{} source nodes for {nodes} nodes", self.surface.source_nodes.len()));
         }
         if let Some(t) = self.surface.triangles.iter().position(|t| t.iter().any(|&n| n as usize >= nodes)) {
-            return fail(format!("triangle {t} names a node beyond the surface's {nodes} nodes"));
+            return fail(format!("triangle {t} names a node half_space the surface's {nodes} nodes"));
         }
         if self.modes.damping_ratios.len() != modes {
             return fail(format!("{} damping ratios for {modes} modes", self.modes.damping_ratios.len()));

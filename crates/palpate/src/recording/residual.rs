@@ -30,7 +30,7 @@ pub struct NearField {
     pub radius: f64,
     /// For each node, where its blocks start; length nodes + 1.
     pub offsets: Vec<u32>,
-    /// Other node of each block, ascending within a row.
+    /// ContactCollider node of each block, ascending within a row.
     pub nodes: Vec<u32>,
     /// Nine numbers per block [m/N], row by row.
     pub blocks: Vec<f32>,

@@ -1,10 +1,11 @@
 //! A body as contacts see it: its recording, how displacement is read on it, and the tree over its surface.
 
-use super::dot::{dot3, dot3_single};
+use super::dot_products::{dot3, dot3_single};
 use super::patch_field::{ModalDistances, PatchField, residual_size};
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, Surface, SurfacePoint, SurfaceTree, Visit, band, thinned, triangles_around,
+    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, poisson_disk_sample,
+    triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -19,7 +20,7 @@ const OVERLAP: f64 = 1.5;
 
 /// How displacement is read, and force spread, at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Reading {
+pub(crate) enum Footprint {
     /// At the point itself, by the weights of its triangle.
     #[default]
     Point,
@@ -29,14 +30,14 @@ pub(crate) enum Reading {
 
 /// Where a force can act on a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct ContactLocation {
     pub(crate) point: SurfacePoint,
-    pub(crate) reading: Reading,
+    pub(crate) footprint: Footprint,
 }
 
 /// What is known of a place at the start of a step [m, body].
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Placed {
+pub(crate) struct LocationState {
     /// Elastic displacement.
     pub(crate) displacement: DVec3,
     /// The part of it that the residual compliance and the weight cause.
@@ -47,8 +48,8 @@ pub(crate) struct Placed {
 
 /// A force that acted over the last step.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Acting {
-    pub(crate) place: Place,
+pub(crate) struct AppliedForce {
+    pub(crate) location: ContactLocation,
     /// [N, body]
     pub(crate) force: DVec3,
     /// Where at rest [m, body].
@@ -64,7 +65,7 @@ pub(crate) struct Body {
     /// Those of devices, then those that stand for the nodes of faces in contact, finest first (see `contact::against`).
     pub(crate) patches: Vec<PatchField>,
     devices: usize,
-    tree: SurfaceTree,
+    tree: SphereTree,
     bounds: Bounds,
     /// Mean edge of the triangles at rest [m].
     pub(crate) edge: f64,
@@ -79,7 +80,7 @@ pub(crate) struct Body {
 impl Body {
     /// With patches of the given radii [m], and faces that meet something at so many places at most.
     pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], max_contact_samples: usize) -> Self {
-        let tree = SurfaceTree::new(&recording.surface.positions, &recording.surface.triangles);
+        let tree = SphereTree::new(&recording.surface.positions, &recording.surface.triangles);
         let shapes = &recording.modes.mode_shapes;
         let distances = ModalDistances::new(&recording, shapes);
         let modal = |i: usize, c: Option<usize>| distances.between(i, c);
@@ -94,7 +95,7 @@ impl Body {
                 break;
             }
             apart *= COARSER[usize::from(count <= MANY)];
-            let nodes = thinned(&recording.surface, apart);
+            let nodes = poisson_disk_sample(&recording.surface, apart);
             if nodes.len() < count {
                 count = nodes.len();
                 patches.push(PatchField::about(&recording, &nodes, OVERLAP * apart));
@@ -110,41 +111,41 @@ impl Body {
     }
 
     /// Whether a place [m, body] is within a reach [m] of the box around the body at rest.
-    pub(crate) fn is_near(&self, place: DVec3, reach: f64) -> bool {
-        (place - place.clamp(self.low, self.high)).length() < reach
+    pub(crate) fn rest_box_is_within(&self, location: DVec3, reach: f64) -> bool {
+        (location - location.clamp(self.low, self.high)).length() < reach
     }
 
     /// The triangles around a surface node.
-    pub(crate) fn around(&self, node: usize) -> &[u32] {
+    pub(crate) fn triangles_around(&self, node: usize) -> &[u32] {
         &self.around[self.first_around[node] as usize..self.first_around[node + 1] as usize]
     }
 
     /// The triangle on the other side of an edge; none at a border.
-    pub(crate) fn across(&self, triangle: u32, a: u32, b: u32) -> Option<u32> {
+    pub(crate) fn triangle_across(&self, triangle: u32, a: u32, b: u32) -> Option<u32> {
         let has = |t: u32| t != triangle && self.recording.surface.triangles[t as usize].contains(&b);
-        self.around(a as usize).iter().copied().find(|&t| has(t))
+        self.triangles_around(a as usize).iter().copied().find(|&t| has(t))
     }
 
-    /// A node that a reading knows as a surface point, always the same.
-    pub(crate) fn node_point(&self, reading: Reading, node: usize) -> SurfacePoint {
-        if let Some(some) = self.patch(reading).and_then(|patch| patch.some.as_ref()) {
+    /// A node that a footprint knows as a surface point, always the same.
+    pub(crate) fn node_point(&self, footprint: Footprint, node: usize) -> SurfacePoint {
+        if let Some(some) = self.patch(footprint).and_then(|patch| patch.some.as_ref()) {
             return some.node_point(node);
         }
-        let triangle = self.around(node)[0];
+        let triangle = self.triangles_around(node)[0];
         let corners = self.recording.surface.triangles[triangle as usize];
         let weights = corners.map(|corner| if corner as usize == node { 1.0 } else { 0.0 });
         SurfacePoint { triangle, weights }
     }
 
     /// √(Σω²·q²) of every band of modes [√J]: √(2·elastic energy) of modal coordinates.
-    pub(crate) fn norms(&self, q: &[f64]) -> Bands {
+    pub(crate) fn band_norms(&self, q: &[f64]) -> Bands {
         self.norms_of(q.iter().copied())
     }
 
     /// How far any surface node can go between two modal coordinates [m].
-    pub(crate) fn way(&self, from: &[f64], to: &[f64]) -> f64 {
+    pub(crate) fn displacement_bound(&self, from: &[f64], to: &[f64]) -> f64 {
         let modal = self.norms_of(from.iter().zip(to).map(|(a, b)| b - a));
-        self.bounds.reach(&Visit { modal, ..Visit::STILL })
+        self.bounds.max_displacement(&DeformationBound { modal, ..DeformationBound::STILL })
     }
 
     fn norms_of(&self, q: impl Iterator<Item = f64>) -> Bands {
@@ -153,58 +154,58 @@ impl Body {
         core::array::from_fn(|at| libm::sqrt(squares.by_ref().take(band(omegas.len(), at).len()).sum()))
     }
 
-    /// The reading for a patch of a radius [m]; the point itself for 0.
-    pub(crate) fn reading(&self, radius: f64) -> Reading {
+    /// The footprint for a patch of a radius [m]; the point itself for 0.
+    pub(crate) fn footprint(&self, radius: f64) -> Footprint {
         let patch = self.patches.iter().position(|patch| patch.radius == radius);
-        patch.map_or(Reading::Point, |at| Reading::Patch(at as u32))
+        patch.map_or(Footprint::Point, |at| Footprint::Patch(at as u32))
     }
 
     /// How a face is read: by its nodes at level 0, then by ever fewer places.
-    pub(crate) fn level(&self, level: usize) -> Reading {
-        if level == 0 { Reading::Point } else { Reading::Patch((self.devices + level - 1) as u32) }
+    pub(crate) fn footprint_at_level(&self, level: usize) -> Footprint {
+        if level == 0 { Footprint::Point } else { Footprint::Patch((self.devices + level - 1) as u32) }
     }
 
     /// The coarsest of these.
-    pub(crate) fn coarsest(&self) -> usize {
+    pub(crate) fn coarsest_level(&self) -> usize {
         self.patches.len() - self.devices
     }
 
     /// The coarsest of these that, with all before it, is a surface that other objects can meet.
-    pub(crate) fn coarsest_surface(&self) -> usize {
+    pub(crate) fn coarsest_surface_level(&self) -> usize {
         let is_surface = |patch: &&PatchField| patch.some.as_ref().is_some_and(|some| some.is_surface);
         self.patches[self.devices..].iter().take_while(is_surface).count()
     }
 
-    /// The surface that a reading knows: all of it, or a coarser one between places.
-    pub(crate) fn surface(&self, reading: Reading) -> &Surface {
-        self.patch(reading).map_or(&self.recording.surface, |patch| patch.surface(&self.recording))
+    /// The surface that a footprint knows: all of it, or a coarser one between places.
+    pub(crate) fn surface(&self, footprint: Footprint) -> &Surface {
+        self.patch(footprint).map_or(&self.recording.surface, |patch| patch.surface(&self.recording))
     }
 
     /// The tree over it.
-    pub(crate) fn tree(&self, reading: Reading) -> &SurfaceTree {
-        let some = self.patch(reading).and_then(|patch| patch.some.as_ref());
+    pub(crate) fn tree(&self, footprint: Footprint) -> &SphereTree {
+        let some = self.patch(footprint).and_then(|patch| patch.some.as_ref());
         some.map_or(&self.tree, |some| &some.tree)
     }
 
     /// The corners of a place's triangle with their weights.
-    pub(crate) fn corners(&self, place: &Place) -> [(usize, f64); 3] {
-        self.surface(place.reading).corners(&place.point)
+    pub(crate) fn corners(&self, location: &ContactLocation) -> [(usize, f64); 3] {
+        self.surface(location.footprint).corners(&location.point)
     }
 
     /// The way that a place which stands for others faces at rest [body]; zero for nodes, which stand for themselves.
-    pub(crate) fn facing(&self, reading: Reading, node: usize) -> DVec3 {
-        let some = self.patch(reading).and_then(|patch| patch.some.as_ref());
+    pub(crate) fn outward_normal(&self, footprint: Footprint, node: usize) -> DVec3 {
+        let some = self.patch(footprint).and_then(|patch| patch.some.as_ref());
         some.map_or(DVec3::ZERO, |some| some.facing(node))
     }
 
     /// Where a place is at rest [m, body].
-    pub(crate) fn rest_position(&self, place: &Place) -> DVec3 {
-        self.surface(place.reading).rest_position(&place.point)
+    pub(crate) fn rest_position(&self, location: &ContactLocation) -> DVec3 {
+        self.surface(location.footprint).rest_position(&location.point)
     }
 
-    /// The nodes that a reading knows.
-    pub(super) fn places(&self, reading: Reading) -> Vec<u32> {
-        match self.patch(reading).and_then(|patch| patch.some.as_ref()) {
+    /// The nodes that a footprint knows.
+    pub(super) fn places(&self, footprint: Footprint) -> Vec<u32> {
+        match self.patch(footprint).and_then(|patch| patch.some.as_ref()) {
             Some(some) => some.nodes().to_vec(),
             None => (0..self.recording.surface.positions.len() as u32).collect(),
         }
@@ -213,37 +214,37 @@ impl Body {
     /// Which of these a node is.
     ///
     /// # Real time
-    pub(super) fn number(&self, reading: Reading, node: usize) -> usize {
-        self.patch(reading).map_or(node, |patch| patch.number(node))
+    pub(super) fn number(&self, footprint: Footprint, node: usize) -> usize {
+        self.patch(footprint).map_or(node, |patch| patch.number(node))
     }
 
-    pub(super) fn patch(&self, reading: Reading) -> Option<&PatchField> {
-        match reading {
-            Reading::Point => None,
-            Reading::Patch(at) => self.patches.get(at as usize),
+    pub(super) fn patch(&self, footprint: Footprint) -> Option<&PatchField> {
+        match footprint {
+            Footprint::Point => None,
+            Footprint::Patch(at) => self.patches.get(at as usize),
         }
     }
 
-    /// What the first few modes, or all, do to a surface node [m, body], as a reading sees it: for patches, which are kept
+    /// What the first few modes, or all, do to a surface node [m, body], as a footprint sees it: for patches, which are kept
     /// and read in single precision, by `single`.
     ///
     /// # Real time
-    pub(crate) fn displacement(&self, reading: Reading, node: usize, q: &[f64], single: &[f32]) -> DVec3 {
+    pub(crate) fn displacement(&self, footprint: Footprint, node: usize, q: &[f64], single: &[f32]) -> DVec3 {
         let (m, shapes) = (self.recording.modes.len(), &self.recording.modes.mode_shapes);
         let own = |number: usize| 3 * m * number..3 * m * (number + 1);
-        match self.patch(reading) {
+        match self.patch(footprint) {
             None => dot3(&shapes[own(node)], q),
             Some(patch) => dot3_single(&patch.rows[own(patch.number(node))], single),
         }
     }
 
-    /// Add the mode shapes of a surface node with a weight, as a reading sees them: three rows.
+    /// Add the mode shapes of a surface node with a weight, as a footprint sees them: three rows.
     ///
     /// # Real time
-    pub(crate) fn add_rows(&self, reading: Reading, node: usize, weight: f64, rows: &mut [f64]) {
+    pub(crate) fn add_rows(&self, footprint: Footprint, node: usize, weight: f64, rows: &mut [f64]) {
         let length = rows.len();
         let own = |number: usize| length * number..length * (number + 1);
-        match self.patch(reading) {
+        match self.patch(footprint) {
             None => rows
                 .iter_mut()
                 .zip(&self.recording.modes.mode_shapes[own(node)])
@@ -257,27 +258,27 @@ impl Body {
 
     /// What of a dent can change over a distance, as a share per metre; infinite where dents have no shape that is worth
     /// looking at: between nodes, and between places that stand for others.
-    pub(crate) fn dent_slope(&self, reading: Reading) -> f64 {
-        let patch = self.patch(reading).filter(|patch| patch.some.is_none());
-        patch.map_or(f64::INFINITY, PatchField::dent_slope)
+    pub(crate) fn residual_slope(&self, footprint: Footprint) -> f64 {
+        let patch = self.patch(footprint).filter(|patch| patch.some.is_none());
+        patch.map_or(f64::INFINITY, PatchField::residual_slope)
     }
 
-    /// How far the surface can go, as a reading sees it.
-    pub(crate) fn bounds(&self, reading: Reading) -> &Bounds {
-        self.patch(reading).map_or(&self.bounds, |patch| &patch.bounds)
+    /// How far the surface can go, as a footprint sees it.
+    pub(crate) fn bounds(&self, footprint: Footprint) -> &Bounds {
+        self.patch(footprint).map_or(&self.bounds, |patch| &patch.bounds)
     }
 
     /// Residual compliance between two places [m/N]; none between different readings, whose places answer each other
     /// by the modes alone.
     ///
     /// # Real time
-    pub(crate) fn residual(&self, a: &Place, b: &Place) -> DMat3 {
+    pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
         let recording = &*self.recording;
-        match (a.reading == b.reading, self.patch(a.reading)) {
+        match (a.footprint == b.footprint, self.patch(a.footprint)) {
             (false, _) => DMat3::ZERO,
             (true, Some(patch)) => patch.residual(recording, &a.point, &b.point),
             (true, None) => {
-                let corners = |place: &Place| recording.surface.corners(&place.point);
+                let corners = |location: &ContactLocation| recording.surface.corners(&location.point);
                 let used = |corner: &(usize, f64)| corner.1 != 0.0;
                 let mut sum = DMat3::ZERO;
                 for (i, wi) in corners(a).into_iter().filter(used) {
@@ -293,28 +294,33 @@ impl Body {
     /// What a force leaves of itself for the step after.
     ///
     /// # Real time
-    pub(crate) fn acting(&self, place: Place, force: DVec3) -> Acting {
-        let rest = self.rest_position(&place);
-        let patch = self.patch(place.reading);
-        let pulls = patch.map(|patch| patch.pulls(&self.recording, &place.point, rest, force));
-        Acting { place, force, rest, pulls: pulls.unwrap_or_default() }
+    pub(crate) fn applied_forces(&self, location: ContactLocation, force: DVec3) -> AppliedForce {
+        let rest = self.rest_position(&location);
+        let patch = self.patch(location.footprint);
+        let pulls = patch.map(|patch| patch.pulls(&self.recording, &location.point, rest, force));
+        AppliedForce { location, force, rest, pulls: pulls.unwrap_or_default() }
     }
 
     /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
     /// `flat` [m] from the force a patch's dent is as deep as there.
     ///
     /// # Real time
-    pub(crate) fn dent(&self, node: usize, acting: &Acting, flat: f64) -> DVec3 {
-        match self.patch(acting.place.reading) {
-            Some(patch) => patch.dent(&self.recording, node, &acting.pulls, flat),
-            None => self.residual_of_node(node, &acting.place) * acting.force,
+    pub(crate) fn residual_displacement(
+        &self,
+        node: usize,
+        applied_forces: &AppliedForce,
+        flat: f64,
+    ) -> DVec3 {
+        match self.patch(applied_forces.location.footprint) {
+            Some(patch) => patch.residual_displacement(&self.recording, node, &applied_forces.pulls, flat),
+            None => self.residual_of_node(node, &applied_forces.location) * applied_forces.force,
         }
     }
 
     /// The nodes that a force at a place acts on, with their weights; a node may come more than once.
-    pub(super) fn spread(&self, place: &Place, mut give: impl FnMut(usize, f64)) {
-        for (corner, weight) in self.corners(place) {
-            match self.patch(place.reading) {
+    pub(super) fn spread(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
+        for (corner, weight) in self.corners(location) {
+            match self.patch(location.footprint) {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),
                 Some(patch) => {
@@ -325,9 +331,9 @@ impl Body {
     }
 
     /// Residual compliance from a place to the surface node itself [m/N].
-    pub(super) fn residual_of_node(&self, node: usize, place: &Place) -> DMat3 {
+    pub(super) fn residual_of_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
         let mut sum = DMat3::ZERO;
-        self.spread(place, |other, weight| sum += self.recording.residual.block(node, other) * weight);
+        self.spread(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
         sum
     }
 }

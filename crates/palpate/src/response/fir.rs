@@ -11,8 +11,8 @@
 //! copied together when the two first meet, weighted with their corners. When no room is left for a copy the table
 //! itself is read: the same numbers, more slowly.
 
-use super::history::ForceHistory;
-use crate::contact::ContactPoint;
+use super::ContactPoint;
+use super::force_history::ForceHistory;
 use crate::error::Error;
 use crate::recording::{ImpulseResponse, Recording};
 use crate::surface::SurfacePoint;
@@ -267,7 +267,7 @@ impl FirState {
     /// Write the step's forces into the history; what is older than T steps is forgotten.
     ///
     /// # Real time
-    pub(crate) fn advance(&mut self, acting: &[ContactPoint]) {
+    pub(crate) fn advance(&mut self, applied_forces: &[ContactPoint]) {
         let (sources, slots) = (self.history.sources(), self.contacts.len());
         for source in 0..sources {
             if self.history.ages(source) {
@@ -275,11 +275,11 @@ impl FirState {
             }
         }
         self.history.begin_step();
-        for acting in acting {
-            let force = acting.force_in_body;
-            self.work += force.dot(acting.displacement - acting.placed.displacement);
+        for applied_forces in applied_forces {
+            let force = applied_forces.force_in_body;
+            self.work += force.dot(applied_forces.displacement - applied_forces.state.displacement);
             if force != DVec3::ZERO {
-                self.history.add(&acting.place.point, force);
+                self.history.add(&applied_forces.location.point, force);
             }
         }
     }

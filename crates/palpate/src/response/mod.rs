@@ -1,36 +1,35 @@
 //! How a body answers forces, in one of two forms behind one small interface: modal with residual compliance,
 //! or the paper's recorded table.
 
-mod answers;
 mod body;
-mod dot;
+mod contact_points;
+mod dot_products;
 mod fir;
-mod history;
-mod loads;
+mod force_history;
 mod modal;
-mod nodes;
+mod nodal_compliance;
+mod nodal_forces;
 mod oscillator;
 mod patch_field;
+mod residual_fields;
 
-pub(crate) use answers::Answers;
-pub(crate) use body::{Acting, Body, Place, Placed, Reading};
-pub(crate) use dot::dot;
-pub(crate) use loads::NodalForces;
+pub(crate) use body::{AppliedForce, Body, ContactLocation, Footprint, LocationState};
+pub(crate) use contact_points::{ContactPoint, ContactPoints};
+pub(crate) use dot_products::dot;
+pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
+pub(crate) use residual_fields::ResidualFields;
 
-use crate::contact::ContactPoint;
 use crate::error::Error;
-use crate::motion::RigidState;
 use crate::recording::{ImpulseResponse, Recording};
-use crate::scene::Model;
 use crate::surface::SurfacePoint;
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use fir::{Fir, FirState};
+use force_history::ForceHistory;
 use glam::{DMat3, DVec3};
-use history::ForceHistory;
 use modal::{ModalDeformation, ModalState, SampledModes};
-use nodes::NodeCompliance;
+use nodal_compliance::NodeCompliance;
 
 /// Which form of its response an object uses.
 #[derive(Debug, Clone, Default)]
@@ -98,7 +97,11 @@ impl Response {
 
     /// Know R[0] between all surface nodes, or the places that stand for them, before the first step, where there are not too
     /// many; `others` are objects that may know it already.
-    pub(crate) fn know_nodes<'r>(&mut self, body: &Body, others: impl Iterator<Item = (&'r Body, &'r Self)>) {
+    pub(crate) fn precompute_nodal_compliance<'r>(
+        &mut self,
+        body: &Body,
+        others: impl Iterator<Item = (&'r Body, &'r Self)>,
+    ) {
         let Self::Modal(modes) = self else { return };
         let same = others.filter(|(other, _)| Arc::ptr_eq(&other.recording, &body.recording));
         let known = |response: &Self| match response {
@@ -106,8 +109,8 @@ impl Response {
             Self::Fir(_) => None,
         };
         let same = same.filter_map(|(_, response)| known(response)).next();
-        let levels = (0..=body.coarsest()).map(|level| body.level(level));
-        let find = |reading| NodeCompliance::new(body, modes, reading).map(Arc::new);
+        let levels = (0..=body.coarsest_level()).map(|level| body.footprint_at_level(level));
+        let find = |footprint| NodeCompliance::new(body, modes, footprint).map(Arc::new);
         let all = same.unwrap_or_else(|| levels.filter_map(find).collect());
         modes.known = all;
     }
@@ -122,7 +125,7 @@ impl Response {
 }
 
 /// An object's response with its state, for one step.
-pub(crate) struct Responding<'a> {
+pub(crate) struct ResponseView<'a> {
     pub(crate) response: &'a Response,
     pub(crate) body: &'a Body,
     pub(crate) state: &'a mut ResponseState,
@@ -130,29 +133,22 @@ pub(crate) struct Responding<'a> {
     pub(crate) gravity: DVec3,
 }
 
-impl<'a> Responding<'a> {
-    /// Of an object of the model, as it stands.
-    pub(crate) fn new(model: &'a Model, at: usize, rigid: &RigidState, state: &'a mut ResponseState) -> Self {
-        let object = &model.objects[at];
-        let gravity = object.gravity_in_body(model.parameters.gravity, &rigid.pose);
-        Self { response: &object.response, body: &object.body, state, gravity }
-    }
-
+impl ResponseView<'_> {
     /// Let a slot stand for a place; gives where the place is now.
     ///
     /// # Real time
     /// Costs modes, or for a table samples × sources of force; only when the place is new.
-    pub(crate) fn place(&mut self, slot: usize, place: &Place) -> Placed {
+    pub(crate) fn assign(&mut self, slot: usize, location: &ContactLocation) -> LocationState {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.place(self.body, state, slot, place, self.gravity)
+                modes.assign(self.body, state, slot, location, self.gravity)
             }
             (Response::Fir(fir), ResponseState::Fir(state)) => {
                 state.release(slot);
-                let displacement = state.hold(fir, slot, &place.point, self.gravity);
-                Placed { displacement, ..Placed::default() }
+                let displacement = state.hold(fir, slot, &location.point, self.gravity);
+                LocationState { displacement, ..LocationState::default() }
             }
-            _ => Placed::default(),
+            _ => LocationState::default(),
         }
     }
 
@@ -162,17 +158,17 @@ impl<'a> Responding<'a> {
     /// # Real time
     pub(crate) fn compliance(
         &mut self,
-        (slot, place): (usize, &Place),
+        (slot, location): (usize, &ContactLocation),
         points: &[ContactPoint],
         mut give: impl FnMut(usize, DMat3),
     ) {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.compliance(self.body, state, (slot, place), points, give);
+                modes.compliance(self.body, state, (slot, location), points, give);
             }
             (Response::Fir(fir), _) => {
                 for (at, point) in points.iter().enumerate() {
-                    give(at, fir.compliance(&place.point, &point.place.point));
+                    give(at, fir.compliance(&location.point, &point.location.point));
                 }
             }
             _ => {}
@@ -194,9 +190,9 @@ impl<'a> Responding<'a> {
     /// ũ of a slot's place: where it is at the end of the step without contact force [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&mut self, slot: usize, placed: &Placed) -> DVec3 {
+    pub(crate) fn free(&mut self, slot: usize, state_at: &LocationState) -> DVec3 {
         match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + placed.sag,
+            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + state_at.sag,
             (Response::Fir(fir), ResponseState::Fir(state)) => state.free(fir, slot, self.gravity),
             _ => DVec3::ZERO,
         }
@@ -205,13 +201,13 @@ impl<'a> Responding<'a> {
     /// Hold forces over the step, with gravity at its end; gives the energy [J] that is known to be lost in it.
     ///
     /// # Real time
-    pub(crate) fn advance(&mut self, acting: &mut [ContactPoint]) -> f64 {
+    pub(crate) fn advance(&mut self, applied_forces: &mut [ContactPoint]) -> f64 {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.advance(self.body, state, acting, self.gravity)
+                modes.advance(self.body, state, applied_forces, self.gravity)
             }
             (Response::Fir(_), ResponseState::Fir(state)) => {
-                state.advance(acting);
+                state.advance(applied_forces);
                 0.0
             }
             _ => 0.0,
@@ -246,9 +242,9 @@ impl ResponseState {
     }
 
     /// Forces [N, body] of the last step with their places.
-    pub(crate) fn acting(&self) -> &[Acting] {
+    pub(crate) fn applied_forces(&self) -> &[AppliedForce] {
         match self {
-            Self::Modal(state) => &state.acting,
+            Self::Modal(state) => &state.applied_forces,
             Self::Fir(_) => &[],
         }
     }
@@ -303,23 +299,23 @@ impl ResponseState {
         }
     }
 
-    /// What deforms the object now.
-    pub(crate) fn deformed(&self) -> Deformed {
+    /// Copy of all data that the deformation follows from.
+    pub(crate) fn deformation(&self) -> DeformationData {
         match self {
-            Self::Modal(state) => Deformed::Modal(ModalDeformation::new(state)),
-            Self::Fir(state) => Deformed::Fir(Box::new(state.history.clone())),
+            Self::Modal(state) => DeformationData::Modal(ModalDeformation::new(state)),
+            Self::Fir(state) => DeformationData::Fir(Box::new(state.history.clone())),
         }
     }
 }
 
 /// What deforms an object: all that its surface takes; buffers are made once.
 #[derive(Debug, Clone)]
-pub(crate) enum Deformed {
+pub(crate) enum DeformationData {
     Modal(ModalDeformation),
     Fir(Box<ForceHistory>),
 }
 
-impl Deformed {
+impl DeformationData {
     /// Take over what deforms the same object now.
     ///
     /// # Real time
@@ -341,18 +337,18 @@ impl Deformed {
     }
 
     /// The part of the surface's displacement that is not the modes' [m, body].
-    pub(crate) fn dents(
+    pub(crate) fn residual_displacements(
         &self,
         (response, body): (&Response, &Body),
         gravity: DVec3,
-        answers: &mut Answers,
+        residual_fields: &mut ResidualFields,
         out: &mut [DVec3],
     ) {
         match (response, self) {
             (Response::Modal(modes), Self::Modal(deformed)) => {
-                modes.dents(body, deformed, gravity, answers, out)
+                modes.residual_displacements(body, deformed, gravity, residual_fields, out)
             }
-            _ => self.surface_displacement((response, body), gravity, answers, out),
+            _ => self.surface_displacement((response, body), gravity, residual_fields, out),
         }
     }
 
@@ -361,12 +357,12 @@ impl Deformed {
         &self,
         (response, body): (&Response, &Body),
         gravity: DVec3,
-        answers: &mut Answers,
+        residual_fields: &mut ResidualFields,
         out: &mut [DVec3],
     ) {
         match (response, self) {
             (Response::Modal(modes), Self::Modal(deformed)) => {
-                modes.surface_displacement(body, deformed, gravity, answers, out);
+                modes.surface_displacement(body, deformed, gravity, residual_fields, out);
             }
             (Response::Fir(fir), Self::Fir(history)) => history.surface_displacement(fir, gravity, out),
             _ => {}

@@ -3,13 +3,13 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
 //! stands for everything that the kept modes miss, as a massless spring within the step.
 
-use super::answers::Answers;
-use super::dot::{dot, dot3, dot9, dots};
-use super::loads::{NodalForces, add_dents};
-use super::nodes::NodeCompliance;
+use super::ContactPoint;
+use super::dot_products::{dot, dot3, dot9, dots};
+use super::nodal_compliance::NodeCompliance;
+use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
-use super::{Acting, Body, Place, Placed, Reading};
-use crate::contact::ContactPoint;
+use super::residual_fields::ResidualFields;
+use super::{AppliedForce, Body, ContactLocation, Footprint, LocationState};
 use crate::recording::{ModalBasis, Recording};
 use alloc::sync::Arc;
 use alloc::vec;
@@ -44,7 +44,7 @@ pub(crate) struct ModalState {
     /// Three rows times B.
     weighted: Vec<f64>,
     /// Forces [N, body] of the last step with their places, for the residual compliance.
-    pub(super) acting: Vec<Acting>,
+    pub(super) applied_forces: Vec<AppliedForce>,
     /// Those that act at points, by nodes.
     pub(super) nodal: NodalForces,
     /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
@@ -61,22 +61,24 @@ impl ModalState {
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
-            acting: Vec::with_capacity(capacity),
+            applied_forces: Vec::with_capacity(capacity),
             nodal: NodalForces::new(nodes, capacity),
             residual_energy: 0.0,
         }
     }
 
     /// Displacement of a place by the residual compliance under the forces of the last step [m, body].
-    fn residual_displacement(&mut self, body: &Body, place: &Place) -> DVec3 {
-        if place.reading == Reading::Point {
-            let corners = body.recording.surface.corners(&place.point).into_iter();
+    fn residual_displacement(&mut self, body: &Body, location: &ContactLocation) -> DVec3 {
+        if location.footprint == Footprint::Point {
+            let corners = body.recording.surface.corners(&location.point).into_iter();
             let used = corners.filter(|(_, weight)| *weight != 0.0);
             return used
-                .map(|(node, weight)| self.nodal.find_dent(&body.recording.residual, node) * weight)
+                .map(|(node, weight)| {
+                    self.nodal.find_residual_displacement(&body.recording.residual, node) * weight
+                })
                 .sum();
         }
-        self.acting.iter().map(|other| body.residual(place, &other.place) * other.force).sum()
+        self.applied_forces.iter().map(|other| body.residual(location, &other.location) * other.force).sum()
     }
 
     /// Let the modes move so.
@@ -117,27 +119,27 @@ impl SampledModes {
     /// the body's weight cause [m, body].
     ///
     /// # Real time
-    pub(crate) fn place(
+    pub(crate) fn assign(
         &self,
         body: &Body,
         state: &mut ModalState,
         slot: usize,
-        place: &Place,
+        location: &ContactLocation,
         gravity: DVec3,
-    ) -> Placed {
+    ) -> LocationState {
         let m = self.len();
-        let corners = body.corners(place);
+        let corners = body.corners(location);
         // J·Φ: the weighted rows of the triangle's corners.
         let rows = &mut state.rows[3 * m * slot..3 * m * (slot + 1)];
         rows.fill(0.0);
         for (node, weight) in corners.into_iter().filter(|(_, w)| *w != 0.0) {
-            body.add_rows(place.reading, node, weight, rows);
+            body.add_rows(location.footprint, node, weight, rows);
         }
         let sag = body.recording.gravity.as_ref().map_or(DVec3::ZERO, |response| {
             corners.iter().map(|&(node, w)| response.residual_displacement(node, gravity) * w).sum()
         });
-        let residual = sag + state.residual_displacement(body, place);
-        Placed { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
+        let residual = sag + state.residual_displacement(body, location);
+        LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }
 
     /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
@@ -148,26 +150,26 @@ impl SampledModes {
         &self,
         body: &Body,
         state: &mut ModalState,
-        (slot, place): (usize, &Place),
+        (slot, location): (usize, &ContactLocation),
         points: &[ContactPoint],
         mut give: impl FnMut(usize, DMat3),
     ) {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        let known = self.known.iter().find(|known| known.reading == place.reading);
-        let own = body.corners(place);
+        let known = self.known.iter().find(|known| known.footprint == location.footprint);
+        let own = body.corners(location);
         let mut weighed = false;
         for (at, point) in points.iter().enumerate() {
-            if let Some(known) = known.filter(|known| known.reading == point.place.reading) {
-                give(at, known.between(body, &own, &body.corners(&point.place)));
+            if let Some(known) = known.filter(|known| known.footprint == point.location.footprint) {
+                give(at, known.between(body, &own, &body.corners(&point.location)));
                 continue;
             }
             if !weighed {
                 self.weigh(of(slot), weighted);
                 weighed = true;
             }
-            give(at, dot9(weighted, of(point.slot)) + body.residual(place, &point.place));
+            give(at, dot9(weighted, of(point.slot)) + body.residual(location, &point.location));
         }
     }
 
@@ -212,12 +214,12 @@ impl SampledModes {
         &self,
         body: &Body,
         state: &mut ModalState,
-        acting: &mut [ContactPoint],
+        applied_forces: &mut [ContactPoint],
         next_gravity: DVec3,
     ) -> f64 {
         let m = self.len();
         // p = Φᵀ·Jᵀ·g.
-        for point in acting.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
+        for point in applied_forces.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let g = point.force_in_body;
             let (x, rest) = rows.split_at(m);
@@ -240,23 +242,23 @@ impl SampledModes {
 
         // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
         let (mut work, mut energy) = (0.0, 0.0);
-        state.acting.clear();
+        state.applied_forces.clear();
         state.nodal.clear();
-        for point in acting.iter_mut() {
+        for point in applied_forces.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let [modal, free] = dots(rows, [&state.q, &state.free]);
-            point.free = free + point.placed.sag;
+            point.free = free + point.state.sag;
             let residual = point.displacement - modal;
-            work += point.force_in_body.dot(residual - point.placed.residual);
-            energy += 0.5 * point.force_in_body.dot(residual - point.placed.sag);
-            point.placed.residual = residual;
+            work += point.force_in_body.dot(residual - point.state.residual);
+            energy += 0.5 * point.force_in_body.dot(residual - point.state.sag);
+            point.state.residual = residual;
             if let Some(node) = point.known_node() {
-                state.nodal.know(node, residual - point.placed.sag);
+                state.nodal.know(node, residual - point.state.sag);
             }
             if point.force_in_body != DVec3::ZERO {
-                state.acting.push(body.acting(point.place, point.force_in_body));
-                if point.place.reading == Reading::Point {
-                    let corners = body.recording.surface.corners(&point.place.point);
+                state.applied_forces.push(body.applied_forces(point.location, point.force_in_body));
+                if point.location.footprint == Footprint::Point {
+                    let corners = body.recording.surface.corners(&point.location.point);
                     state.nodal.add(corners, point.force_in_body);
                 }
             }
@@ -285,11 +287,11 @@ impl SampledModes {
         body: &Body,
         deformed: &ModalDeformation,
         gravity: DVec3,
-        answers: &mut Answers,
+        residual_fields: &mut ResidualFields,
         out: &mut [DVec3],
     ) {
         let modes = &body.recording.modes;
-        self.dents(body, deformed, gravity, answers, out);
+        self.residual_displacements(body, deformed, gravity, residual_fields, out);
         for (node, u) in out.iter_mut().enumerate() {
             let row = |axis: usize| modes.row(node, axis);
             *u += DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
@@ -297,12 +299,12 @@ impl SampledModes {
     }
 
     /// The part of it that is not the modes', S·f with what the body's weight adds.
-    pub(crate) fn dents(
+    pub(crate) fn residual_displacements(
         &self,
         body: &Body,
         deformed: &ModalDeformation,
         gravity: DVec3,
-        answers: &mut Answers,
+        residual_fields: &mut ResidualFields,
         out: &mut [DVec3],
     ) {
         let recording = &body.recording;
@@ -314,10 +316,10 @@ impl SampledModes {
             None => out.fill(DVec3::ZERO),
         }
         let mut loads = deformed.loaded.clone();
-        if !answers.add(body, &deformed.patches, out) {
+        if !residual_fields.add(body, &deformed.patches, out) {
             // All forces as forces on nodes: patches share theirs.
-            for Acting { place, force, .. } in &deformed.patches {
-                body.spread(place, |node, weight| loads.push((node as u32, *force * weight)));
+            for AppliedForce { location, force, .. } in &deformed.patches {
+                body.spread(location, |node, weight| loads.push((node as u32, *force * weight)));
             }
             loads.sort_unstable_by_key(|(node, _)| *node);
             loads.dedup_by(|next, kept| {
@@ -328,7 +330,7 @@ impl SampledModes {
                 same
             });
         }
-        add_dents(&recording.residual, &loads, out);
+        add_residual_displacements(&recording.residual, &loads, out);
     }
 }
 
@@ -338,7 +340,7 @@ pub(crate) struct ModalDeformation {
     q: Vec<f64>,
     /// Forces [N, body] on nodes, and on patches.
     loaded: Vec<(u32, DVec3)>,
-    patches: Vec<Acting>,
+    patches: Vec<AppliedForce>,
 }
 
 impl Clone for ModalDeformation {
@@ -357,7 +359,7 @@ impl ModalDeformation {
         let mut new = Self {
             q: state.q.clone(),
             loaded: Vec::with_capacity(state.nodal.capacity()),
-            patches: Vec::with_capacity(state.acting.capacity()),
+            patches: Vec::with_capacity(state.applied_forces.capacity()),
         };
         new.copy_from(state);
         new
@@ -374,7 +376,10 @@ impl ModalDeformation {
         self.loaded.clear();
         self.loaded.extend_from_slice(state.nodal.loaded());
         self.patches.clear();
-        let patches = state.acting.iter().filter(|acting| acting.place.reading != Reading::Point);
+        let patches = state
+            .applied_forces
+            .iter()
+            .filter(|applied_forces| applied_forces.location.footprint != Footprint::Point);
         self.patches.extend(patches.copied());
     }
 }

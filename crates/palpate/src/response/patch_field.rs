@@ -11,7 +11,7 @@
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
 use crate::surface::{
-    Bands, Bounds, PatchWeights, Surface, SurfacePoint, SurfaceTree, band, coarser, facing,
+    Bands, Bounds, PatchWeights, SphereTree, Surface, SurfacePoint, band, decimate, facing,
 };
 use alloc::vec;
 use alloc::vec::Vec;
@@ -33,12 +33,12 @@ pub(crate) struct PatchField {
     range: f64,
     pub(crate) bounds: Bounds,
     /// The nodes that have a patch, where not all have one.
-    pub(crate) some: Option<SomeNodes>,
+    pub(crate) some: Option<SampleSurface>,
 }
 
 /// Some of the surface nodes.
 #[derive(Debug, Clone)]
-pub(crate) struct SomeNodes {
+pub(crate) struct SampleSurface {
     /// Which of them every surface node is; [`NONE`] for the others.
     numbers: Vec<u32>,
     nodes: Vec<u32>,
@@ -49,17 +49,17 @@ pub(crate) struct SomeNodes {
     facing: Vec<DVec3>,
     /// One of its triangles for each.
     triangle: Vec<u32>,
-    pub(crate) tree: SurfaceTree,
+    pub(crate) tree: SphereTree,
 }
 
 /// No patch.
 const NONE: u32 = u32::MAX;
 
-impl SomeNodes {
+impl SampleSurface {
     pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
         let mut numbers = vec![NONE; surface.positions.len()];
         nodes.iter().enumerate().for_each(|(number, &node)| numbers[node as usize] = number as u32);
-        let between = coarser(surface, nodes);
+        let between = decimate(surface, nodes);
         let is_surface = between.is_some();
         let triangles = between.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
         let mut triangle = vec![0; nodes.len()];
@@ -68,7 +68,7 @@ impl SomeNodes {
         }
         let facing = facing(surface);
         let facing = nodes.iter().map(|&node| facing[node as usize]).collect();
-        let tree = SurfaceTree::new(&surface.positions, &triangles);
+        let tree = SphereTree::new(&surface.positions, &triangles);
         let surface = Surface { triangles, ..surface.clone() };
         Self { numbers, nodes: nodes.to_vec(), surface, is_surface, facing, triangle, tree }
     }
@@ -96,7 +96,7 @@ const FIT_CENTRES: usize = 24;
 
 impl PatchField {
     /// About all surface nodes, over whose triangles there is a tree.
-    pub(crate) fn new(recording: &Recording, tree: &SurfaceTree, radius: f64) -> Self {
+    pub(crate) fn new(recording: &Recording, tree: &SphereTree, radius: f64) -> Self {
         let all: Vec<u32> = (0..recording.surface.positions.len() as u32).collect();
         let field = Self::without_bounds(recording, &all, radius);
         let bounds = field.find_bounds(recording, tree, &recording.surface.triangles);
@@ -105,7 +105,7 @@ impl PatchField {
 
     /// About some of them.
     pub(crate) fn about(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
-        let some = SomeNodes::new(&recording.surface, nodes);
+        let some = SampleSurface::new(&recording.surface, nodes);
         let field = Self { some: Some(some), ..Self::without_bounds(recording, nodes, radius) };
         let some = field.some.as_ref();
         let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.surface.triangles));
@@ -165,7 +165,7 @@ impl PatchField {
         Self { radius, weights, rows, roots, range, bounds: Bounds::default(), some: None }
     }
 
-    fn find_bounds(&self, recording: &Recording, tree: &SurfaceTree, triangles: &[[u32; 3]]) -> Bounds {
+    fn find_bounds(&self, recording: &Recording, tree: &SphereTree, triangles: &[[u32; 3]]) -> Bounds {
         let distances = ModalDistances::new(recording, &self.rows);
         tree.bounds(
             triangles,
@@ -203,7 +203,7 @@ impl PatchField {
     /// K·f [m] at the patch about a node, for pulls Aᵀ·f with their places at rest, around which it is flat.
     ///
     /// # Real time
-    pub(crate) fn dent(
+    pub(crate) fn residual_displacement(
         &self,
         recording: &Recording,
         node: usize,
@@ -241,7 +241,7 @@ impl PatchField {
     }
 
     /// Steepest slope of ψ [1/m].
-    pub(crate) fn dent_slope(&self) -> f64 {
+    pub(crate) fn residual_slope(&self) -> f64 {
         // ψ′ = −20·s·(1 − s)³ is steepest at a quarter.
         2.11 / self.range
     }
@@ -260,7 +260,7 @@ impl PatchField {
     ///
     /// # Real time
     pub(crate) fn residual(&self, recording: &Recording, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
-        if let Some(SomeNodes { surface, .. }) = &self.some {
+        if let Some(SampleSurface { surface, .. }) = &self.some {
             let used = |point| surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
             let mut sum = DMat3::ZERO;
             for (i, wi) in used(a) {

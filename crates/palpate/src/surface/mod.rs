@@ -4,17 +4,20 @@
 //! Σ w·u over its corners; a force at the point enters the corners with the same weights, so
 //! that work is the same on both sides and reciprocity holds.
 
-mod coarser;
-mod face;
-mod patch;
-mod thin;
-mod tree;
+mod decimation;
+mod patch_weights;
+mod poisson_disk;
+mod quadratic_face;
+mod sphere_tree;
 mod triangle;
 
-pub(crate) use coarser::coarser;
-pub(crate) use patch::{PatchWeights, triangles_around};
-pub(crate) use thin::{facing, thinned};
-pub(crate) use tree::{Bands, Bounds, Centre, Moving, Still, SurfaceTree, Visit, Walk, band, low_modes};
+pub(crate) use decimation::decimate;
+pub(crate) use patch_weights::{PatchWeights, triangles_around};
+pub(crate) use poisson_disk::{facing, poisson_disk_sample};
+pub(crate) use sphere_tree::{
+    Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
+    low_modes,
+};
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 
 use alloc::vec::Vec;
@@ -72,8 +75,8 @@ impl Surface {
         (high - low).length()
     }
 
-    /// Whether a point is one of this surface.
-    pub(crate) fn holds(&self, point: &SurfacePoint) -> bool {
+    /// Whether a point's triangle exists and its weights are barycentric.
+    pub(crate) fn contains(&self, point: &SurfacePoint) -> bool {
         (point.triangle as usize) < self.triangles.len()
             && libm::fabs(point.weights.iter().sum::<f64>() - 1.0) < 1e-9
             && point.weights.iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))

@@ -62,9 +62,9 @@ fn frame_times(
         }
         step(&model, &mut state, &input);
         if number % STEPS_PER_FRAME == 0 {
-            snapshot.take(number as u64, &input, &state);
+            snapshot.capture(number as u64, &input, &state);
             let before = Instant::now();
-            let frame = encoder.make(&snapshot, form);
+            let frame = encoder.encode(&snapshot, form);
             times.push(before.elapsed().as_nanos().min(u128::from(u32::MAX)) as u32);
             bytes += frame.len();
         }

@@ -1,0 +1,85 @@
+//! Context of a step's collision detection: the scene, and buffers that are made once.
+
+use super::candidate::CandidateList;
+use super::contact::Contact;
+use super::level_of_detail::LevelOfDetail;
+use super::node_cache::NodePositionCache;
+use super::proximity::ProximityQuery;
+use super::triangle_cache::TriangleCache;
+use crate::device::DeviceParameters;
+use crate::object::{Object, ObjectState};
+use crate::obstacle::Obstacle;
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// The immutable scene as collision detection sees it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CollisionScene<'a> {
+    pub(crate) objects: &'a [Object],
+    pub(crate) devices: &'a [DeviceParameters],
+    pub(crate) obstacles: &'a [Obstacle],
+    pub(crate) max_contact_samples: usize,
+}
+
+/// Buffers and caches of collision detection.
+#[derive(Debug, Clone)]
+pub(crate) struct CollisionWorkspace {
+    pub(crate) query: ProximityQuery,
+    /// Node positions, per object.
+    pub(crate) positions: Vec<NodePositionCache>,
+    /// Triangles near each device: devices × objects.
+    pub(crate) triangles: Vec<TriangleCache>,
+    /// Surface nodes that the broad phase leaves.
+    pub(crate) near_nodes: Vec<u32>,
+    /// Modal coordinates at a time within the step.
+    pub(crate) coordinates: Vec<f64>,
+    pub(crate) candidates: CandidateList,
+}
+
+impl CollisionWorkspace {
+    /// Buffers for a scene with room for so many contacts.
+    pub(crate) fn new(scene: CollisionScene, contacts: usize) -> Self {
+        let CollisionScene { objects, devices, .. } = scene;
+        let modes = |object: &Object| object.response.modes();
+        let nodes = |object: &Object| object.body.recording.surface.positions.len();
+        let per_device = devices.iter().flat_map(|_| objects.iter().map(|o| TriangleCache::new(modes(o))));
+        Self {
+            query: ProximityQuery::new(),
+            positions: objects.iter().map(|o| NodePositionCache::new(&o.body)).collect(),
+            triangles: per_device.collect(),
+            near_nodes: Vec::with_capacity(objects.iter().map(nodes).max().unwrap_or(0)),
+            coordinates: vec![0.0; objects.iter().map(modes).max().unwrap_or(0)],
+            candidates: CandidateList::new(contacts),
+        }
+    }
+}
+
+/// One step's collision detection.
+pub(crate) struct CollisionContext<'a> {
+    pub(crate) scene: CollisionScene<'a>,
+    pub(crate) states: &'a [ObjectState],
+    /// Contacts of the last step.
+    pub(crate) contacts: &'a [Contact],
+    /// Levels of detail: objects × (obstacles + objects).
+    pub(crate) levels: &'a mut [LevelOfDetail],
+    pub(crate) workspace: &'a mut CollisionWorkspace,
+    /// Number of the step.
+    pub(crate) step: u64,
+}
+
+impl CollisionContext<'_> {
+    /// Index of the level of detail of an object against an obstacle.
+    pub(super) fn level_against_obstacle(&self, object: usize, obstacle: usize) -> usize {
+        object * (self.scene.obstacles.len() + self.scene.objects.len()) + obstacle
+    }
+
+    /// Index of the level of detail of an object against another.
+    pub(super) fn level_against_object(&self, object: usize, other: usize) -> usize {
+        self.level_against_obstacle(object, self.scene.obstacles.len() + other)
+    }
+
+    /// Index of the triangle cache of a device on an object.
+    pub(super) fn triangle_cache(&self, device: usize, object: usize) -> usize {
+        device * self.scene.objects.len() + object
+    }
+}

@@ -1,0 +1,337 @@
+//! Objects against planes and rigid obstacles.
+//!
+//! A surface node or contact sample that comes near becomes a contact with the tangent plane of the obstacle at its nearest
+//! point, which moves with the obstacle. Round obstacles also meet the interior of triangles, and the corners of others
+//! meet the surface between the nodes.
+
+use super::ON_EDGE;
+use super::point_surface::{MARGIN, MovingPoint, point_against_surface};
+use crate::collision::candidate::{CandidateList, CandidateSide, ContactCandidate};
+use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
+use crate::collision::context::CollisionContext;
+use crate::collision::deformed_surface::{DeformedSurface, Moment};
+use crate::object::ObjectState;
+use crate::obstacle::Obstacle;
+use crate::response::{Body, ContactLocation, Footprint};
+use crate::spatial::Pose;
+use crate::surface::{Centre, SurfacePoint, at_weights};
+use glam::{DAffine3, DVec3};
+
+/// Displacement of a free node by forces on its neighbours, as a share of theirs: an upper bound between neighbours.
+const NEIGHBOUR_DISPLACEMENT: f64 = 0.3;
+
+/// Upper limit of conservative advancements.
+const MAX_ADVANCEMENTS: usize = 30;
+
+/// An object and an obstacle over a step.
+struct ObstacleQuery<'a> {
+    object: usize,
+    number: usize,
+    body: &'a Body,
+    own: &'a ObjectState,
+    obstacle: &'a Obstacle,
+    /// Level of detail of the object: 0 for all nodes.
+    level: usize,
+    /// Obstacle at the start and at the end.
+    before: Pose,
+    after: Pose,
+    /// Maps from the body to the obstacle's frame at the start, and at the end without contact force.
+    obstacle_from_body: DAffine3,
+    obstacle_from_body_after: DAffine3,
+    /// Bound of the relative rigid motion of body and obstacle [m].
+    travel: f64,
+    /// Distance within which nodes become candidates [m], and the addition to it where the travel could lead through the
+    /// obstacle.
+    margin: f64,
+    sweep_margin: f64,
+}
+
+impl CollisionContext<'_> {
+    /// Find the contacts of an object with an obstacle that moves from one pose to another.
+    ///
+    /// # Real time
+    /// Costs the nodes that are near, and the logarithm of all.
+    pub(crate) fn find_obstacle_contacts(&mut self, at: usize, number: usize, before: Pose, after: Pose) {
+        let (object, obstacle) = (&self.scene.objects[at], &self.scene.obstacles[number]);
+        let (body, own) = (&object.body, &self.states[at]);
+        let (start, free) = (own.rigid.pose, own.free.end.pose);
+        let apart = (before.position - start.position).length();
+        let travel =
+            before.motion_bound(&after, apart + object.radius) + start.motion_bound(&free, object.radius);
+        let mut query = ObstacleQuery {
+            object: at,
+            number,
+            body,
+            own,
+            obstacle,
+            level: 0,
+            before,
+            after,
+            obstacle_from_body: start.seen_from(&before),
+            obstacle_from_body_after: free.seen_from(&after),
+            travel,
+            margin: MARGIN * body.edge + NEIGHBOUR_DISPLACEMENT * own.contact_displacement,
+            sweep_margin: if travel > 0.5 * obstacle.shape.size() { travel } else { 0.0 },
+        };
+        let max_samples = self.scene.max_contact_samples;
+        let level = self.level_against_obstacle(at, number);
+        let mark = self.workspace.candidates.mark();
+        loop {
+            query.level = self.levels[level].level;
+            let footprint = body.footprint_at_level(query.level);
+            let positions = &mut self.workspace.positions[at];
+            let moment = Moment::StepStart(self.step);
+            let surface =
+                &mut DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+            surface.cover_prediction();
+            let reach = object.radius + surface.max_displacement() + travel + query.margin;
+            let candidates = &mut self.workspace.candidates;
+            if apart - reach <= obstacle.shape.radius() {
+                let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
+                query.nodes(surface, known, candidates, mark.len.saturating_add(max_samples));
+            }
+            let found = candidates.list.len() - mark.len;
+            if found > max_samples && query.level < body.coarsest_level() {
+                candidates.rewind(mark);
+                self.levels[level] = self.levels[level].coarser(self.step);
+                continue;
+            }
+            self.levels[level] = self.levels[level].after(found, max_samples, self.step);
+            break;
+        }
+        if obstacle.shape.has_corners() {
+            query.corners(self);
+        }
+    }
+}
+
+impl ObstacleQuery<'_> {
+    /// Distance of a body point from the obstacle at the start [m]; infinite where it is more than `most`.
+    fn distance(&self, p: DVec3, most: f64) -> f64 {
+        let local = self.obstacle_from_body.transform_point3(p);
+        self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// Distance of a body point at the end of the step without contact force [m].
+    fn distance_after(&self, p: DVec3, most: f64) -> f64 {
+        let local = self.obstacle_from_body_after.transform_point3(p);
+        self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// Whether a point is within a reach [m] at the start or at the end of the step. Its end is computed only if it can
+    /// be near.
+    fn approaches(&self, start: DVec3, end: impl FnOnce() -> DVec3, reach: f64) -> bool {
+        let most = reach + self.travel + self.own.surface_motion;
+        let distance = self.distance(start, most);
+        distance < reach || distance < most && self.distance_after(end(), reach) < reach
+    }
+
+    /// Nodes or contact samples, and for round obstacles the interiors of triangles.
+    fn nodes(
+        &self,
+        surface: &mut DeformedSurface,
+        known: &[Contact],
+        candidates: &mut CandidateList,
+        most: usize,
+    ) {
+        let footprint = self.body.footprint_at_level(self.level);
+        let triangles = &self.body.surface(footprint).triangles;
+        let is_full = core::cell::Cell::new(false);
+        let residual = surface.max_residual();
+        surface.clear_marks();
+        surface.traverse(
+            |surface, of, centre, radius| {
+                if is_full.get() {
+                    return false;
+                }
+                let reach = radius + self.margin + self.sweep_margin;
+                match of {
+                    Centre::Rest => self.distance(centre, reach + self.travel) < reach + self.travel,
+                    Centre::LowModes(node) => {
+                        self.approaches(centre, || surface.predicted_low_mode_position(node), reach)
+                    }
+                    Centre::Deformed(node) => {
+                        self.approaches(centre, || surface.predicted_position(node), reach)
+                    }
+                }
+            },
+            |surface, triangle, high| {
+                for node in triangles[triangle as usize].map(|n| n as usize) {
+                    if !surface.mark_node(node) {
+                        continue;
+                    }
+                    let feature = self.feature(node);
+                    let position = match known.binary_search_by(|c| c.id.feature.cmp(&feature)) {
+                        Ok(contact) => {
+                            let point = self.own.points.of(known[contact].slot);
+                            point.rest + point.state.displacement
+                        }
+                        Err(_) => {
+                            let reach = self.margin + residual + self.sweep_margin;
+                            // The low modes alone may exclude it.
+                            let low = surface.low_mode_position(node);
+                            let end = || surface.predicted_low_mode_position(node);
+                            if !self.approaches(low, end, reach + high) {
+                                continue;
+                            }
+                            let modal = surface.modal_position(node);
+                            if !self.approaches(modal, || surface.predicted_position(node), reach) {
+                                continue;
+                            }
+                            surface.position(node)
+                        }
+                    };
+                    let free = surface.predicted_position(node);
+                    let location =
+                        ContactLocation { point: self.body.node_point(footprint, node), footprint };
+                    self.meet(candidates, position, free, location, feature);
+                }
+                if self.level == 0 {
+                    self.triangle_interior(surface, triangle, residual, candidates);
+                }
+                is_full.set(candidates.list.len() > most && self.level < self.body.coarsest_level());
+            },
+        );
+    }
+
+    /// Interior of a triangle, where a round obstacle comes nearer to it than to its nodes.
+    fn triangle_interior(
+        &self,
+        surface: &mut DeformedSurface,
+        triangle: u32,
+        residual: f64,
+        candidates: &mut CandidateList,
+    ) {
+        if !self.obstacle.shape.is_round() {
+            return;
+        }
+        let corners = self.body.recording.surface.triangles[triangle as usize].map(|n| n as usize);
+        let positions = corners.map(|node| surface.modal_position(node));
+        let local = positions.map(|p| self.obstacle_from_body.transform_point3(p));
+        let Some(weights) = self.obstacle.shape.deepest(local) else { return };
+        // Inside the triangle, or on an edge, which counts for one of its two triangles.
+        let is_thin = |k: &usize| weights[*k] < ON_EDGE;
+        let edge = (0..3).find(is_thin).map(|k| (corners[(k + 1) % 3], corners[(k + 2) % 3]));
+        if (0..3).filter(is_thin).count() > 1 || edge.is_some_and(|(a, b)| a > b) {
+            return;
+        }
+        let far = f64::INFINITY;
+        let deepest = self.distance(at_weights(positions, weights), far);
+        let is_nearer = |p: &DVec3| self.distance(*p, far) < deepest + 1e-3 * self.body.edge;
+        if deepest > self.margin + residual + self.sweep_margin || positions.iter().any(is_nearer) {
+            return;
+        }
+        let starts = corners.map(|node| surface.position(node));
+        let ends = corners.map(|node| surface.predicted_position(node));
+        let location =
+            ContactLocation { point: SurfacePoint { triangle, weights }, footprint: Footprint::Point };
+        let feature = FeatureId::Triangle(triangle);
+        self.meet(candidates, at_weights(starts, weights), at_weights(ends, weights), location, feature);
+    }
+
+    /// Push a candidate if a point that moves from one body position to another comes near the obstacle.
+    fn meet(
+        &self,
+        candidates: &mut CandidateList,
+        from: DVec3,
+        to: DVec3,
+        location: ContactLocation,
+        feature: FeatureId,
+    ) {
+        let shape = &self.obstacle.shape;
+        let (start, end) = (
+            self.obstacle_from_body.transform_point3(from),
+            self.obstacle_from_body_after.transform_point3(to),
+        );
+        let distance = |p: DVec3| shape.signed_distance(p, f64::INFINITY);
+        let (Some((first, _)), Some((last, _))) = (distance(start), distance(end)) else { return };
+        let travel = (end - start).length();
+        // In the obstacle's frame: where a fast point first touches, else where it is.
+        let mut position = start;
+        if travel > 0.5 * shape.size() && first > 0.0 {
+            let mut t = 0.0;
+            for _ in 0..MAX_ADVANCEMENTS {
+                position = start.lerp(end, t);
+                let Some((gap, _)) = distance(position) else { return };
+                if gap < 0.5 * self.margin {
+                    break;
+                }
+                t += (gap / travel).max(1e-3);
+                if t >= 1.0 {
+                    return;
+                }
+            }
+        } else if first.min(last) > self.margin + libm::fabs(last - first) {
+            return;
+        }
+        let Some((gap, outward)) = distance(position) else { return };
+        let nearest = position - outward * gap;
+        let normal = -(self.before.orientation * outward);
+        self.push(candidates, feature, location, normal, nearest);
+    }
+
+    /// Feature of a node at the present level of detail.
+    fn feature(&self, node: usize) -> FeatureId {
+        match self.level {
+            0 => FeatureId::Node(node as u32),
+            level => FeatureId::Sample { level: level as u8, node: node as u32 },
+        }
+    }
+
+    /// Push a contact of a location with a point of the obstacle, in its frame.
+    fn push(
+        &self,
+        candidates: &mut CandidateList,
+        feature: FeatureId,
+        location: ContactLocation,
+        normal: DVec3,
+        other: DVec3,
+    ) {
+        candidates.push(ContactCandidate {
+            id: ContactId { collider: Collider::Obstacle(self.number), object: self.object, feature },
+            location,
+            other: CandidateSide::Obstacle {
+                number: self.number,
+                start: self.before.world_from_body(other),
+                end: self.after.world_from_body(other),
+            },
+            law: ContactLaw::Unilateral { friction: self.obstacle.friction },
+            normal,
+            distance: 0.0,
+        });
+    }
+
+    /// Corners of the obstacle against the surface.
+    fn corners(&self, context: &mut CollisionContext) {
+        let (start, free) = (self.own.rigid.pose, self.own.free.end.pose);
+        let contacts = context.contacts;
+        let workspace = &mut *context.workspace;
+        let (query, candidates) = (&mut workspace.query, &mut workspace.candidates);
+        let positions = &mut workspace.positions[self.object];
+        let moment = Moment::StepStart(context.step);
+        let (response, points) = (&self.own.response, &self.own.points);
+        let surface =
+            &mut DeformedSurface::new(self.body, Footprint::Point, response, points, positions, moment);
+        let grown = surface.max_displacement() + self.margin + self.travel;
+        self.obstacle.shape.corners(
+            |centre, radius| {
+                let centre = start.body_from_world(self.before.world_from_body(centre));
+                self.body.rest_box_is_within(centre, radius + grown)
+            },
+            |corner, position| {
+                let feature = FeatureId::Corner(corner as u32);
+                let id =
+                    ContactId { collider: Collider::Obstacle(self.number), object: self.object, feature };
+                let known = contacts.binary_search_by(|c| c.id.cmp(&id)).ok();
+                let known = known.map(|at| self.own.points.of(contacts[at].slot).location.point.triangle);
+                let point = start.body_from_world(self.before.world_from_body(position));
+                let travel = (free.body_from_world(self.after.world_from_body(position)) - point).length();
+                let moving = MovingPoint { point, travel, facing: DVec3::ZERO, known, edge: self.body.edge };
+                if let Some((point, normal)) = point_against_surface(query, surface, &moving) {
+                    let location = ContactLocation { point, footprint: Footprint::Point };
+                    self.push(candidates, feature, location, start.orientation * normal, position);
+                }
+            },
+        );
+    }
+}

@@ -1,0 +1,327 @@
+//! Device tips against objects: contacts of the proxy, a ball with the tip's radius, with the deformed surface.
+//!
+//! Where a surface comes within reach of the proxy in a step, the nearest point of each face becomes a contact, and the solver
+//! keeps the ball outside (god-object of Zilles & Salisbury 1995). A contact stays at its material point while it sticks; when
+//! it slips or rolls it follows the point nearest to the proxy. Fast tips are swept by conservative advancement.
+
+use super::phong_projection::phong_project;
+use crate::collision::candidate::{CandidateSide, ContactCandidate};
+use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
+use crate::collision::context::CollisionContext;
+use crate::collision::deformed_surface::{DeformedSurface, MAX_TIP_CONTACTS, Moment, TriangleProjection};
+use crate::collision::proximity::{ProximityQuery, SAME_FACE};
+use crate::device::{DeviceParameters, DeviceState};
+use crate::response::{Body, ContactLocation, Footprint};
+use crate::surface::SurfacePoint;
+use glam::DVec3;
+
+/// Tangential distance of the proxy, as a share of the contact's size, below which its material point stays.
+const ROLL_TOLERANCE: f64 = 1e-3;
+
+/// Cosine below which two faces are the front and the back of one wall.
+const OPPOSED: f64 = -0.5;
+
+/// Least radius of a tip, as a share of the mean edge: a point needs a side from which it comes.
+const MIN_TIP: f64 = 1e-3;
+
+/// Upper limit of conservative advancements along a path; each about halves the distance.
+const MAX_ADVANCEMENTS: usize = 40;
+
+/// Upper limit of samples along a slide.
+const MAX_SLIDE_SAMPLES: f64 = 8.0;
+
+/// A device and an object in a step.
+#[derive(Clone, Copy)]
+pub(crate) struct TipPair<'a> {
+    pub(crate) number: usize,
+    pub(crate) device: &'a DeviceState,
+    pub(crate) object: usize,
+    /// Whether the proxy appears in this step, so that the side it is on is not known.
+    pub(crate) is_new: bool,
+}
+
+/// Motion of a proxy relative to an object over a step, and how the object is read.
+struct Path {
+    object: usize,
+    footprint: Footprint,
+    /// Proxy at the start, and at the end without contact force [m, body].
+    start: DVec3,
+    free: DVec3,
+    /// Bound of the relative motion of proxy and surface [m].
+    motion: f64,
+}
+
+impl CollisionContext<'_> {
+    /// Find the contacts of a device with an object. `inside` says whether the proxy is known to be inside, where it
+    /// touches nothing until it has come out.
+    ///
+    /// # Real time
+    pub(crate) fn find_tip_contacts(&mut self, pair: TipPair, inside: &mut bool) {
+        let TipPair { number, device, object: at, is_new } = pair;
+        let (object, own) = (&self.scene.objects[at], &self.states[at]);
+        let parameters = &self.scene.devices[number];
+        let body = &object.body;
+        let footprint = body.footprint(parameters.patch_radius);
+        let tip = parameters.tip_radius.max(MIN_TIP * body.edge);
+        let start = own.rigid.pose.body_from_world(device.proxy);
+        let free = own.free.end.pose.body_from_world(device.proxy_under_force());
+        let travel = (free - start).length();
+        let motion = travel + own.surface_motion;
+
+        let own_contacts = self.own_locations(number, at);
+        let triangle_cache = self.triangle_cache(number, at);
+        let workspace = &mut *self.workspace;
+        let positions = &mut workspace.positions[at];
+        let moment = Moment::StepStart(self.step);
+        let mut surface =
+            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+        if start.length() - motion - tip > object.radius + surface.max_displacement() {
+            *inside = false;
+            return;
+        }
+        surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
+        let query = &mut workspace.query;
+        if is_new || *inside {
+            let Some(nearest) = ProximityQuery::nearest(&mut surface, start, f64::INFINITY) else { return };
+            query.triangles_within(&mut surface, start, nearest.distance * (1.0 + 1e-9) + 1e-12);
+            *inside = query.is_inside(start);
+            if *inside {
+                return;
+            }
+        }
+        let reach = tip + 1.2 * travel + 0.02 * body.edge;
+        let triangles = &mut workspace.triangles[triangle_cache];
+        triangles.find(query, &mut surface, start, reach);
+        // The surface here moves about as its nearest nodes do.
+        let mut motion = motion;
+        if let Some(nearest) = query.found.first().copied() {
+            let local = 1.5 * surface.predicted_motion(nearest.triangle);
+            motion = motion.min(travel + local + 0.01 * body.edge);
+        }
+        // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
+        let is_fast = motion > 0.5 * tip.max(0.5 * body.edge);
+        let needed = if is_fast { 1.05 * tip } else { tip + 1.2 * motion };
+        if needed > reach {
+            triangles.find(query, &mut surface, start, needed);
+        }
+        query.keep_local_minima(body, needed, 2 * MAX_TIP_CONTACTS);
+        let mut contacts = TipContacts { list: [None; MAX_TIP_CONTACTS], count: 0, tip };
+        for found in &query.found {
+            contacts.add(&mut surface, found, start, own.rigid.pose.orientation);
+        }
+        let path = Path { object: at, footprint, start, free, motion };
+        if is_fast {
+            self.sweep_tip(&mut contacts, &path);
+        }
+        self.push_tip_candidates(&contacts, number, &path);
+    }
+
+    /// Continue the incremental rebuild of a device's triangle cache on an object.
+    ///
+    /// # Real time
+    pub(crate) fn rebuild_ahead(&mut self, number: usize, at: usize) {
+        let cache = self.triangle_cache(number, at);
+        let Some(coordinates) = self.workspace.triangles[cache].take_rebuild_coordinates() else { return };
+        let own_contacts = self.own_locations(number, at);
+        let (body, own) = (&self.scene.objects[at].body, &self.states[at]);
+        let parameters = &self.scene.devices[number];
+        let footprint = body.footprint(parameters.patch_radius);
+        let positions = &mut self.workspace.positions[at];
+        let moment = Moment::Coordinates(&coordinates[..own.response.coordinates().len()]);
+        let mut surface =
+            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+        surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
+        self.workspace.triangles[cache].continue_rebuild(&mut surface);
+        self.workspace.triangles[cache].return_rebuild_coordinates(coordinates, body);
+    }
+
+    /// Locations at which a device is in contact with an object: their residual displacement is its own.
+    fn own_locations(&self, number: usize, at: usize) -> [Option<ContactLocation>; MAX_TIP_CONTACTS] {
+        let mut locations = [None; MAX_TIP_CONTACTS];
+        let contacts = contacts_between(self.contacts, Collider::Device(number), at);
+        for (location, contact) in locations.iter_mut().zip(contacts) {
+            *location = Some(self.states[at].points.of(contact.slot).location);
+        }
+        locations
+    }
+
+    /// Sweep a fast proxy: add the faces that it meets first on its path.
+    fn sweep_tip(&mut self, contacts: &mut TipContacts, path: &Path) {
+        let Path { object: at, footprint, start, free, motion } = *path;
+        let own = &self.states[at];
+        let body = &self.scene.objects[at].body;
+        let (from, to) = (own.response.coordinates(), own.response.free_coordinates());
+        let (before, after) = (own.rigid.pose.orientation, own.free.end.pose.orientation);
+        let workspace = &mut *self.workspace;
+        let blend = &mut workspace.coordinates[..from.len()];
+        let interpolate = |t: f64, blend: &mut [f64]| {
+            blend.iter_mut().zip(from.iter().zip(to)).for_each(|(q, (a, b))| *q = a + t * (b - a));
+        };
+        let (query, positions) = (&mut workspace.query, &mut workspace.positions[at]);
+        let touching = contacts.count;
+        if touching == 0 {
+            // Free: conservative advancement to the first touch.
+            let mut t = 0.0;
+            for _ in 0..MAX_ADVANCEMENTS {
+                interpolate(t, blend);
+                let moment = Moment::Coordinates(blend);
+                let mut surface =
+                    DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+                let p = start.lerp(free, t);
+                let reach = motion * (1.0 - t) + 2.0 * contacts.tip;
+                let Some(nearest) = ProximityQuery::nearest(&mut surface, p, reach) else { return };
+                let gap = nearest.distance - contacts.tip;
+                if gap < 0.02 * contacts.tip {
+                    query.triangles_within(&mut surface, p, contacts.tip + gap + 0.05 * contacts.tip);
+                    query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
+                    for found in &query.found {
+                        contacts.add(&mut surface, found, p, before.slerp(after, t));
+                    }
+                    return;
+                }
+                t += (gap / motion).max(1e-4);
+                if t >= 1.0 {
+                    return;
+                }
+            }
+            return;
+        }
+        // Touching: samples along the slide on the touched faces, to the first other face.
+        let mut slide = free - start;
+        for contact in contacts.all() {
+            slide -= contact.normal_in_body * slide.dot(contact.normal_in_body).min(0.0);
+        }
+        let count =
+            libm::ceil(slide.length() / (0.5 * contacts.tip.max(0.5 * body.edge))).min(MAX_SLIDE_SAMPLES);
+        for k in 1..=count as u32 {
+            let t = f64::from(k) / count;
+            interpolate(t, blend);
+            let moment = Moment::Coordinates(blend);
+            let mut surface =
+                DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+            let p = start + slide * t;
+            query.triangles_within(&mut surface, p, 0.98 * contacts.tip.max(slide.length() / count));
+            query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
+            for found in &query.found {
+                let is_other = contacts.all().all(|c| c.normal_in_body.dot(found.normal) < SAME_FACE);
+                // Met from outside: the slide leads against it.
+                if is_other && slide.dot(found.normal) < 0.0 {
+                    let beside = found.position + found.normal * contacts.tip;
+                    contacts.add(&mut surface, found, beside, before.slerp(after, t));
+                }
+            }
+            if contacts.count > touching {
+                return;
+            }
+        }
+    }
+
+    /// Push the tip contacts as candidates, matched with the contacts of the last step.
+    fn push_tip_candidates(&mut self, contacts: &TipContacts, number: usize, path: &Path) {
+        let Path { object: at, footprint, start, motion, .. } = *path;
+        let (own, body) = (&self.states[at], &self.scene.objects[at].body);
+        let parameters = &self.scene.devices[number];
+        let size = contacts.tip.max(parameters.patch_radius).max(0.1 * body.edge);
+        let mut taken = [false; 2 * MAX_TIP_CONTACTS];
+        let collider = Collider::Device(number);
+        let known = contacts_between(self.contacts, collider, at);
+        for found in contacts.all() {
+            let rest = body.recording.surface.rest_position(&found.point);
+            let mut location = ContactLocation { point: found.point, footprint };
+            // The nearest contact of the last step on the surface, within reach of the motion.
+            let is_free = |c: &&Contact| tip_number(c).is_some_and(|number| !taken[number as usize]);
+            let distance = |c: &Contact| (own.points.of(c.slot).rest - rest).length();
+            let before = known.iter().filter(is_free).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let before = before.filter(|c| distance(c) < size + 2.0 * motion + body.edge);
+            let feature = match before.and_then(|contact| Some((contact, tip_number(contact)?))) {
+                Some((contact, feature)) => {
+                    let point = own.points.of(contact.slot);
+                    let away = start - (point.rest + point.state.displacement);
+                    let aside = away - found.normal_in_body * found.normal_in_body.dot(away);
+                    if aside.length() < ROLL_TOLERANCE * size {
+                        location = point.location;
+                    }
+                    feature
+                }
+                None => {
+                    let is_used = |feature: u8| {
+                        taken[feature as usize] || known.iter().any(|c| tip_number(c) == Some(feature))
+                    };
+                    (0..taken.len() as u8).find(|&feature| !is_used(feature)).unwrap_or_default()
+                }
+            };
+            taken[feature as usize] = true;
+            self.workspace.candidates.push(ContactCandidate {
+                id: ContactId { collider, object: at, feature: FeatureId::Tip(feature) },
+                location,
+                other: CandidateSide::Device(number),
+                law: ContactLaw::Unilateral { friction: parameters.friction },
+                normal: found.normal_in_world,
+                distance: contacts.tip,
+            });
+        }
+    }
+}
+
+/// Number of a tip contact; none for a held point.
+fn tip_number(contact: &Contact) -> Option<u8> {
+    match contact.id.feature {
+        FeatureId::Tip(number) => Some(number),
+        _ => None,
+    }
+}
+
+/// Distance from a location that a tip presses up to which the surface moves as the location does [m].
+fn flat_radius(parameters: &DeviceParameters, body: &Body) -> f64 {
+    1.5 * (parameters.patch_radius + body.edge)
+}
+
+/// Contact of a tip with a face.
+#[derive(Clone, Copy)]
+struct TipContact {
+    point: SurfacePoint,
+    normal_in_world: DVec3,
+    normal_in_body: DVec3,
+}
+
+/// Contacts of a tip with an object, one per face.
+struct TipContacts {
+    list: [Option<TipContact>; MAX_TIP_CONTACTS],
+    count: usize,
+    /// Tip radius [m].
+    tip: f64,
+}
+
+impl TipContacts {
+    /// Add a nearest point if the proxy is on its outer side and its face is not known.
+    fn add(
+        &mut self,
+        surface: &mut DeformedSurface,
+        found: &TriangleProjection,
+        proxy: DVec3,
+        orientation: glam::DQuat,
+    ) {
+        // A proxy on the surface itself may be below it by round-off.
+        let clearance = (proxy - found.position).dot(found.normal);
+        if self.count == MAX_TIP_CONTACTS || clearance < -0.5 * self.tip || found.normal == DVec3::ZERO {
+            return;
+        }
+        let foot = phong_project(surface, found, proxy, self.tip);
+        // Two nearest points of one smooth surface are one contact; the back of a wall whose front is touched is none.
+        let is_known = |c: &TipContact| c.normal_in_body.dot(foot.normal) > SAME_FACE;
+        let is_back = |c: &TipContact| clearance < 0.0 && c.normal_in_body.dot(foot.normal) < OPPOSED;
+        if self.all().any(|c| is_known(c) || is_back(c)) {
+            return;
+        }
+        self.list[self.count] = Some(TipContact {
+            point: SurfacePoint { triangle: foot.triangle, weights: foot.weights },
+            normal_in_world: orientation * foot.normal,
+            normal_in_body: foot.normal,
+        });
+        self.count += 1;
+    }
+
+    fn all(&self) -> impl Iterator<Item = &TipContact> {
+        self.list.iter().flatten()
+    }
+}

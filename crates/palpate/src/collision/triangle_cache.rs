@@ -1,0 +1,351 @@
+//! Triangle cache: the triangles near a point that moves little from step to step, a Verlet list with a skin.
+//!
+//! A list built with reach r + skin holds all triangles within r while point and surface together have moved less than the
+//! skin since. The next list is built before that, a part of the traversal in each step.
+
+use super::deformed_surface::{DeformedSurface, TriangleProjection};
+use super::proximity::{MAX_TRIANGLES, ProximityQuery, collect_within, keep_local_minima, sort_by_distance};
+use crate::response::Body;
+use crate::surface::Traversal;
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Skin as a share of the mean edge, and of the reach. Where only seeds are kept the skin is thin, since another face may
+/// come up before long.
+const SKIN_EDGE: f64 = 0.8;
+const SKIN_EDGE_SEEDED: f64 = 0.15;
+const SKIN_REACH: f64 = 0.25;
+
+/// An incremental rebuild takes this share of the steps in which the skin is used up, between these limits [steps], and
+/// visits so many spheres and triangles a step at least.
+const REBUILD_SHARE: f64 = 0.2;
+const MIN_REBUILD_STEPS: f64 = 3.0;
+const MAX_REBUILD_STEPS: f64 = 8.0;
+const MIN_VISITS_PER_STEP: usize = 24;
+
+/// A list that has to be rebuilt at once is rebuilt with this share of its skin left, if no other one is in this step.
+const EARLY_REBUILD_SHARE: f64 = 0.4;
+
+/// Weight of the latest step in the smoothed speed.
+const SPEED_SMOOTHING: f64 = 0.1;
+
+/// Of more triangles than this only seeds are kept: the local minima of the distance, so many at most, from which a descent
+/// of so many steps leads to the present minimum.
+const SEED_ABOVE: usize = 48;
+const MAX_SEEDS: usize = 8;
+const MAX_DESCENT_STEPS: usize = 64;
+
+/// Verlet list of the triangles around a point.
+#[derive(Debug, Clone)]
+struct TriangleList {
+    /// Triangles, the nearest first, with their distances when it was built [m].
+    triangles: Vec<(u32, f64)>,
+    /// Seeds, where there are too many triangles; else empty.
+    seeds: Vec<u32>,
+    /// Point [m, body], modal coordinates, and the range of the largest residual displacement [m] while it was built.
+    point: DVec3,
+    q: Vec<f64>,
+    residual: [f64; 2],
+    /// Distance within which it is complete [m]; 0 for an empty list.
+    reach: f64,
+}
+
+impl TriangleList {
+    fn new(modes: usize) -> Self {
+        Self {
+            triangles: Vec::with_capacity(MAX_TRIANGLES),
+            seeds: Vec::with_capacity(MAX_SEEDS),
+            point: DVec3::ZERO,
+            q: vec![0.0; modes],
+            residual: [0.0; 2],
+            reach: 0.0,
+        }
+    }
+
+    /// Upper bound of the relative displacement of point and surface since the list was built [m].
+    fn displacement_since_build(&self, surface: &DeformedSurface, p: DVec3) -> f64 {
+        let deformed = surface.body.displacement_bound(&self.q[..surface.q.len()], surface.q);
+        let residual = self.residual.map(|residual| libm::fabs(surface.max_residual() - residual));
+        deformed + 2.0 * residual[0].max(residual[1]) + (p - self.point).length()
+    }
+}
+
+/// Triangle cache of one device on one object.
+#[derive(Debug, Clone)]
+pub(crate) struct TriangleCache {
+    current: TriangleList,
+    /// List that is being built, its triangles so far, its traversal, and the number of visits: so far, and per step.
+    next: TriangleList,
+    found: Vec<TriangleProjection>,
+    traversal: Traversal,
+    visited: usize,
+    visits_per_step: usize,
+    /// Displacement since the build in the last step [m], if the same list was used, and its smoothed growth per step [m].
+    displacement: Option<f64>,
+    speed: f64,
+    seed_above: usize,
+}
+
+impl TriangleCache {
+    pub(crate) fn new(modes: usize) -> Self {
+        Self {
+            current: TriangleList::new(modes),
+            next: TriangleList::new(modes),
+            found: Vec::with_capacity(MAX_TRIANGLES),
+            traversal: Traversal::FINISHED,
+            visited: 0,
+            visits_per_step: MIN_VISITS_PER_STEP,
+            displacement: None,
+            speed: 0.0,
+            seed_above: SEED_ABOVE,
+        }
+    }
+
+    /// Find the triangles within a reach [m] of a body point, or some more; of many only the local minima.
+    ///
+    /// # Real time
+    /// Costs the listed triangles; a full rebuild where point or surface is fast, or comes anew.
+    pub(crate) fn find(
+        &mut self,
+        query: &mut ProximityQuery,
+        surface: &mut DeformedSurface,
+        p: DVec3,
+        reach: f64,
+    ) {
+        let displacement = self.current.displacement_since_build(surface, p);
+        let skin = self.current.reach - reach;
+        let left = skin - displacement;
+        if let Some(before) = self.displacement.replace(displacement) {
+            self.speed += SPEED_SMOOTHING * ((displacement - before).max(0.0) - self.speed);
+        }
+        let steps = REBUILD_SHARE * skin / self.speed;
+        let is_early = self.traversal.is_finished()
+            && steps < MIN_REBUILD_STEPS
+            && left < EARLY_REBUILD_SHARE * skin
+            && !query.rebuilt_cache;
+        if left <= 0.0 || self.current.reach == 0.0 || is_early {
+            query.rebuilt_cache = true;
+            self.begin_rebuild(surface, p, reach);
+            self.resume_rebuild(surface, usize::MAX);
+            self.finish_rebuild(surface.body);
+            query.found.clone_from(&self.found);
+            return;
+        }
+        let steps = steps.min(MAX_REBUILD_STEPS);
+        let begins = steps >= MIN_REBUILD_STEPS && left < self.speed * 2.0 * steps;
+        if self.traversal.is_finished() && begins {
+            self.visits_per_step = MIN_VISITS_PER_STEP.max((self.visited as f64 / steps) as usize + 1);
+            self.begin_rebuild(surface, p, reach);
+        }
+        let found = &mut query.found;
+        found.clear();
+        if self.current.seeds.is_empty() {
+            let triangles = self.current.triangles.iter();
+            let within = triangles.take_while(|(_, distance)| *distance < reach + displacement);
+            found.extend(within.map(|&(triangle, _)| surface.project_on_triangle(triangle, p)));
+        } else {
+            found.extend(self.current.seeds.iter().map(|&seed| descend(surface, seed, p)));
+        }
+        sort_by_distance(found);
+    }
+
+    /// Take the modal coordinates at which the next list is being built, if one is.
+    pub(crate) fn take_rebuild_coordinates(&mut self) -> Option<Vec<f64>> {
+        (!self.traversal.is_finished()).then(|| core::mem::take(&mut self.next.q))
+    }
+
+    /// Continue an incremental rebuild, on the surface at the coordinates of its beginning with the present residual
+    /// displacement.
+    ///
+    /// # Real time
+    /// Costs a part of a rebuild.
+    pub(crate) fn continue_rebuild(&mut self, surface: &mut DeformedSurface) {
+        self.resume_rebuild(surface, self.visits_per_step);
+    }
+
+    /// Return the coordinates; a finished list becomes the current one.
+    pub(crate) fn return_rebuild_coordinates(&mut self, coordinates: Vec<f64>, body: &Body) {
+        self.next.q = coordinates;
+        if self.traversal.is_finished() {
+            self.finish_rebuild(body);
+        }
+    }
+
+    fn begin_rebuild(&mut self, surface: &DeformedSurface, p: DVec3, reach: f64) {
+        let skin = if self.current.seeds.is_empty() { SKIN_EDGE } else { SKIN_EDGE_SEEDED };
+        let next = &mut self.next;
+        next.q[..surface.q.len()].copy_from_slice(surface.q);
+        (next.point, next.residual) = (p, [surface.max_residual(); 2]);
+        next.reach = reach + skin * surface.body.edge + SKIN_REACH * reach;
+        (self.traversal, self.visited) = (Traversal::START, 0);
+        self.found.clear();
+    }
+
+    /// Resume the traversal on the surface at the coordinates of its beginning.
+    fn resume_rebuild(&mut self, surface: &mut DeformedSurface, visits: usize) {
+        let Self { next, found, traversal, .. } = self;
+        let (p, reach, residual) = (next.point, next.reach, surface.max_residual());
+        next.residual = [next.residual[0].min(residual), next.residual[1].max(residual)];
+        self.visited += collect_within(surface, (traversal, visits), p, reach, found);
+    }
+
+    /// Make the next list the current one.
+    fn finish_rebuild(&mut self, body: &Body) {
+        let Self { current, next, found, .. } = self;
+        sort_by_distance(found);
+        next.triangles.clear();
+        next.triangles.extend(found.iter().map(|found| (found.triangle, found.distance)));
+        // A full list is complete up to its farthest triangle only.
+        if let (MAX_TRIANGLES, Some(farthest)) = (found.len(), found.last()) {
+            next.reach = farthest.distance;
+        }
+        next.seeds.clear();
+        if next.triangles.len() > self.seed_above {
+            keep_local_minima(found, body, f64::INFINITY, MAX_SEEDS);
+            next.seeds.extend(found.iter().map(|found| found.triangle));
+        }
+        core::mem::swap(current, next);
+        self.displacement = None;
+    }
+}
+
+/// Local minimum of the distance to a body point, from a triangle over edges and corners while that leads nearer.
+fn descend(surface: &mut DeformedSurface, triangle: u32, p: DVec3) -> TriangleProjection {
+    let mut best = surface.project_on_triangle(triangle, p);
+    let body = surface.body;
+    for _ in 0..MAX_DESCENT_STEPS {
+        let corners = body.recording.surface.triangles[best.triangle as usize];
+        let mut on = corners.iter().zip(best.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| *node);
+        let before = best;
+        let mut look = |surface: &mut DeformedSurface, triangle: u32| {
+            let one = surface.project_on_triangle(triangle, p);
+            if one.distance < best.distance {
+                best = one;
+            }
+        };
+        match (on.next(), on.next(), on.next()) {
+            (Some(a), Some(b), None) => {
+                if let Some(over) = body.triangle_across(before.triangle, a, b) {
+                    look(surface, over);
+                }
+            }
+            (Some(corner), None, None) => {
+                body.triangles_around(corner as usize).iter().for_each(|&other| look(surface, other));
+            }
+            _ => {}
+        }
+        if best.triangle == before.triangle {
+            break;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::deformed_surface::Moment;
+    use crate::collision::node_cache::NodePositionCache;
+    use crate::recording::Recording;
+    use crate::response::{ContactPoints, Footprint, Response, ResponseForm};
+    use alloc::sync::Arc;
+
+    /// Deterministic number in [-1, 1] of a case.
+    fn wave(case: u32, k: f64) -> f64 {
+        libm::sin(12.9 * f64::from(case) + 7.3 * k + 1.0)
+    }
+
+    /// A point moves about a deforming body. Counts steps with all triangles, steps with seeds, those of the latter that had
+    /// the nearest one, rebuilds at once, and incremental rebuilds.
+    fn follow(footprint_of: impl Fn(&Body) -> Footprint, seed_above: usize, speed: f64) -> [u32; 5] {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let body = Body::new(recording.clone(), &[2.0 * recording.surface.mean_edge()], usize::MAX);
+        let footprint = footprint_of(&body);
+        let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
+        let (state, points) = (response.at_rest(recording.surface.positions.len(), 1), ContactPoints::new(1));
+        let (mut cache, mut query) = (NodePositionCache::new(&body), ProximityQuery::new());
+        let omegas = &recording.modes.angular_frequencies;
+        let mut counts = [0; 5];
+        for case in 0..40 {
+            let mut triangles = TriangleCache::new(omegas.len());
+            triangles.seed_above = seed_above;
+            for step in 0..200 {
+                let t = speed * f64::from(step);
+                let mode = |(k, omega): (usize, &f64)| {
+                    0.05 * wave(case, k as f64 + 1.0) * omegas[0] / omega * libm::sin(t * (1.0 + k as f64))
+                };
+                let q: Vec<f64> = omegas.iter().enumerate().map(mode).collect();
+                let aside =
+                    DVec3::new(wave(case, 1.6), wave(case, 1.9), wave(case, 1.3)) * libm::sin(3.0 * t);
+                let p = DVec3::new(wave(case, 0.3), wave(case, 0.6), wave(case, 0.9)) * 0.06 + aside * 0.02;
+                let reach = 0.01 * (2.0 + wave(case, 0.2) + 0.2 * libm::sin(t));
+                let mut surface = DeformedSurface::new(
+                    &body,
+                    footprint,
+                    &state,
+                    &points,
+                    &mut cache,
+                    Moment::Coordinates(&q),
+                );
+                counts[3] += u32::from(
+                    triangles.current.reach - reach - triangles.current.displacement_since_build(&surface, p)
+                        <= 0.0,
+                );
+                triangles.find(&mut query, &mut surface, p, reach);
+                let distances = (0..recording.surface.triangles.len() as u32)
+                    .map(|triangle| surface.project_on_triangle(triangle, p).distance)
+                    .filter(|distance| *distance < reach);
+                if triangles.current.seeds.is_empty() {
+                    let near = query.found.iter().filter(|one| one.distance < reach).count();
+                    assert_eq!(near, distances.count(), "case {case} step {step}");
+                    counts[0] += 1;
+                } else {
+                    // The nearest triangle, or one that was as near when the list was built.
+                    let least = distances.fold(f64::INFINITY, f64::min);
+                    let off = query.found[0].distance.min(reach) - least.min(reach);
+                    assert!(
+                        off <= 2.0 * triangles.current.displacement_since_build(&surface, p) + 1e-12,
+                        "case {case} step {step}: {off}"
+                    );
+                    (counts[1], counts[2]) = (counts[1] + 1, counts[2] + u32::from(off < 1e-9));
+                }
+                if let Some(moment) = triangles.take_rebuild_coordinates() {
+                    let mut surface = DeformedSurface::new(
+                        &body,
+                        footprint,
+                        &state,
+                        &points,
+                        &mut cache,
+                        Moment::Coordinates(&moment),
+                    );
+                    triangles.continue_rebuild(&mut surface);
+                    triangles.return_rebuild_coordinates(moment, &body);
+                    counts[4] += u32::from(triangles.traversal.is_finished());
+                }
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn no_near_triangle_is_missed_during_incremental_rebuilds() {
+        for footprint in [Footprint::Point, Footprint::Patch(0)] {
+            let [all, some, ..] = follow(|_| footprint, usize::MAX, 1e-2);
+            assert_eq!((all, some), (8000, 0));
+            let [_, some, nearest, ..] = follow(|_| footprint, 4, 1e-2);
+            assert!(some > 3000 && 100 * nearest > 99 * some, "{nearest} of {some}");
+        }
+    }
+
+    #[test]
+    fn slow_motion_never_rebuilds_at_once() {
+        for speed in [1e-4, 3e-4] {
+            let [.., at_once, in_parts] = follow(|body| body.footprint_at_level(0), SEED_ABOVE, speed);
+            // The first build of each case.
+            assert_eq!(at_once, 40, "{speed}");
+            assert!(in_parts >= 40, "{speed}: {in_parts}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Input and output of a step.
+
+use crate::collision::{Collider, Grasp};
+use crate::energy::EnergyLedger;
+use crate::spatial::{Pose, Twist};
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Mode of a device in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum DeviceMode {
+    /// Takes no part in the scene.
+    #[default]
+    Inactive,
+    /// Holds a point in all directions (bilateral constraint).
+    Held(Grasp),
+    /// Its tip touches surfaces (unilateral contact).
+    Touch,
+}
+
+/// One device's part of a step's input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceInput {
+    /// Interface point at the end of the step [m, world].
+    pub position: DVec3,
+    /// Mode.
+    pub mode: DeviceMode,
+}
+
+impl From<Option<Grasp>> for DeviceMode {
+    fn from(grasp: Option<Grasp>) -> Self {
+        grasp.map_or(Self::Inactive, Self::Held)
+    }
+}
+
+impl DeviceInput {
+    /// Inactive device.
+    pub fn inactive() -> Self {
+        Self { position: DVec3::ZERO, mode: DeviceMode::Inactive }
+    }
+
+    /// Device that holds a point, at a position [m, world].
+    pub fn held(position: DVec3, grasp: Grasp) -> Self {
+        Self { position, mode: DeviceMode::Held(grasp) }
+    }
+
+    /// Device that touches, at a position [m, world].
+    pub fn touching(position: DVec3) -> Self {
+        Self { position, mode: DeviceMode::Touch }
+    }
+}
+
+/// Input of a step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Input {
+    /// Devices in the model's order. Missing entries are inactive.
+    pub devices: Vec<DeviceInput>,
+    /// Obstacle poses at the end of the step, in the model's order. Missing entries stay.
+    pub obstacles: Vec<Pose>,
+}
+
+/// One device's part of a step's output.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DeviceOutput {
+    /// Reaction force on the hand, held over the step [N, world].
+    pub force_on_hand: DVec3,
+    /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
+    /// without contact the device's position, but for the lag of a coupling's damper.
+    pub proxy: DVec3,
+}
+
+/// Contact that carries force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactOutput {
+    /// Number of the object in the model.
+    pub object: usize,
+    /// The other side.
+    pub against: Collider,
+    /// Point on the object's surface at the end of the step [m, world].
+    pub point: DVec3,
+    /// Unit normal, out of the object [world].
+    pub normal: DVec3,
+    /// Force on the object, held over the step [N, world].
+    pub force: DVec3,
+    /// Gap at the end of the step [m], negative when penetrating.
+    pub gap: f64,
+    /// Mean slip speed over the step [m/s].
+    pub slip_speed: f64,
+}
+
+/// One object's part of a step's output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObjectOutput {
+    /// Placement at the end of the step.
+    pub pose: Pose,
+    /// Velocity at the end of the step.
+    pub twist: Twist,
+    /// Energy ledger.
+    pub energy: EnergyLedger,
+}
+
+/// Status of a step. A step cannot fail; this reports what it could not meet.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepStatus {
+    /// Largest residual of a contact's law [m].
+    pub solver_residual_m: f64,
+    /// Largest number of solver iterations of an island.
+    pub iterations: u32,
+    /// Devices and obstacles with a position that is not finite, or a grasp that does not exist: the device is inactive, the
+    /// obstacle stays.
+    pub rejected_inputs: u32,
+    /// Held directions that depend on others and got no force.
+    pub dependent_rows: u32,
+    /// Islands (objects that contacts connect) whose contacts were not solved to the tolerance, and objects whose rotation was
+    /// not, because a device or a body moves too far in a step. Such contacts give a scaled force in this step, or none;
+    /// islands with held points only give none.
+    pub unsolved_islands: u32,
+    /// Contacts beyond the contact points of an object.
+    pub dropped_contacts: u32,
+}
+
+/// Output of a step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// Time at the end of the step [s].
+    pub time_s: f64,
+    /// Devices, in the model's order.
+    pub devices: Vec<DeviceOutput>,
+    /// Objects, in the model's order.
+    pub objects: Vec<ObjectOutput>,
+    /// Contacts that carry force, without held points.
+    pub contacts: Vec<ContactOutput>,
+    /// Energy ledger of the scene.
+    pub energy: EnergyLedger,
+    /// Status of the step.
+    pub status: StepStatus,
+}

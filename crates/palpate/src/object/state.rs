@@ -1,0 +1,95 @@
+//! State of one object: rigid motion, response, contact points and energy ledger.
+
+use super::Object;
+use crate::energy::EnergyLedger;
+use crate::motion::{RigidIncrement, RigidState, RigidStep};
+use crate::response::{ContactPoints, ResponseState};
+use glam::DVec3;
+
+/// One object in motion.
+#[derive(Debug, Clone)]
+pub(crate) struct ObjectState {
+    /// Rigid motion at the start of the step.
+    pub(crate) rigid: RigidState,
+    pub(crate) response: ResponseState,
+    pub(crate) points: ContactPoints,
+    /// End of the step without contact force, and under the forces of the solver.
+    pub(crate) free: RigidStep,
+    pub(crate) end: RigidStep,
+    pub(crate) increment: RigidIncrement,
+    /// Upper bound of the deformation of any surface node over the step without contact force [m].
+    pub(crate) surface_motion: f64,
+    /// Largest displacement of a contact point by contact forces in the last step [m].
+    pub(crate) contact_displacement: f64,
+    pub(crate) ledger: EnergyLedger,
+    pub(crate) stored_at_start: f64,
+}
+
+impl ObjectState {
+    /// Undeformed object at its start, with room for contact points.
+    pub(crate) fn new(object: &Object, gravity: DVec3, capacity: usize) -> Self {
+        let nodes = object.body.recording.surface.positions.len();
+        let twist = object.start.twist;
+        let pose = object.start.pose;
+        let angular_momentum = object
+            .inertia
+            .map_or(DVec3::ZERO, |inertia| inertia.angular_momentum(pose.orientation, twist.angular));
+        let rigid = RigidState { pose, velocity: twist.linear, angular_momentum };
+        let still = RigidStep { end: rigid, turn: DVec3::ZERO, residual: 0.0 };
+        let mut state = Self {
+            rigid,
+            response: object.response.at_rest(nodes, capacity),
+            points: ContactPoints::new(capacity),
+            free: still,
+            end: still,
+            increment: RigidIncrement::default(),
+            surface_motion: 0.0,
+            contact_displacement: 0.0,
+            ledger: EnergyLedger::default(),
+            stored_at_start: 0.0,
+        };
+        state.update_ledger(object, gravity);
+        state.stored_at_start = state.ledger.stored();
+        state
+    }
+
+    /// Distance from the world's origin that the object reaches [m]: the scale of round-off of its positions.
+    pub(crate) fn reach(&self, object: &Object) -> f64 {
+        self.rigid.pose.position.length() + object.radius
+    }
+
+    /// Write kinetic, elastic and potential energy of the state into its ledger.
+    ///
+    /// # Real time
+    pub(crate) fn update_ledger(&mut self, object: &Object, gravity: DVec3) {
+        let elastic = self.response.energy(&object.response);
+        let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
+        let mut potential = -object.body.recording.mass() * gravity.dot(self.rigid.pose.position);
+        if let Some(response) = &object.body.recording.gravity {
+            let acceleration = object.gravity_in_body(gravity, &self.rigid.pose);
+            let modes = self.response.modes();
+            for (axis, a) in acceleration.to_array().into_iter().enumerate() {
+                let loads = &response.modal_forces[axis * modes.len()..][..modes.len()];
+                let work: f64 = loads.iter().zip(modes).map(|(p, mode)| p * mode.q).sum();
+                potential -= a * work;
+            }
+        }
+        self.ledger.kinetic = elastic.kinetic + rigid;
+        self.ledger.elastic = elastic.elastic;
+        self.ledger.residual = elastic.residual;
+        self.ledger.potential = potential;
+    }
+
+    /// Force in body axes whose work on the deformation is exact, Rᵀ·(1 − v̂/2)·f [N] (see `step`).
+    pub(crate) fn body_force(&self, force: DVec3) -> DVec3 {
+        self.end.end.pose.orientation.inverse() * (force + self.end.turn.cross(force) * 0.5)
+    }
+
+    /// Arms of all contact points at the end of the step, from their displacements.
+    pub(crate) fn update_arms(&mut self) {
+        let orientation = self.end.end.pose.orientation;
+        for point in &mut self.points.points {
+            point.end_arm = orientation * (point.rest + point.displacement);
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! The contact points of one object, and their compliance within a step.
+//!
+//! C [m/N] in body axes, R_cc[0] of equation (9), depends on where the points are, not on time: it is computed when
+//! a point is new and kept while it lasts.
+
+use super::{ContactLocation, Footprint, LocationState, ResponseView, dot};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// A place on an object where a contact acts, during a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ContactPoint {
+    pub(crate) location: ContactLocation,
+    /// Its rows in the response; stays the same while the point lasts.
+    pub(crate) slot: usize,
+    /// The surface node that it is, if it is one.
+    pub(crate) node: Option<usize>,
+    /// Whether it came to its place in this step.
+    pub(crate) is_new: bool,
+    /// Rest position [m, body].
+    pub(crate) rest: DVec3,
+    /// Where it is at the start of the step.
+    pub(crate) state: LocationState,
+    /// Displacement at the end of the step without contact force [m, body].
+    pub(crate) free: DVec3,
+    /// Displacement at the end of the step [m, body].
+    pub(crate) displacement: DVec3,
+    /// Force on the object, held over the step [N, world], and the same in body axes.
+    pub(crate) force: DVec3,
+    pub(crate) force_in_body: DVec3,
+    /// Arm from the centre of mass at the start and at the end of the step [m, world].
+    pub(crate) start_arm: DVec3,
+    pub(crate) end_arm: DVec3,
+}
+
+impl ContactPoint {
+    /// The node that it reads, if it is a node and no patch.
+    pub(crate) fn known_node(&self) -> Option<usize> {
+        self.node.filter(|_| self.location.footprint == Footprint::Point)
+    }
+}
+
+/// All contact points of one object; buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) struct ContactPoints {
+    pub(crate) points: Vec<ContactPoint>,
+    /// C, row by row, `stride` numbers apart.
+    compliance: Vec<f64>,
+    stride: usize,
+    /// Forces g in body axes and C·g, three numbers per point.
+    forces: Vec<f64>,
+    moved: Vec<f64>,
+    /// The same before a sweep, and along the direction of search (see `solver`).
+    before: [Vec<f64>; 2],
+    along: [Vec<f64>; 2],
+    /// Changes of force that move their point by less than this [m] wait until they have added up.
+    pub(crate) least_move: f64,
+    unused: Vec<usize>,
+    /// Where the point of a slot stands in `points`.
+    at: Vec<usize>,
+}
+
+impl ContactPoints {
+    pub(crate) fn new(capacity: usize) -> Self {
+        let stride = 3 * capacity;
+        Self {
+            points: Vec::with_capacity(capacity),
+            compliance: vec![0.0; stride * stride],
+            stride,
+            forces: vec![0.0; stride],
+            moved: vec![0.0; stride],
+            before: [vec![0.0; stride], vec![0.0; stride]],
+            along: [vec![0.0; stride], vec![0.0; stride]],
+            least_move: 0.0,
+            unused: (0..capacity).rev().collect(),
+            at: vec![0; capacity],
+        }
+    }
+
+    /// Room for points.
+    pub(crate) fn capacity(&self) -> usize {
+        self.at.len()
+    }
+
+    /// Where the point of a slot stands.
+    pub(crate) fn index(&self, slot: usize) -> usize {
+        self.at[slot]
+    }
+
+    pub(crate) fn of(&self, slot: usize) -> &ContactPoint {
+        &self.points[self.at[slot]]
+    }
+
+    /// Take in a place; gives its slot, or none when there is no room.
+    ///
+    /// # Real time
+    /// Costs modes × points.
+    pub(crate) fn add(&mut self, view: &mut ResponseView, location: ContactLocation) -> Option<usize> {
+        let slot = self.unused.pop()?;
+        let at = self.points.len();
+        self.at[slot] = at;
+        self.forces[3 * at..3 * at + 3].fill(0.0);
+        self.moved[3 * at..3 * at + 3].fill(0.0);
+        self.points.push(ContactPoint {
+            location,
+            slot,
+            node: None,
+            is_new: true,
+            rest: DVec3::ZERO,
+            state: LocationState::default(),
+            free: DVec3::ZERO,
+            displacement: DVec3::ZERO,
+            force: DVec3::ZERO,
+            force_in_body: DVec3::ZERO,
+            start_arm: DVec3::ZERO,
+            end_arm: DVec3::ZERO,
+        });
+        self.set_location(view, slot, location);
+        Some(slot)
+    }
+
+    /// Move a point to another place.
+    ///
+    /// # Real time
+    /// Costs modes × points.
+    pub(crate) fn set_location(&mut self, view: &mut ResponseView, slot: usize, location: ContactLocation) {
+        let at = self.at[slot];
+        self.drop_force(at);
+        let state_at = view.assign(slot, &location);
+        let rest = view.body.rest_position(&location);
+        let point = &mut self.points[at];
+        (point.location, point.rest, point.state, point.is_new) = (location, rest, state_at, true);
+        let corners = view.body.corners(&location);
+        point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
+        let Self { points, compliance, stride, .. } = self;
+        view.compliance((slot, &location), points, |other, block| {
+            write(compliance, *stride, (at, other), &block);
+            write(compliance, *stride, (other, at), &block.transpose());
+        });
+        let force = DVec3::from_slice(&self.forces[3 * at..]);
+        debug_assert_eq!(force, DVec3::ZERO);
+        let forces = &self.forces[..3 * self.points.len()];
+        for axis in 0..3 {
+            self.moved[3 * at + axis] =
+                dot(&self.compliance[(3 * at + axis) * self.stride..][..forces.len()], forces);
+        }
+    }
+
+    /// Let a point go.
+    ///
+    /// # Real time
+    pub(crate) fn remove(&mut self, view: &mut ResponseView, slot: usize) {
+        view.state.release(slot);
+        let (at, last) = (self.at[slot], self.points.len() - 1);
+        self.drop_force(at);
+        if at != last {
+            // The last point takes the free place.
+            for other in 0..last {
+                if other != at {
+                    let block = self.block(last, other);
+                    write(&mut self.compliance, self.stride, (at, other), &block);
+                    write(&mut self.compliance, self.stride, (other, at), &block.transpose());
+                }
+            }
+            let own = self.block(last, last);
+            write(&mut self.compliance, self.stride, (at, at), &own);
+            self.forces.copy_within(3 * last..3 * last + 3, 3 * at);
+            self.moved.copy_within(3 * last..3 * last + 3, 3 * at);
+            self.at[self.points[last].slot] = at;
+        }
+        self.points.swap_remove(at);
+        self.unused.push(slot);
+    }
+
+    /// C between two points, by where they stand.
+    pub(crate) fn block(&self, row: usize, column: usize) -> DMat3 {
+        let part =
+            |axis: usize| DVec3::from_slice(&self.compliance[(3 * row + axis) * self.stride + 3 * column..]);
+        DMat3::from_cols(part(0), part(1), part(2)).transpose()
+    }
+
+    /// Set the force on a point [N, body].
+    ///
+    /// # Real time
+    /// Costs the number of points, unless it stays as it is.
+    pub(crate) fn push(&mut self, at: usize, force_in_body: DVec3) {
+        let change = force_in_body - DVec3::from_slice(&self.forces[3 * at..]);
+        self.points[at].force_in_body = force_in_body;
+        let own = self.compliance[3 * at * self.stride + 3 * at];
+        if change == DVec3::ZERO || change.length() * own < self.least_move {
+            return;
+        }
+        force_in_body.write_to_slice(&mut self.forces[3 * at..]);
+        // C is symmetric: its rows are its columns.
+        let n = 3 * self.points.len();
+        let row = |axis: usize| &self.compliance[(3 * at + axis) * self.stride..][..n];
+        let rows = row(0).iter().zip(row(1)).zip(row(2));
+        for (moved, ((x, y), z)) in self.moved[..n].iter_mut().zip(rows) {
+            *moved += x * change.x + y * change.y + z * change.z;
+        }
+    }
+
+    /// No force anywhere.
+    ///
+    /// # Real time
+    pub(crate) fn release_forces(&mut self) {
+        let n = 3 * self.points.len();
+        let [along_forces, along_moved] = &mut self.along;
+        for buffer in [&mut self.forces, &mut self.moved, along_forces, along_moved] {
+            buffer[..n].fill(0.0);
+        }
+        for point in &mut self.points {
+            (point.force, point.force_in_body) = (DVec3::ZERO, DVec3::ZERO);
+        }
+    }
+
+    fn drop_force(&mut self, at: usize) {
+        self.least_move = 0.0;
+        self.push(at, DVec3::ZERO);
+    }
+
+    /// Displacement of a point under the forces that are set [m, body].
+    ///
+    /// # Real time
+    pub(crate) fn displaced(&self, at: usize) -> DVec3 {
+        self.points[at].free + DVec3::from_slice(&self.moved[3 * at..])
+    }
+
+    /// Keep forces and displacements for [`Self::accelerate`].
+    ///
+    /// # Real time
+    pub(crate) fn remember(&mut self) {
+        let n = 3 * self.points.len();
+        self.before[0][..n].copy_from_slice(&self.forces[..n]);
+        self.before[1][..n].copy_from_slice(&self.moved[..n]);
+    }
+
+    /// Go on by β times the last direction, and renew it: d ← β·d + (now − before).
+    ///
+    /// # Real time
+    pub(crate) fn accelerate(&mut self, beta: f64) {
+        let n = 3 * self.points.len();
+        let [forces, moved] = &mut self.along;
+        for (now, before, along) in
+            [(&mut self.forces, &self.before[0], forces), (&mut self.moved, &self.before[1], moved)]
+        {
+            for ((now, before), along) in now[..n].iter_mut().zip(before).zip(along) {
+                let change = *now - before;
+                *now += beta * *along;
+                *along = beta * *along + change;
+            }
+        }
+        for (point, force) in self.points.iter_mut().zip(self.forces.chunks_exact(3)) {
+            point.force_in_body = DVec3::from_slice(force);
+        }
+    }
+
+    /// Sum part number `part` of so many of C·g up anew, so that roundings don't add up.
+    ///
+    /// # Real time
+    /// Costs the square of the number of points, over the parts.
+    pub(crate) fn resum(&mut self, part: u64, of: u64) {
+        let n = 3 * self.points.len();
+        let from = |part: u64| n * part as usize / of as usize;
+        for row in from(part)..from(part + 1) {
+            self.moved[row] = dot(&self.compliance[row * self.stride..][..n], &self.forces[..n]);
+        }
+    }
+
+    /// What every point would do without contact force.
+    ///
+    /// # Real time
+    pub(crate) fn predict(&mut self, view: &mut ResponseView) {
+        for point in &mut self.points {
+            point.free = view.free(point.slot, &point.state);
+        }
+    }
+
+    /// The same for those that are new since then.
+    ///
+    /// # Real time
+    pub(crate) fn predict_new(&mut self, view: &mut ResponseView) {
+        for point in self.points.iter_mut().filter(|point| point.is_new) {
+            point.free = view.free(point.slot, &point.state);
+            point.is_new = false;
+        }
+    }
+}
+
+/// Write the block of a row and a column of points.
+fn write(compliance: &mut [f64], stride: usize, (row, column): (usize, usize), block: &DMat3) {
+    for axis in 0..3 {
+        block.row(axis).write_to_slice(&mut compliance[(3 * row + axis) * stride + 3 * column..]);
+    }
+}

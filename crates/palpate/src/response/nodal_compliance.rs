@@ -1,0 +1,109 @@
+//! R[0] between all surface nodes of a body, or the places that stand for them, known before the first step.
+//!
+//! A face that lands on the floor makes contacts of all its nodes at once. What they do to one another is the paper's
+//! R_cc[0] of equation (9): for a mesh of some size it is computed with the model, and a step looks it up.
+
+use super::dot_products::dot9;
+use super::modal::SampledModes;
+use super::{Body, ContactLocation, Footprint};
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DMat3;
+
+/// A place by its surface nodes and their weights.
+type Corners = [(usize, f64); 3];
+
+/// Up to so many surface nodes all pairs are kept, 36 bytes times the square of their number.
+const MOST_NODES: usize = 1024;
+
+/// R[0] [m/N, body] between the nodes of a footprint: those not after the row, row by row.
+#[derive(Debug)]
+pub(crate) struct NodeCompliance {
+    pub(super) footprint: Footprint,
+    blocks: Vec<DMat3>,
+}
+
+impl NodeCompliance {
+    /// Of a body with its modes; none where there are too many nodes.
+    pub(super) fn new(body: &Body, modes: &SampledModes, footprint: Footprint) -> Option<Self> {
+        let places = body.places(footprint);
+        let nodes = places.len();
+        if nodes > MOST_NODES {
+            return None;
+        }
+        let width = 3 * modes.len();
+        let mut rows = vec![0.0; nodes * width];
+        for (node, rows) in places.iter().zip(rows.chunks_exact_mut(width.max(1))) {
+            body.add_rows(footprint, *node as usize, 1.0, rows);
+        }
+        let location = |number: usize| ContactLocation {
+            point: body.node_point(footprint, places[number] as usize),
+            footprint,
+        };
+        let of = |number: usize| &rows[number * width..(number + 1) * width];
+        let mut weighted = vec![0.0; width];
+        let mut blocks = Vec::with_capacity(nodes * (nodes + 1) / 2);
+        for a in 0..nodes {
+            modes.weigh(of(a), &mut weighted);
+            let residual = |b: usize| body.residual(&location(a), &location(b));
+            blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + residual(b)));
+        }
+        Some(Self { footprint, blocks })
+    }
+
+    /// Displacement at a place per force at another, both by the weights of surface nodes.
+    ///
+    /// # Real time
+    pub(super) fn between(&self, body: &Body, a: &Corners, b: &Corners) -> DMat3 {
+        let number = |node: usize| body.number(self.footprint, node);
+        let mut sum = DMat3::ZERO;
+        for &(a, of_a) in a.iter().filter(|corner| corner.1 != 0.0) {
+            for &(b, of_b) in b.iter().filter(|corner| corner.1 != 0.0) {
+                sum += self.of(number(a), number(b)) * (of_a * of_b);
+            }
+        }
+        sum
+    }
+
+    fn of(&self, a: usize, b: usize) -> DMat3 {
+        let of = |row: usize, column: usize| self.blocks[row * (row + 1) / 2 + column];
+        if a >= b { of(a, b) } else { of(b, a).transpose() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Response, ResponseForm, ResponseView};
+    use super::*;
+    use crate::recording::Recording;
+    use crate::response::ContactPoints;
+    use crate::surface::SurfacePoint;
+    use alloc::sync::Arc;
+    use glam::DVec3;
+
+    #[test]
+    fn what_is_looked_up_is_what_modes_and_residual_compliance_give() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let body = Body::new(recording.clone(), &[], usize::MAX);
+        let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
+        let mut looked_up = computed.clone();
+        looked_up.precompute_nodal_compliance(&body, core::iter::empty());
+        let blocks = |response: &Response| {
+            let mut state = response.at_rest(recording.surface.positions.len(), 4);
+            let mut points = ContactPoints::new(4);
+            let mut view = ResponseView { response, body: &body, state: &mut state, gravity: DVec3::ZERO };
+            let node = |node| body.node_point(Footprint::Point, node);
+            let between = SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] };
+            for point in [node(7), between, node(2), node(11)] {
+                points.add(&mut view, ContactLocation { point, footprint: Footprint::Point }).expect("room");
+            }
+            (0..16).map(|k| points.block(k / 4, k % 4)).collect::<Vec<_>>()
+        };
+        for (a, b) in blocks(&computed).iter().zip(blocks(&looked_up)) {
+            assert!(a.abs_diff_eq(b, 1e-14 * a.x_axis.length()), "{a} {b}");
+        }
+        let of = |response: &Response| matches!(response, Response::Modal(modes) if !modes.known.is_empty());
+        assert!(of(&looked_up) && !of(&computed));
+    }
+}

@@ -1,0 +1,110 @@
+//! What unit forces over patches do to every surface node by the residual compliance, remembered.
+//!
+//! ```text
+//! A_c = Σᵢ wᵢ·S_·ᵢ        S·f = Σ_c A_c·f_c
+//! ```
+//!
+//! w are the weights of the patch about node c. Where a face lies the same patches press from picture to picture, and each of
+//! them loads dozens of nodes of a whole S.
+
+use super::body::{AppliedForce, Body, Footprint};
+use crate::recording::ResidualCompliance;
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+use glam::{DMat3, DVec3};
+
+/// So many patches are remembered: faces of several objects' contacts, and a finger on its way.
+const MOST: usize = 256;
+
+/// Patches by their number among the body's and their node; each with a 3×3 matrix [m/N] for every surface node, column by
+/// column, and when it was asked for last.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ResidualFields {
+    known: BTreeMap<(u32, u32), (Vec<f32>, u64)>,
+    pictures: u64,
+}
+
+impl ResidualFields {
+    /// Add what forces over patches do. Says whether it did: only a whole S is worth remembering.
+    pub(super) fn add(&mut self, body: &Body, patches: &[AppliedForce], out: &mut [DVec3]) -> bool {
+        if !matches!(body.recording.residual, ResidualCompliance::Whole(_)) {
+            return false;
+        }
+        self.pictures += 1;
+        for AppliedForce { location, force, .. } in patches {
+            let Footprint::Patch(number) = location.footprint else { continue };
+            for (corner, weight) in body.corners(location).into_iter().filter(|(_, weight)| *weight != 0.0) {
+                let entry = self.known.entry((number, corner as u32));
+                let (field, used) = entry.or_insert_with(|| (answer(body, location.footprint, corner), 0));
+                *used = self.pictures;
+                let force = (*force * weight).as_vec3();
+                let (blocks, _) = field.as_chunks::<9>();
+                for (u, [a, b, c, d, e, f, g, h, i]) in out.iter_mut().zip(blocks) {
+                    u.x += f64::from(a * force.x + d * force.y + g * force.z);
+                    u.y += f64::from(b * force.x + e * force.y + h * force.z);
+                    u.z += f64::from(c * force.x + f * force.y + i * force.z);
+                }
+            }
+        }
+        if self.known.len() > MOST {
+            let now = self.pictures;
+            self.known.retain(|_, (_, used)| *used == now);
+        }
+        true
+    }
+}
+
+/// A_c of the patch about a node.
+fn answer(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32> {
+    let nodes = body.recording.surface.positions.len();
+    let mut field = Vec::with_capacity(9 * nodes);
+    let Some(patch) = body.patch(footprint) else { return field };
+    let weights: Vec<(usize, f64)> = patch.weights.of(patch.number(corner)).collect();
+    for node in 0..nodes {
+        let block = |(other, weight): &(usize, f64)| body.recording.residual.block(node, *other) * *weight;
+        let sum: DMat3 = weights.iter().map(block).sum();
+        field.extend(sum.to_cols_array().map(|x| x as f32));
+    }
+    field
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use crate::spatial::{Pose, Twist};
+    use crate::state::State;
+    use crate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart};
+    use alloc::sync::Arc;
+    use alloc::vec;
+
+    #[test]
+    fn patches_that_are_remembered_do_what_their_nodes_do() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+        let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
+        let parameters = ModelParameters { devices: vec![finger; 2], ..ModelParameters::default() };
+        let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+        let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
+        let mut state = State::new(&model);
+        let mut residual_fields = ResidualFields::default();
+        for number in 0..40 {
+            let inwards = 0.2 * 1e-3 * f64::from(number);
+            let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (0.111 - inwards), 0.01, 0.01));
+            let input = Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() };
+            crate::step::step(&model, &mut state, &input);
+            let (body, applied_forces) = (&model.objects[0].body, state.objects[0].response.applied_forces());
+            let mut displacements = vec![DVec3::ZERO; body.recording.surface.positions.len()];
+            assert!(residual_fields.add(body, applied_forces, &mut displacements));
+            for (node, displacement) in displacements.into_iter().enumerate() {
+                let by_nodes = |at: &AppliedForce| body.residual_of_node(node, &at.location) * at.force;
+                let expected: DVec3 = applied_forces.iter().map(by_nodes).sum();
+                assert!(
+                    (displacement - expected).length() <= 1e-6 * expected.length() + 1e-12,
+                    "{number}, {node}"
+                );
+            }
+        }
+        assert!(state.objects[0].response.applied_forces().len() > 1, "they press");
+    }
+}

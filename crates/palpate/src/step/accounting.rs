@@ -1,0 +1,54 @@
+//! Energy accounting of a step: contacts and virtual couplings.
+
+use crate::collision::{Contact, OtherSide};
+use crate::contact::Constraint;
+use crate::device::{DeviceParameters, DeviceState};
+use crate::energy::EnergyLedger;
+use crate::object::ObjectState;
+use glam::DVec3;
+
+/// Add a contact's work over the step to the ledgers of its objects: the input by the other side, and the losses between.
+pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut [ObjectState]) {
+    let travel = |objects: &[ObjectState], object: usize, slot: usize| {
+        let (own, point) = (&objects[object], objects[object].points.of(slot));
+        (own.end.end.pose.position - own.rigid.pose.position) + (point.end_arm - point.start_arm)
+    };
+    let work = contact.force.dot(travel(objects, contact.object(), contact.slot));
+    let (impact, friction) = if contact.is_held() { (0.0, 0.0) } else { constraint.losses(contact) };
+    let ledger = &mut objects[contact.object()].ledger;
+    ledger.input += work + impact + friction;
+    ledger.impact += impact;
+    ledger.friction += friction;
+    if let OtherSide::Object { number, slot } = contact.other {
+        let work = contact.force.dot(travel(objects, number, slot));
+        objects[number].ledger.input -= work;
+    }
+}
+
+/// Advance a device's proxy, and add what its coupling takes in, stores and dissipates over the step.
+pub(super) fn coupling(
+    parameters: &DeviceParameters,
+    device: &mut DeviceState,
+    couplings: &mut EnergyLedger,
+) {
+    let stored =
+        |stretch: DVec3| 0.5 * parameters.coupling.map_or(0.0, |c| c.stiffness) * stretch.length_squared();
+    let before = device.start - device.proxy;
+    if !device.active {
+        // An inactive device loses what its coupling stored.
+        couplings.coupling -= stored(before);
+        couplings.dissipated += stored(before);
+        device.proxy = device.start;
+        return;
+    }
+    // Without force the stretch relaxes as the damper lets it: a proxy that was pulled off a surface does not fall into it.
+    let after = device.target - device.proxy_under_force();
+    if parameters.coupling.is_some() {
+        let (work, change) = (device.force.dot(after - before), stored(after) - stored(before));
+        couplings.input += work;
+        couplings.coupling += change;
+        couplings.dissipated += work - change;
+    }
+    device.proxy = device.target - after;
+    device.start = device.target;
+}

@@ -1,0 +1,287 @@
+//! One step of a scene, a function per stage:
+//!
+//! ```text
+//! predict → collision (broad phase, narrow phase, contact cache) → contact problem → solve → integrate → account → output
+//! ```
+//!
+//! Forces are held over the step. With R, R⁺ the orientation before and after, v = h·ω̄ the step's rotation (see `motion`), a
+//! the deformed arm in body axes, and A = R·a, A⁺ = R⁺·a⁺ in world axes, the Cayley map gives
+//!
+//! ```text
+//! A⁺ − A = v × (A + A⁺)/2 + (1 + v̂/2)·R·(a⁺ − a)
+//! ```
+//!
+//! So with torque ½(A + A⁺) × f and force in the body g = Rᵀ·(1 − v̂/2)·f = R⁺ᵀ·(1 + v̂/2)·f, the work
+//! f·(Δx + ΔA) at a contact is, exactly, the work on the rigid motion, f·Δx + τ·v, plus that on
+//! the deformation, g·Δa: the energy balance holds in every step, also while the body turns.
+//!
+//! The work that a contact dissipates over a step is f·Δapart, in the normal direction −λ·(gap⁺ − gap). With
+//! gap⁺ ≥ min(0, gap) and Coulomb's law for the slip of the whole step it is never negative: contacts are passive, whatever
+//! the shape, the normal and the location that were chosen for the step.
+
+mod accounting;
+mod output;
+
+use crate::collision::{
+    CandidateSide, Collider, CollisionContext, ContactCandidate, ContactId, ContactLaw, FeatureId, OtherSide,
+    TipPair, match_contacts,
+};
+use crate::contact::{Constraint, ContactProblem, SolverReport, StepRules};
+use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
+use crate::response::{ContactLocation, Footprint};
+use crate::scene::{Model, RigidCompliance};
+use crate::spatial::Pose;
+use crate::state::{State, Workspace};
+use glam::DVec3;
+
+/// Residual of a rotation, times the size of the body, that counts as unsolved, as a share of the reach.
+const UNSOLVED: f64 = 1e-9;
+
+/// Share of a penetration that is pushed out per step, as far as earlier losses pay for the work.
+const RECOVERY: f64 = 0.1;
+
+/// C·f, which is updated from step to step, is summed again over so many steps, a share of its rows in each, so that round-off
+/// does not grow; all rows in every step for few contact points.
+const RESUM_STEPS: u64 = 64;
+const FEW_POINTS: usize = 16;
+
+impl Model {
+    /// Rules of a step.
+    fn step_rules(&self) -> StepRules {
+        let parameters = &self.parameters;
+        StepRules {
+            step_s: parameters.step_s,
+            gravity: parameters.gravity,
+            integrator: parameters.motion,
+            includes_rigid_compliance: parameters.rigid_compliance == RigidCompliance::Included,
+        }
+    }
+}
+
+/// Advance a scene by one step.
+///
+/// # Real time
+/// No allocation, lock or system call. The cost grows with modes × contacts, not with the mesh.
+pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
+    state.output.status = StepStatus::default();
+    predict(model, state);
+    move_obstacles(state, input);
+    find_contacts(model, state, input);
+    set_up_constraints(model, state);
+    solve(model, state);
+    integrate(model, state);
+    state.steps += 1;
+    output::write(model, state, input);
+    &state.output
+}
+
+/// Predict every object at the end of the step without contact force.
+fn predict(model: &Model, state: &mut State) {
+    let rules = model.step_rules();
+    for (object, own) in model.objects.iter().zip(&mut state.objects) {
+        let mut view = object.view(rules.gravity, &own.rigid, &mut own.response);
+        // A step predicts the next one, if gravity and step size stay.
+        if !view.predict() {
+            own.points.predict(&mut view);
+        }
+        let motion = (rules.integrator, rules.step_s, rules.gravity);
+        own.free = object.advance_rigid(motion, &own.rigid, (DVec3::ZERO, DVec3::ZERO), None);
+        own.surface_motion =
+            object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
+    }
+}
+
+/// Obstacle poses at the end of the step; unusable ones stay.
+fn move_obstacles(state: &mut State, input: &Input) {
+    let State { obstacles, workspace, output, .. } = state;
+    for (number, next) in workspace.next_obstacles.iter_mut().enumerate() {
+        *next = obstacles[number];
+        let Some(given) = input.obstacles.get(number) else { continue };
+        let length = given.orientation.length();
+        if given.position.is_finite() && (0.99..=1.01).contains(&length) {
+            *next = Pose { orientation: given.orientation.normalize(), ..*given };
+        } else {
+            output.status.rejected_inputs += 1;
+        }
+    }
+}
+
+/// A device's input, if it can be used.
+fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i DeviceInput> {
+    let device_input = input.devices.get(device)?;
+    let is_allowed = match &device_input.mode {
+        DeviceMode::Inactive => false,
+        DeviceMode::Held(grasp) => model.accepts(grasp),
+        DeviceMode::Touch => true,
+    };
+    (is_allowed && device_input.position.is_finite()).then_some(device_input)
+}
+
+/// Collision detection: all contacts of the step.
+fn find_contacts(model: &Model, state: &mut State, input: &Input) {
+    let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
+    let Workspace { collision, spare, next_obstacles, .. } = workspace;
+    collision.candidates.clear();
+    collision.query.begin_step();
+    let step = *steps;
+    let scene = model.collision_scene();
+    let mut context =
+        CollisionContext { scene, states: objects, contacts, levels, workspace: collision, step };
+    let touchable = || (0..model.objects.len()).filter(|&at| model.objects[at].is_touchable());
+    for (number, device) in devices.iter_mut().enumerate() {
+        let is_asked = input.devices.get(number).is_some_and(|d| d.mode != DeviceMode::Inactive);
+        let Some(device_input) = usable(model, input, number) else {
+            output.status.rejected_inputs += u32::from(is_asked);
+            device.active = false;
+            continue;
+        };
+        // A device that was inactive, or held a point, starts where it is.
+        let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
+        let touches = device_input.mode == DeviceMode::Touch;
+        let is_new = touches && (!device.active || held);
+        device.active &= touches != held;
+        let (target, parameters) = (device_input.position, &model.parameters.devices[number]);
+        device.begin(parameters, model.parameters.step_s, target, target);
+        if let DeviceMode::Held(grasp) = device_input.mode {
+            let collider = Collider::Device(number);
+            context.workspace.candidates.push(ContactCandidate {
+                id: ContactId { collider, object: grasp.object, feature: FeatureId::HeldPoint },
+                location: ContactLocation { point: grasp.point, footprint: Footprint::Point },
+                other: CandidateSide::Device(number),
+                law: ContactLaw::Bilateral,
+                normal: DVec3::ZERO,
+                distance: 0.0,
+            });
+            continue;
+        }
+        for object in touchable() {
+            let inside = &mut inside[number * model.objects.len() + object];
+            context.find_tip_contacts(TipPair { number, device, object, is_new }, inside);
+        }
+    }
+    for object in touchable() {
+        for (number, (before, after)) in obstacles.iter().zip(&*next_obstacles).enumerate() {
+            context.find_obstacle_contacts(object, number, *before, *after);
+        }
+    }
+    context.find_pair_contacts();
+    // Last, since it looks at the surface of another moment.
+    for (number, object) in (0..devices.len()).flat_map(|n| touchable().map(move |object| (n, object))) {
+        context.rebuild_ahead(number, object);
+    }
+    let bodies = (&*model.objects, model.parameters.gravity);
+    output.status.dropped_contacts +=
+        match_contacts(bodies, objects, contacts, spare, &mut collision.candidates);
+}
+
+/// Set up the constraints: where the sides of each contact start, and which penetration may remain.
+fn set_up_constraints(model: &Model, state: &mut State) {
+    let State { steps, objects, devices, contacts, workspace, output, .. } = state;
+    for (object, own) in model.objects.iter().zip(&mut *objects) {
+        let orientation = own.rigid.pose.orientation;
+        let mut view = object.view(model.parameters.gravity, &own.rigid, &mut own.response);
+        own.points.predict_new(&mut view);
+        match own.points.points.len() {
+            0..=FEW_POINTS => own.points.resum(0, 1),
+            _ => own.points.resum(*steps % RESUM_STEPS, RESUM_STEPS),
+        }
+        for point in &mut own.points.points {
+            point.start_arm = orientation * (point.rest + point.state.displacement);
+        }
+    }
+    // Losses pay for pushing out penetrations, shared among the contacts.
+    let mut budget = 0.5 * output.energy.lost().max(0.0);
+    workspace.constraints.clear();
+    for contact in contacts.iter() {
+        let at = |object: usize, slot: usize| {
+            objects[object].rigid.pose.position + objects[object].points.of(slot).start_arm
+        };
+        let other = match contact.other {
+            OtherSide::Device(device) => devices[device].proxy,
+            OtherSide::Obstacle { start, .. } => start,
+            OtherSide::Object { number, slot } => at(number, slot),
+        };
+        if let (true, OtherSide::Device(number)) = (contact.is_held(), contact.other) {
+            if contact.is_new {
+                // The hand takes the point where it is.
+                let (parameters, h) = (&model.parameters.devices[number], model.parameters.step_s);
+                let device = &mut devices[number];
+                device.active = false;
+                device.begin(parameters, h, device.target, at(contact.object(), contact.slot));
+            }
+            workspace.constraints.push(Constraint::default());
+            continue;
+        }
+        let mut constraint = Constraint::new(other - at(contact.object(), contact.slot));
+        let gap = contact.gap(constraint.start);
+        if gap < 0.0 {
+            let push = RECOVERY * -gap;
+            let cost = 2.0 * contact.force.length() * push;
+            let paid = if cost > budget { 0.0 } else { push };
+            budget -= if paid > 0.0 { cost } else { 0.0 };
+            constraint.min_gap = gap + paid;
+        }
+        workspace.constraints.push(constraint);
+    }
+}
+
+/// Solve for the contact forces. Losses of earlier steps must pay for pushing out penetrations: if they do not, penetrations
+/// stay as they are, and in the last resort their contacts carry no force.
+fn solve(model: &Model, state: &mut State) {
+    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let paid = output.energy.lost().max(0.0);
+    let Workspace { solver, constraints, .. } = workspace;
+    let mut problem = ContactProblem {
+        objects: &model.objects,
+        rules: model.step_rules(),
+        states: objects,
+        devices,
+        contacts,
+        constraints,
+    };
+    for attempt in 0..3 {
+        let SolverReport { residual_m, iterations, dependent_rows, unsolved_islands } =
+            solver.solve(&mut problem);
+        if problem.dissipated() + paid >= -problem.rounding() || attempt == 2 {
+            let status = &mut output.status;
+            (status.solver_residual_m, status.iterations) = (residual_m, iterations);
+            (status.dependent_rows, status.unsolved_islands) = (dependent_rows, unsolved_islands);
+            return;
+        }
+        let pairs = problem.contacts.iter_mut().zip(&mut *problem.constraints);
+        for (contact, constraint) in pairs.filter(|(contact, _)| !contact.is_held()) {
+            if attempt == 0 {
+                constraint.min_gap = contact.gap(constraint.start).min(0.0);
+            } else {
+                (constraint.min_gap, contact.force) = (f64::NEG_INFINITY, DVec3::ZERO);
+            }
+        }
+    }
+}
+
+/// Integrate deformation and rigid motion with the forces held, and account for the energy.
+fn integrate(model: &Model, state: &mut State) {
+    let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
+    for (contact, constraint) in contacts.iter_mut().zip(&workspace.constraints) {
+        accounting::contact(contact, constraint, objects);
+        contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
+    }
+    let gravity = model.parameters.gravity;
+    for (object, own) in model.objects.iter().zip(objects) {
+        let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
+        output.status.unsolved_islands += u32::from(is_unsolved);
+        let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
+        own.contact_displacement = displaced.fold(0.0, f64::max);
+        own.rigid = own.end.end;
+        let mut view = object.view(gravity, &own.rigid, &mut own.response);
+        own.ledger.dissipated += view.advance(&mut own.points.points);
+        own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
+        own.update_ledger(object, gravity);
+        own.ledger.defect =
+            own.ledger.stored() - own.stored_at_start - (own.ledger.input - own.ledger.lost());
+    }
+    for (parameters, device) in model.parameters.devices.iter().zip(devices) {
+        accounting::coupling(parameters, device, couplings);
+    }
+    obstacles.copy_from_slice(&workspace.next_obstacles);
+}

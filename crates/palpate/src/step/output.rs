@@ -1,0 +1,54 @@
+//! Output of a step.
+
+use crate::collision::OtherSide;
+use crate::io::{ContactOutput, Input};
+use crate::scene::Model;
+use crate::state::State;
+use glam::DVec3;
+
+/// Write the output of a step from the state at its end.
+pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
+    let State { steps, objects, devices, contacts, couplings, workspace, output, .. } = state;
+    let h = model.parameters.step_s;
+    output.time_s = *steps as f64 * h;
+    for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
+        out.pose = own.rigid.pose;
+        if let Some(inertia) = &object.inertia {
+            out.twist = inertia.twist(&own.rigid);
+        }
+        out.energy = own.ledger;
+    }
+    output.energy = objects.iter().fold(*couplings, |sum, own| sum.plus(&own.ledger));
+    for (number, out) in output.devices.iter_mut().enumerate() {
+        let device = &devices[number];
+        out.force_on_hand = if device.active { -device.force } else { DVec3::ZERO };
+        if device.active {
+            out.proxy = device.proxy;
+        } else if let Some(given) = input.devices.get(number).filter(|given| given.position.is_finite()) {
+            out.proxy = given.position;
+        }
+    }
+    output.contacts.clear();
+    for (contact, constraint) in contacts.iter().zip(&workspace.constraints) {
+        let own = &objects[contact.object()];
+        let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
+        let carries_force = contact.force != DVec3::ZERO;
+        if let (true, true, OtherSide::Device(device)) = (carries_force, contact.is_held(), contact.other) {
+            // A rigidly held point is the proxy, to the last digit that the solver gives.
+            if model.parameters.devices[device].coupling.is_none() {
+                output.devices[device].proxy = point;
+            }
+        }
+        if carries_force && !contact.is_held() && output.contacts.len() < output.contacts.capacity() {
+            output.contacts.push(ContactOutput {
+                object: contact.object(),
+                against: contact.id.collider,
+                point,
+                normal: contact.normal,
+                force: contact.force,
+                gap: contact.gap(constraint.end),
+                slip_speed: constraint.slip(contact).length() / h,
+            });
+        }
+    }
+}

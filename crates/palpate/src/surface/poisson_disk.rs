@@ -1,0 +1,113 @@
+//! Some of a surface's nodes that stand for all.
+
+use super::patch_weights::area_vector;
+use super::{Surface, triangles_around};
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Cosines between a node's normal and those of its triangles: below the first a corner, below the second an edge.
+const CORNER: f64 = 0.65;
+const EDGE: f64 = 0.85;
+
+/// The mean of the directions of the triangles around every node; zero where they have none together.
+pub(crate) fn facing(surface: &Surface) -> Vec<DVec3> {
+    let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
+    let sum = |own: &Vec<u32>| own.iter().map(unit).sum::<DVec3>().normalize_or_zero();
+    triangles_around(surface).iter().map(sum).collect()
+}
+
+/// Nodes that are at least so far apart [m], and no node is farther from one of them: corners first, then edges, so that
+/// what stands on them stands as the whole surface does. The two sides of a thin part have nodes of their own;
+/// a side that has no direction counts for both.
+pub(crate) fn poisson_disk_sample(surface: &Surface, apart: f64) -> Vec<u32> {
+    let around = triangles_around(surface);
+    let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
+    let normals = facing(surface);
+    let rank = |node: &u32| {
+        let (own, normal) = (&around[*node as usize], normals[*node as usize]);
+        let least = own.iter().map(|t| unit(t).dot(normal)).fold(1.0, f64::min);
+        (u32::from(least >= CORNER) + u32::from(least >= EDGE), *node)
+    };
+    let mut nodes: Vec<u32> =
+        (0..surface.positions.len() as u32).filter(|n| !around[*n as usize].is_empty()).collect();
+    nodes.sort_by_cached_key(rank);
+    let cell = |p: DVec3| (p / apart).floor().to_array().map(|x| x as i64);
+    let mut taken: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
+    nodes.retain(|&node| {
+        let (place, normal) = (surface.positions[node as usize], normals[node as usize]);
+        let [x, y, z] = cell(place);
+        let beside = |[dx, dy, dz]: [i64; 3]| taken.get(&[x + dx, y + dy, z + dz]).into_iter().flatten();
+        let blocks = |other: &u32| {
+            let (other, its) = (surface.positions[*other as usize], normals[*other as usize]);
+            (other - place).length() < apart && its.dot(normal) >= 0.0
+        };
+        let mut offsets = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+        let stays = !offsets.any(|offset| beside(offset).any(blocks));
+        if stays {
+            taken.entry([x, y, z]).or_default().push(node);
+        }
+        stays
+    });
+    nodes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slab of n × n cells with side 1 and this thickness: its two large faces alone.
+    fn slab(n: u32, thickness: f64) -> Surface {
+        let side = (n + 1) * (n + 1);
+        let node = |i: u32, j: u32, face: u32| face * side + i * (n + 1) + j;
+        let mut triangles = Vec::new();
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let corners = |face: u32| [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| node(i + x, j + y, face));
+            let ([a, b, c, d], [e, f, g, h]) = (corners(0), corners(1));
+            triangles.extend([[a, c, b], [a, d, c], [e, f, g], [e, g, h]]);
+        }
+        let place = |k: u32| {
+            let (face, k) = (k / side, k % side);
+            DVec3::new(f64::from(k / (n + 1)), f64::from(k % (n + 1)), 0.0) / f64::from(n)
+                + DVec3::Z * (f64::from(face) * thickness)
+        };
+        let positions: Vec<DVec3> = (0..2 * side).map(place).collect();
+        Surface { source_nodes: (0..positions.len() as u32).collect(), positions, triangles }
+    }
+
+    #[test]
+    fn places_are_apart_and_leave_nothing_out_on_both_sides_of_a_thin_part() {
+        let surface = slab(20, 0.01);
+        for apart in [0.07, 0.15, 0.4] {
+            let nodes = poisson_disk_sample(&surface, apart);
+            let place = |node: &u32| surface.positions[*node as usize];
+            let same_side = |a: DVec3, b: DVec3| (a.z - b.z).abs() < 1e-9;
+            for (at, a) in nodes.iter().map(place).enumerate() {
+                let others = nodes[..at].iter().map(place).filter(|b| same_side(a, *b));
+                assert!(others.map(|b| (a - b).length()).fold(1.0, f64::min) >= apart);
+            }
+            for p in &surface.positions {
+                let near = nodes.iter().map(place).filter(|b| same_side(*p, *b));
+                assert!(near.map(|b| (*p - b).length()).fold(1.0, f64::min) < apart, "{p}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sheet_of_no_thickness_is_thinned_too() {
+        let mut surface = slab(10, 0.0);
+        // Both faces over the same nodes: none of them has a side.
+        let nodes = surface.positions.len() as u32 / 2;
+        surface.triangles.iter_mut().flatten().for_each(|node| *node %= nodes);
+        assert!(poisson_disk_sample(&surface, 0.3).len() < 30);
+    }
+
+    #[test]
+    fn the_corners_of_a_block_are_among_its_places() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let surface = crate::recording::Recording::from_bytes(bytes).expect("a released recording").surface;
+        let nodes = poisson_disk_sample(&surface, 0.099);
+        let is_corner = |node: &u32| surface.positions[*node as usize].x.abs() > 0.099;
+        assert_eq!(nodes.iter().filter(|node| is_corner(node)).count(), 8, "{nodes:?}");
+    }
+}

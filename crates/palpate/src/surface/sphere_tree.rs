@@ -1,0 +1,451 @@
+//! Bounding-sphere tree over the surface that follows the deformation without being refitted.
+//!
+//! The sphere of a tree node is centred at a surface node c. With the mode shapes φ, ω [rad/s] and the elastic
+//! energy E of the modes, Cauchy and Schwarz bound the displacement of any surface node i below:
+//!
+//! ```text
+//! |uᵢ − u_c| ≤ √(Σ|φᵢ − φ_c|²/ω²) · √(2E)         |uᵢ| ≤ √(Σ|φᵢ|²/ω²) · √(2E)
+//! ```
+//!
+//! and likewise |uᵢ| ≤ √tr(Sᵢᵢ)·√(fᵀ·S·f) for the residual compliance S. So a sphere about the *displaced* centre
+//! needs one precomputed number per energy. This replaces the bounds on |q| of James & Pai's bounded
+//! deformation tree (2004, ACM Trans. Graph. 23, 393). Modes are grouped in bands, each twice as wide as the one before,
+//! with an energy of its own: low modes carry most of the energy, high modes most of the difference between neighbours.
+
+use super::Surface;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+use glam::DVec3;
+
+/// Upper limit of triangles in a leaf.
+const LEAF: usize = 4;
+
+/// Number of bands of modes, and of the low ones, which place a centre nearly and cheaply.
+pub(crate) const BANDS: usize = 8;
+const LOW: usize = 5;
+
+/// Depth of a traversal's stack, enough for 2³¹ triangles; flag of a sphere whose subtree was visited.
+const MAX_DEPTH: usize = 128;
+const DONE: u32 = 1 << 31;
+
+/// Ratio of radii from which the sphere about the deformed centre, which costs all modes, is worth computing.
+const REFINE_RATIO: f64 = 1.3;
+
+/// Resumable traversal of a tree: its stack.
+#[derive(Debug, Clone)]
+pub(crate) struct Traversal {
+    stack: [u32; MAX_DEPTH],
+    depth: usize,
+}
+
+impl Traversal {
+    /// Finished traversal.
+    pub(crate) const FINISHED: Self = Self { stack: [0; MAX_DEPTH], depth: 0 };
+
+    /// Traversal at its start.
+    pub(crate) const START: Self = Self { depth: 1, ..Self::FINISHED };
+
+    pub(crate) fn is_finished(&self) -> bool {
+        self.depth == 0
+    }
+}
+
+/// One number per band of modes.
+pub(crate) type Bands = [f64; BANDS];
+
+/// Modes of a band, of so many in all.
+pub(crate) fn band(modes: usize, at: usize) -> Range<usize> {
+    let end = |at: usize| modes.div_ceil(1 << (BANDS - 1 - at));
+    if at == 0 { 0..end(0) } else { end(at - 1)..end(at) }
+}
+
+/// Number of low modes, which place a centre nearly.
+pub(crate) fn low_modes(modes: usize) -> usize {
+    band(modes, LOW - 1).end
+}
+
+/// Sphere tree over the triangles; immutable.
+#[derive(Debug, Clone)]
+pub(crate) struct SphereTree {
+    nodes: Vec<TreeNode>,
+    triangles: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct TreeNode {
+    /// The surface node at the centre.
+    centre: u32,
+    /// Largest distance [m] at rest of a surface node below from the centre.
+    radius: f64,
+    /// Triangles below, in [`SphereTree::triangles`].
+    first: u32,
+    count: u32,
+    /// The second child; the first comes right after its parent. 0 for a leaf.
+    second: u32,
+}
+
+/// Displacement bounds of the surface nodes below a tree node, per √(2·energy) of each band of modes and of the residual
+/// compliance [m/√J].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct SubtreeBound {
+    /// From the rest position.
+    modal: [f32; BANDS],
+    residual: f32,
+    /// Relative to the displacement of the centre.
+    apart: [f32; BANDS],
+}
+
+/// Spreads of all tree nodes, for one contact footprint.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Bounds {
+    spreads: Vec<SubtreeBound>,
+}
+
+/// Norms of a deformation that bound the displacement of surface nodes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeformationBound {
+    /// √(2·energy) [√J] of the bands of modes, and of the residual compliance.
+    pub(crate) modal: Bands,
+    pub(crate) residual: f64,
+    /// Upper bound of the residual displacement of any node [m], where it is known.
+    pub(crate) max_residual: f64,
+    /// Largest relative change of residual displacement per distance [1/m]; infinite where neighbours are unrelated.
+    pub(crate) slope: f64,
+}
+
+impl DeformationBound {
+    /// No deformation.
+    pub(crate) const STILL: Self =
+        Self { modal: [0.0; BANDS], residual: 0.0, max_residual: 0.0, slope: f64::INFINITY };
+
+    fn residual_of(&self, spread: &SubtreeBound) -> f64 {
+        (f64::from(spread.residual) * self.residual).min(self.max_residual)
+    }
+
+    /// Displacement bound from rest [m].
+    fn reach(&self, spread: &SubtreeBound) -> f64 {
+        self.sum(&spread.modal, 0..BANDS) + self.residual_of(spread)
+    }
+
+    /// Distance bound from the centre placed by the low modes, less the radius at rest [m].
+    fn beside_low(&self, spread: &SubtreeBound, radius: f64) -> f64 {
+        let modal = self.sum(&spread.apart, 0..LOW) + self.sum(&spread.modal, LOW..BANDS);
+        modal + self.residual_apart(spread, radius)
+    }
+
+    /// Distance bound from the deformed centre, less the radius at rest [m].
+    fn apart(&self, spread: &SubtreeBound, radius: f64) -> f64 {
+        self.sum(&spread.apart, 0..BANDS) + self.residual_apart(spread, radius)
+    }
+
+    fn residual_apart(&self, spread: &SubtreeBound, radius: f64) -> f64 {
+        let change = self.max_residual * (self.slope * radius).min(1.0);
+        (f64::from(spread.residual) * self.residual).min(change)
+    }
+
+    fn sum(&self, spread: &[f32; BANDS], bands: Range<usize>) -> f64 {
+        bands.map(|at| f64::from(spread[at]) * self.modal[at]).sum()
+    }
+}
+
+/// Kind of a sphere's centre.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Centre {
+    /// Rest position of a surface node.
+    Rest,
+    /// Surface node placed by the low modes.
+    LowModes(usize),
+    /// Deformed surface node.
+    Deformed(usize),
+}
+
+/// Node positions of a deforming surface at a moment, and radii of its spheres as far as traversals have refitted them.
+pub(crate) trait DeformingNodes {
+    fn rest(&self, node: usize) -> DVec3;
+    /// Position by the low modes; none where all modes are known.
+    fn low_mode_position(&self, node: usize) -> Option<DVec3>;
+    fn position(&mut self, node: usize) -> DVec3;
+    /// Whether refitted radii are kept.
+    fn keeps_radii(&self) -> bool;
+    /// Position of a node, if it is known already.
+    fn known_position(&self, node: usize) -> Option<DVec3>;
+    fn refitted_radius(&self, sphere: usize) -> Option<f64>;
+    fn set_refitted_radius(&mut self, sphere: usize, radius: f64);
+    fn corners_of(&self, triangle: u32) -> [usize; 3];
+}
+
+/// Node positions of a rigid surface.
+pub(crate) struct RigidNodes<'a>(pub(crate) &'a Surface);
+
+impl DeformingNodes for RigidNodes<'_> {
+    fn rest(&self, node: usize) -> DVec3 {
+        self.0.positions[node]
+    }
+
+    fn low_mode_position(&self, _: usize) -> Option<DVec3> {
+        None
+    }
+
+    fn position(&mut self, node: usize) -> DVec3 {
+        self.rest(node)
+    }
+
+    /// Its spheres are tight from the beginning.
+    fn keeps_radii(&self) -> bool {
+        false
+    }
+
+    fn known_position(&self, _: usize) -> Option<DVec3> {
+        None
+    }
+
+    fn corners_of(&self, triangle: u32) -> [usize; 3] {
+        self.0.triangles[triangle as usize].map(|node| node as usize)
+    }
+
+    fn refitted_radius(&self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn set_refitted_radius(&mut self, _: usize, _: f64) {}
+}
+
+/// Raise every band to the larger value, rounded up.
+fn raise(of: &mut [f32; BANDS], by: impl Fn(usize) -> f64) {
+    for (at, of) in of.iter_mut().enumerate() {
+        *of = of.max((by(at) as f32).next_up());
+    }
+}
+
+impl SphereTree {
+    /// Tree over triangles between positions [m]; a single node is a triangle of three times itself.
+    pub(crate) fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        let count = triangles.len();
+        let mut tree = Self { nodes: Vec::new(), triangles: (0..count as u32).collect() };
+        let middle = |corners: &[u32; 3]| corners.iter().map(|&n| positions[n as usize]).sum::<DVec3>() / 3.0;
+        let centres: Vec<DVec3> = triangles.iter().map(middle).collect();
+        if count > 0 {
+            tree.build((positions, triangles), &centres, 0, count);
+        }
+        tree
+    }
+
+    fn build(&mut self, surface: (&[DVec3], &[[u32; 3]]), centres: &[DVec3], first: usize, count: usize) {
+        let (positions, triangles) = surface;
+        let below = &mut self.triangles[first..first + count];
+        let corners = |t: &u32| triangles[*t as usize].map(|n| positions[n as usize]);
+        let points = || below.iter().flat_map(corners);
+        let low = points().reduce(DVec3::min).unwrap_or_default();
+        let high = points().reduce(DVec3::max).unwrap_or_default();
+        let middle = (low + high) * 0.5;
+        let nodes = below.iter().flat_map(|t| triangles[*t as usize]);
+        let off = |node: &u32| (positions[*node as usize] - middle).length_squared();
+        let centre = nodes.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default();
+        let at = positions[centre as usize];
+        let radius = points().map(|p| (p - at).length()).fold(0.0, f64::max);
+        let place = self.nodes.len();
+        self.nodes.push(TreeNode { centre, radius, first: first as u32, count: count as u32, second: 0 });
+        if count > LEAF {
+            // Halves along the longest side.
+            let extent = high - low;
+            let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or_default();
+            let half = count / 2;
+            let key = |t: &u32| centres[*t as usize][axis];
+            below.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+            self.build(surface, centres, first, half);
+            self.nodes[place].second = self.nodes.len() as u32;
+            self.build(surface, centres, first + half, count - half);
+        }
+    }
+
+    /// Spreads for a contact footprint: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²) for every band, or
+    /// √(Σ|φᵢ|²/ω²) without c, and `residual(i)` √tr(Sᵢᵢ).
+    pub(crate) fn bounds(
+        &self,
+        triangles: &[[u32; 3]],
+        modal: impl Fn(usize, Option<usize>) -> Bands,
+        residual: impl Fn(usize) -> f64,
+    ) -> Bounds {
+        let nodes = triangles.iter().flatten().max().map_or(0, |node| *node as usize + 1);
+        let mut own: Vec<Option<(Bands, f32)>> = vec![None; nodes];
+        for i in triangles.iter().flatten().map(|node| *node as usize) {
+            own[i].get_or_insert_with(|| (modal(i, None), (residual(i) as f32).next_up()));
+        }
+        let mut spreads = vec![SubtreeBound::default(); self.nodes.len()];
+        // Children come after their parents.
+        for at in (0..self.nodes.len()).rev() {
+            let node = self.nodes[at];
+            let c = node.centre as usize;
+            let mut spread = SubtreeBound::default();
+            if node.count as usize <= 16 * LEAF {
+                for triangle in self.triangles_of(&node) {
+                    for i in triangles[triangle as usize] {
+                        let i = i as usize;
+                        let (moves, dent) = own[i].unwrap_or_default();
+                        raise(&mut spread.modal, |band| moves[band]);
+                        spread.residual = spread.residual.max(dent);
+                        if i != c {
+                            let apart = modal(i, Some(c));
+                            raise(&mut spread.apart, |band| apart[band]);
+                        }
+                    }
+                }
+            } else {
+                // Higher up, by way of the children's centres.
+                for child in [at + 1, node.second as usize] {
+                    let (below, middle) = (spreads[child], self.nodes[child].centre as usize);
+                    let far = if middle == c { Bands::default() } else { modal(middle, Some(c)) };
+                    raise(&mut spread.modal, |band| below.modal[band].into());
+                    spread.residual = spread.residual.max(below.residual);
+                    raise(&mut spread.apart, |band| far[band] + f64::from(below.apart[band]));
+                }
+            }
+            spreads[at] = spread;
+        }
+        Bounds { spreads }
+    }
+
+    fn triangles_of(&self, node: &TreeNode) -> impl Iterator<Item = u32> + '_ {
+        self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
+    }
+
+    /// Number of spheres.
+    pub(crate) fn spheres(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Traverse the tree. `near` decides by kind of centre, centre and radius whether a sphere is entered: about the rest
+    /// position, then about the position by the low modes, then about the deformed position. `found` takes the triangles of
+    /// the leaves, with a bound of their nodes' distance from the positions by the low modes. All in one frame.
+    ///
+    /// # Real time
+    pub(crate) fn traverse<S: DeformingNodes>(
+        &self,
+        bounds: (&Bounds, &DeformationBound),
+        surface: &mut S,
+        near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+        found: impl FnMut(&mut S, u32, f64),
+    ) {
+        self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), bounds, surface, near, found);
+    }
+
+    /// Resume a traversal until so many spheres and triangles were visited, or up to a leaf's triangles more. Gives their
+    /// number.
+    ///
+    /// # Real time
+    pub(crate) fn resume_traversal<S: DeformingNodes>(
+        &self,
+        (traversal, most): (&mut Traversal, usize),
+        (bounds, bound): (&Bounds, &DeformationBound),
+        surface: &mut S,
+        near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+        mut found: impl FnMut(&mut S, u32, f64),
+    ) -> usize {
+        let Traversal { stack, depth } = traversal;
+        if self.nodes.is_empty() {
+            *depth = 0;
+        }
+        let mut passed = 0;
+        while *depth > 0 && passed < most {
+            passed += 1;
+            *depth -= 1;
+            let (at, done) = ((stack[*depth] & !DONE) as usize, stack[*depth] & DONE != 0);
+            let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
+            if done {
+                self.refit_lazily(at, surface);
+                continue;
+            }
+            let refitted_radius = surface.refitted_radius(at);
+            if !Self::enter(node, spread, bound, refitted_radius, surface, &near) {
+                continue;
+            }
+            if node.second == 0 {
+                let high = bound.sum(&spread.modal, LOW..BANDS) + bound.residual_of(spread);
+                self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
+                passed += node.count as usize;
+            }
+            if refitted_radius.is_none() && surface.keeps_radii() {
+                stack[*depth] = at as u32 | DONE;
+                *depth += 1;
+            }
+            if node.second != 0 {
+                stack[*depth] = node.second;
+                stack[*depth + 1] = at as u32 + 1;
+                *depth += 2;
+            }
+        }
+        passed
+    }
+
+    /// Whether a traversal enters a sphere.
+    fn enter<S: DeformingNodes>(
+        node: &TreeNode,
+        spread: &SubtreeBound,
+        bound: &DeformationBound,
+        refitted_radius: Option<f64>,
+        surface: &mut S,
+        near: &impl Fn(&mut S, Centre, DVec3, f64) -> bool,
+    ) -> bool {
+        let c = node.centre as usize;
+        if let Some(radius) = refitted_radius {
+            let centre = surface.position(c);
+            return near(
+                surface,
+                Centre::Deformed(c),
+                centre,
+                radius + bound.residual_apart(spread, node.radius),
+            );
+        }
+        let at_rest = surface.rest(c);
+        if !near(surface, Centre::Rest, at_rest, node.radius + bound.reach(spread)) {
+            return false;
+        }
+        let within = node.radius + bound.apart(spread, node.radius);
+        let nearly = node.radius + bound.beside_low(spread, node.radius);
+        let low = surface.low_mode_position(c);
+        if low.is_some_and(|centre| !near(surface, Centre::LowModes(c), centre, nearly)) {
+            return false;
+        }
+        // The sphere about where it is costs all modes: only where that is much smaller.
+        if low.is_some() && nearly <= REFINE_RATIO * within {
+            return true;
+        }
+        let centre = surface.position(c);
+        near(surface, Centre::Deformed(c), centre, within)
+    }
+
+    /// Refit a sphere to the positions that the traversal has computed, if all of them are known.
+    fn refit_lazily<S: DeformingNodes>(&self, at: usize, surface: &mut S) {
+        let node = &self.nodes[at];
+        let Some(centre) = surface.known_position(node.centre as usize) else { return };
+        let mut radius = 0.0_f64;
+        let mut hold = |place: Option<DVec3>, around: Option<f64>| {
+            let far = place.zip(around).map(|(place, around)| (place - centre).length() + around);
+            radius = radius.max(far?);
+            Some(())
+        };
+        let all = match node.second {
+            0 => self.triangles_of(node).try_for_each(|t| {
+                surface.corners_of(t).into_iter().try_for_each(|i| hold(surface.known_position(i), Some(0.0)))
+            }),
+            second => [at + 1, second as usize].into_iter().try_for_each(|child| {
+                hold(
+                    surface.known_position(self.nodes[child].centre as usize),
+                    surface.refitted_radius(child),
+                )
+            }),
+        };
+        if all.is_some() {
+            surface.set_refitted_radius(at, radius);
+        }
+    }
+}
+
+impl Bounds {
+    /// Upper bound of the displacement of any surface node from rest [m].
+    pub(crate) fn max_displacement(&self, bound: &DeformationBound) -> f64 {
+        let root = self.spreads.first().copied().unwrap_or_default();
+        bound.reach(&root)
+    }
+}

@@ -1,0 +1,141 @@
+//! A state that goes on under other rules, and what pictures take of it.
+
+use glam::DVec3;
+use palpate::{
+    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
+    Recording, ResidualFieldCache, State, SurfacePoint, Twist, step,
+};
+use std::sync::Arc;
+
+fn model(step_s: f64, gravity: DVec3) -> Model {
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+    let start = ObjectStart {
+        pose: Pose::IDENTITY,
+        twist: Twist { linear: DVec3::new(0.1, 0.0, 0.2), angular: DVec3::new(0.5, -1.0, 2.0) },
+    };
+    let parameters = ModelParameters {
+        step_s,
+        gravity,
+        devices: vec![DeviceParameters::default()],
+        ..ModelParameters::default()
+    };
+    Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model")
+}
+
+/// Pulled for a while at a point.
+fn pulled(model: &Model) -> State {
+    let grasp = Grasp { object: 0, point: SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] } };
+    let recording = model.recordings().next().expect("an object");
+    let rest = recording.surface.rest_position(&grasp.point);
+    let mut state = State::new(model);
+    for number in 1..=40 {
+        let hand = rest + DVec3::new(2e-4, 1e-4, -1e-4) * f64::from(number);
+        let input = Input { devices: vec![DeviceInput::held(hand, grasp)], ..Input::default() };
+        step(model, &mut state, &input);
+    }
+    state
+}
+
+fn away() -> Input {
+    Input { devices: vec![DeviceInput::inactive()], ..Input::default() }
+}
+
+#[test]
+fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
+    let model = model(1e-3, DVec3::Y * -9.81);
+    let mut state = pulled(&model);
+    let mut other = State::resume(&model, &state.snapshots());
+    assert_eq!(other.output().objects[0].pose, state.output().objects[0].pose);
+    assert_eq!(other.modal_state(0), state.modal_state(0));
+    for _ in 0..200 {
+        let (a, b) = (step(&model, &mut state, &away()).clone(), step(&model, &mut other, &away()));
+        assert_eq!((a.objects[0].pose, a.objects[0].twist), (b.objects[0].pose, b.objects[0].twist));
+        assert_eq!(a.objects[0].energy.elastic, b.objects[0].energy.elastic);
+    }
+    assert_eq!(state.modal_state(0), other.modal_state(0));
+}
+
+#[test]
+fn a_scene_at_its_start_goes_on_as_itself() {
+    let model = model(1e-3, DVec3::Y * -9.81);
+    let start = State::new(&model);
+    let mut other = State::resume(&model, &start.snapshots());
+    assert_eq!((other.output(), other.snapshots()), (start.output(), start.snapshots()));
+    let mut state = start;
+    for _ in 0..100 {
+        assert_eq!(step(&model, &mut state, &away()), step(&model, &mut other, &away()));
+    }
+}
+
+#[test]
+fn under_other_rules_it_keeps_its_motion_and_its_energy_but_for_gravity() {
+    let before = model(1e-3, DVec3::ZERO);
+    let state = pulled(&before);
+    let after = model(5e-4, DVec3::X * 3.0);
+    let mut other = State::resume(&after, &state.snapshots());
+    let (old, new) = (state.output(), other.output().clone());
+    assert_eq!((old.objects[0].pose, old.objects[0].twist), (new.objects[0].pose, new.objects[0].twist));
+    assert_eq!(old.energy.kinetic, new.energy.kinetic);
+    assert_eq!((old.energy.elastic, new.time_s, new.energy.input), (new.energy.elastic, 0.0, 0.0));
+    let begun = new.energy.stored();
+    assert!(old.energy.elastic > 1e-7 && old.energy.kinetic > 1e-6, "{:?}", old.energy);
+    for _ in 0..400 {
+        let energy = step(&after, &mut other, &away()).energy;
+        let missing = energy.stored() + energy.lost() - begun - energy.defect;
+        assert!(missing.abs() < 1e-12 * begun.abs().max(1.0), "{missing} J of {begun} J");
+    }
+}
+
+#[test]
+fn a_surface_is_its_modes_and_its_dents() {
+    let model = model(1e-3, DVec3::Y * -9.81);
+    let state = pulled(&model);
+    let deformation = state.deformation(0);
+    let recording = model.recordings().next().expect("an object");
+    let mut whole = vec![DVec3::ZERO; recording.surface.positions.len()];
+    let mut dents = whole.clone();
+    deformation.surface_displacement(&model, &mut whole);
+    deformation.residual_displacements(&model, &mut ResidualFieldCache::default(), &mut dents);
+    let (q, mut deepest) = (deformation.modal_coordinates(), 0.0_f64);
+    assert_eq!(q.len(), recording.modes.len());
+    for (node, (u, dent)) in whole.iter().zip(&dents).enumerate() {
+        let row = |axis: usize| recording.modes.row(node, axis).iter().zip(q).map(|(a, b)| a * b).sum();
+        let modal = DVec3::new(row(0), row(1), row(2));
+        assert!((modal + *dent - *u).length() < 1e-15, "{node}: {modal} {dent} {u}");
+        deepest = deepest.max(dent.length());
+    }
+    assert!(deepest > 1e-5, "the hand makes a dent: {deepest} m");
+}
+
+#[test]
+fn a_picture_with_a_memory_is_that_without() {
+    let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
+    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
+    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
+    let parameters = ModelParameters { devices: vec![finger; 2], ..ModelParameters::default() };
+    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
+    let surface = &model.recordings().next().expect("an object").surface;
+    let edge = surface.positions.iter().map(|place| place.x).fold(0.0, f64::max);
+    let mut state = State::new(&model);
+    let mut memory = ResidualFieldCache::default();
+    let mut deepest = 0.0_f64;
+    for number in 0..300 {
+        // They press, and wander over patches that are new and known.
+        let (press, along) =
+            (0.004 * (f64::from(number) / 100.0).min(1.0), 0.02 * (f64::from(number) / 40.0).sin());
+        let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (edge + 0.0105 - press), along, 0.01));
+        step(&model, &mut state, &Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() });
+        let mut with = vec![DVec3::ZERO; surface.positions.len()];
+        let mut without = with.clone();
+        let deformation = state.deformation(0);
+        deformation.surface_displacement_cached(&model, &mut memory, &mut with);
+        deformation.surface_displacement(&model, &mut without);
+        let size = without.iter().map(|u| u.length()).fold(0.0, f64::max);
+        let off = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+        assert!(off <= 1e-6 * size, "{number}: {off} of {size}");
+        deepest = deepest.max(size);
+    }
+    assert!(deepest > 1e-4, "they press: {deepest} m");
+}
