@@ -1,4 +1,4 @@
-//! The cost of direct convolution against what section 2.5 of the paper says of it.
+//! The cost of direct convolution, against section 2.5 of the paper.
 
 use crate::bodies::{cube, table_in_memory};
 use crate::chapter::{Chapter, csv};
@@ -40,7 +40,7 @@ const STEP_S: f64 = 1e-3;
 const USUAL_SAMPLES: usize = 500;
 const USUAL_POINTS: usize = 2;
 
-/// Few: the numbers in the table don't change its cost.
+/// Modes of the bodies: few, for the numbers in the table do not change its cost.
 const MODES: usize = 60;
 
 /// Surface nodes spread over the body, each as a point of one of its triangles.
@@ -55,7 +55,7 @@ fn points(recording: &Recording, count: usize) -> Vec<SurfacePoint> {
     (0..count).filter_map(|k| at_node((2 * k + 1) * nodes / (2 * count))).collect()
 }
 
-/// Measure one configuration: all hands move, and the history is full.
+/// Measures one configuration, with all devices in motion and a full history.
 fn measure(body: &RecordedBody, held: usize, samples: usize, steps: usize) -> Result<Cost, ReproduceError> {
     let recording = Arc::new(body.recording.clone());
     let surface_nodes = body.surface_nodes();

@@ -1,7 +1,7 @@
 //! Figures 2 and 3: an impulse by a point and by a plane on the top face, and how the wave arrives.
 
 use crate::chapter::{Chapter, DataFile, csv};
-use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::page::{Section, figure, gallery, paragraph};
@@ -12,7 +12,7 @@ use palpate::Sampling;
 use palpate_fem::RecordedBody;
 use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 
-/// Steps of the integration [s]; the force is held for `HELD` of them, the paper's step of 2 ms.
+/// Step of the integration [s]; the force is held for `HELD` of them, the paper's step of 2 ms.
 const STEP_S: f64 = 0.5e-3;
 const HELD: usize = 4;
 const SAMPLES: usize = 160;
@@ -158,12 +158,13 @@ pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<
             },
         ],
         reference_lines: vec![
-            ReferenceLine::Horizontal { y: 16.0, label: "paper: 16 ms".into() },
-            ReferenceLine::Horizontal {
-                y: pressure_ms,
+            ReferenceLine { axis: AxisName::Y, value: 16.0, label: "paper: 16 ms".into() },
+            ReferenceLine {
+                axis: AxisName::Y,
+                value: pressure_ms,
                 label: format!("pressure wave: {pressure_ms:.1} ms"),
             },
-            ReferenceLine::Vertical { x: 1.0, label: "1 %".into() },
+            ReferenceLine { axis: AxisName::X, value: 1.0, label: "1 %".into() },
         ],
     };
     let at = |points: &[(f64, f64)], percent: f64| {

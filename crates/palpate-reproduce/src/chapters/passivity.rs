@@ -1,4 +1,4 @@
-//! The discrete passivity test: which ways of sampling keep a port from giving energy away.
+//! The discrete passivity test of ways of sampling: whether a port generates energy.
 //!
 //! The work at a port in a step is f[t]·(u[t] − u[t−1]). With u = Σ R[s]·f[t−s] it is never negative in sum exactly if
 //!
@@ -9,7 +9,7 @@
 //! Where Re Y is negative the discrete port generates energy; its least value is given as a share of the largest.
 
 use crate::chapter::{Chapter, csv};
-use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::page::{Section, figure, paragraph, table};
@@ -24,7 +24,7 @@ use std::f64::consts::TAU;
 const STEP_S: f64 = 2e-3;
 const WINDOW: usize = 500;
 
-/// Long enough for all but the last 1e-9 of a mode that decays with α/2 = 1/s.
+/// Samples after which a mode that decays with α/2 = 1/s has lost all but 1e-9 of its amplitude.
 const LONG: usize = 10_000;
 
 /// Krylov blocks for what 200 modes leave out, as in the certificate.
@@ -139,7 +139,7 @@ fn recipes(of: impl Fn(f64) -> Port, cut: &Port) -> Vec<Recipe> {
     ]
 }
 
-/// What is found for one recipe: largest generation of energy as a share of the largest Re Y, and where [Hz].
+/// Result of a recipe: largest generation of energy as a share of the largest Re Y, and its frequency [Hz].
 struct Tested {
     share: f64,
     hertz: f64,
@@ -191,7 +191,7 @@ pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<
         x: Axis { label: "frequency [Hz]".into(), scale: Scale::Linear },
         y: Axis { label: "Re Y [% of its largest]".into(), scale: Scale::Linear },
         series,
-        reference_lines: vec![ReferenceLine::Horizontal { y: 0.0, label: "passive above".into() }],
+        reference_lines: vec![ReferenceLine { axis: AxisName::Y, value: 0.0, label: "passive above".into() }],
     };
     let html = table(
         "Largest generation of energy by ways of sampling, as a share of the largest Re Y; step 2 ms",

@@ -19,10 +19,10 @@ const USUAL: usize = 48;
 /// Tolerances of the sag with 48 and with 24 samples: compliance that is averaged over ever larger patches.
 const SAG: [(usize, f64); 2] = [(USUAL, 0.03), (24, 0.06)];
 
-/// The same for the lower of two cubes; the upper one rests on two sampled faces, of which it gets half as much again.
+/// Tolerances of the sag of the lower of two cubes; those of the upper one, which rests on two sampled faces, are 1.5 times these.
 const STACKED_SAG: [(usize, f64); 2] = [(USUAL, 0.04), (24, 0.08)];
 
-/// Tolerance of the floor's mean force: the body still settles by that much.
+/// Tolerance of the floor's mean force: the body still oscillates a little.
 const FLOOR_FORCE: f64 = 1e-4;
 
 /// Tolerance of the mean force between two cubes, which sway longer.
