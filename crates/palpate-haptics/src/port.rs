@@ -1,6 +1,5 @@
 //! Port between a haptic update and the force process: two values, motion and effort, of which only the newest counts.
 
-use crate::link::LinkSender;
 use glam::{DQuat, DVec3};
 use palpate::DeviceMode;
 use triple_buffer::{Input, Output, triple_buffer};
@@ -68,8 +67,8 @@ pub struct DevicePort {
 pub(crate) enum MotionSink {
     /// Force process in this process.
     Local(Input<Motion>),
-    /// Force process behind a link.
-    Link(LinkSender),
+    /// Force process elsewhere.
+    Remote(Box<dyn FnMut(Motion) + Send>),
 }
 
 /// Force process's side of a port.
@@ -89,9 +88,9 @@ pub fn port() -> (DevicePort, ForcePort) {
 }
 
 impl DevicePort {
-    /// Device side of a port whose other side is behind a link.
-    pub(crate) fn linked(sender: LinkSender, effort: Output<Effort>) -> Self {
-        Self { motion: MotionSink::Link(sender), effort }
+    /// Device side of a port whose other side is elsewhere.
+    pub(crate) fn remote(send: Box<dyn FnMut(Motion) + Send>, effort: Output<Effort>) -> Self {
+        Self { motion: MotionSink::Remote(send), effort }
     }
 
     /// Sends a motion.
@@ -115,7 +114,7 @@ impl MotionSink {
     pub(crate) fn send(&mut self, motion: Motion) {
         match self {
             Self::Local(input) => input.write(motion),
-            Self::Link(sender) => sender.send(&motion),
+            Self::Remote(send) => send(motion),
         }
     }
 }

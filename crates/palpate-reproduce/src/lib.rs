@@ -9,6 +9,7 @@ mod chapters;
 mod chart;
 mod error;
 mod findings;
+mod html;
 mod image_series;
 mod log_steps;
 mod options;

@@ -2,6 +2,7 @@
 //!
 //! Callers number the figures and tables. Texts are escaped here, except where a parameter says that it is html.
 
+use crate::html::escape;
 use crate::surface_picture::PICTURE_STYLE;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -116,23 +117,6 @@ impl Page {
     }
 }
 
-/// A text with the characters escaped that mean something in html, and without control characters.
-pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c if c.is_control() && !c.is_ascii_whitespace() => {}
-            c => out.push(c),
-        }
-    }
-    out
-}
-
 /// A table of plain texts; the first column is on the left and names its row.
 pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     let head: String = head.iter().map(|cell| format!("<th scope=\"col\">{}</th>", escape(cell))).collect();
@@ -212,26 +196,9 @@ pub fn code(text: &str) -> String {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-
-    /// Every element that opens also closes, in order; attributes hold no stray quotes.
-    pub(crate) fn assert_well_formed(html: &str) {
-        let mut open: Vec<&str> = Vec::new();
-        for piece in html.split('<').skip(1) {
-            let (tag, text) = piece.split_once('>').expect("a tag ends");
-            assert!(!text.contains('>'), "stray > after <{tag}>");
-            assert_eq!(tag.matches('"').count() % 2, 0, "quotes in <{tag}>");
-            let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("as it was drawn");
-            match tag {
-                _ if tag.starts_with('!') || name == "meta" || tag.ends_with('/') => {}
-                _ if tag.starts_with('/') => assert_eq!(open.pop(), Some(name)),
-                _ => open.push(name),
-            }
-        }
-        assert!(open.is_empty(), "{open:?} stay open");
-    }
-
+    use crate::html::tests::assert_well_formed;
     fn page() -> Page {
         let body = [
             paragraph("1 < 2"),

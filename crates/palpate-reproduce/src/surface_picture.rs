@@ -6,7 +6,7 @@
 //! surface of a solid.
 
 use crate::chart::{Range, Scale};
-use crate::page::escape;
+use crate::html::escape;
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 
@@ -272,7 +272,7 @@ pub fn colour_bar(range: (f64, f64), label: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page::tests::assert_well_formed;
+    use crate::html::tests::assert_well_formed;
 
     const VIEW: View = View { azimuth_deg: 30.0, elevation_deg: 25.0 };
 

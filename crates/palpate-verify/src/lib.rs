@@ -16,6 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod case;
 mod cases;
 mod check;
 mod error;
@@ -24,8 +25,9 @@ mod reference;
 mod run;
 mod run_invariants;
 
+pub use case::Case;
 pub use cases::CASES;
 pub use check::Check;
 pub use error::{UnknownCase, VerifyError};
 pub use reference::{UNREDUCED_REBOUND_M, UnreducedFallRow, unreduced_fall};
-pub use run::{Case, CaseResult, Event, run, select};
+pub use run::{CaseResult, Event, run, select};

@@ -1,20 +1,10 @@
 //! Running cases.
 
+use crate::case::Case;
 use crate::cases::CASES;
 use crate::check::Check;
 use crate::error::{UnknownCase, VerifyError};
 use std::time::{Duration, Instant};
-
-/// A case with known answers.
-#[derive(Debug)]
-pub struct Case {
-    /// Short name, by which it is asked for.
-    pub name: &'static str,
-    /// One line on what is compared with what.
-    pub about: &'static str,
-    /// Computes the checks.
-    pub compute: fn() -> Result<Vec<Check>, VerifyError>,
-}
 
 /// A case that was computed.
 #[derive(Debug)]

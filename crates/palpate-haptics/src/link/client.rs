@@ -42,15 +42,10 @@ struct Shared {
     state: Mutex<LinkState>,
 }
 
-/// Sink of motions that sends them over a link.
-pub(crate) struct LinkSender {
-    shared: Arc<Shared>,
-}
-
-impl LinkSender {
+impl Shared {
     /// Sends a motion, if the link is connected and not locked.
-    pub(crate) fn send(&self, motion: &Motion) {
-        let Ok(connection) = self.shared.connection.try_lock() else { return };
+    fn send(&self, motion: &Motion) {
+        let Ok(connection) = self.connection.try_lock() else { return };
         if let Some(connection) = &*connection {
             // A datagram that can't be sent now would be outdated later.
             let _ = connection.send_datagram(motion_bytes(motion).to_vec().into());
@@ -103,7 +98,8 @@ impl LinkClient {
             start,
         };
         runtime.spawn(link.keep_connected(efforts));
-        let port = DevicePort::linked(LinkSender { shared: shared.clone() }, newest);
+        let sender = shared.clone();
+        let port = DevicePort::remote(Box::new(move |motion| sender.send(&motion)), newest);
         Ok((port, Self { runtime: Some(runtime), endpoint, shared }))
     }
 

@@ -11,7 +11,6 @@ mod sequence;
 mod server;
 mod transport;
 
-pub(crate) use client::LinkSender;
 pub use client::{LinkClient, LinkState};
 pub use identity::Secret;
 pub use server::{LinkCounts, LinkServer};

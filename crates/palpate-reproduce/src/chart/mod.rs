@@ -9,7 +9,7 @@ mod curve;
 
 pub use axis::{Range, Scale};
 
-use crate::page::escape;
+use crate::html::escape;
 use curve::looks;
 use glam::DVec2;
 
@@ -274,7 +274,7 @@ fn short(length: f64) -> String {
 mod tests {
     use super::AxisName::{X, Y};
     use super::*;
-    use crate::page::tests::assert_well_formed;
+    use crate::html::tests::assert_well_formed;
 
     fn series(points: Vec<(f64, f64)>, style: Style) -> Series {
         Series { label: "a < b".into(), points, style }

@@ -19,7 +19,7 @@ mod shaken_block;
 mod sphere;
 mod stack;
 
-use crate::run::Case;
+use crate::case::Case;
 
 /// All cases, quick ones first.
 pub const CASES: &[Case] = &[

@@ -4,7 +4,7 @@
 //! objects' support functions along it, they are apart when e_a + e_b is less than the distance of the centres.
 
 use super::context::CollisionContext;
-use super::deformed_surface::{DeformedSurface, Moment};
+use super::deformed_surface::{DeformedSurface, SurfaceTime};
 use super::narrow_phase::{APPROACH_FACTOR, MARGIN};
 use crate::response::Footprint;
 use glam::DVec3;
@@ -66,7 +66,7 @@ impl CollisionContext<'_> {
         let footprint = self.footprint_against(at, other);
         let (own, body) = (&self.states[at], &self.scene.objects[at].body);
         let positions = &mut self.workspace.positions[at];
-        let moment = Moment::StepStart(self.step);
+        let moment = SurfaceTime::StepStart(self.step);
         DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment)
     }
 }

@@ -32,9 +32,9 @@ pub(crate) struct TriangleProjection {
     pub(crate) normal: DVec3,
 }
 
-/// Moment at which a surface is looked at.
+/// Time within a step at which a surface is evaluated.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Moment<'a> {
+pub(crate) enum SurfaceTime<'a> {
     /// Start of the step with this number: node positions are kept for the step.
     StepStart(u64),
     /// Modal coordinates of another moment.
@@ -71,11 +71,11 @@ impl<'a> DeformedSurface<'a> {
         state: &'a ResponseState,
         points: &ContactPoints,
         cache: &'a mut NodePositionCache,
-        moment: Moment<'a>,
+        moment: SurfaceTime<'a>,
     ) -> Self {
         let (q, key) = match moment {
-            Moment::StepStart(step) => (state.coordinates(), Some((step, footprint))),
-            Moment::Coordinates(q) => (q, None),
+            SurfaceTime::StepStart(step) => (state.coordinates(), Some((step, footprint))),
+            SurfaceTime::Coordinates(q) => (q, None),
         };
         let free = state.free_coordinates();
         if cache.select(key) {

@@ -181,7 +181,7 @@ pub(super) fn keep_local_minima(found: &mut Vec<TriangleProjection>, body: &Body
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::deformed_surface::Moment;
+    use crate::collision::deformed_surface::SurfaceTime;
     use crate::collision::node_cache::NodePositionCache;
     use crate::recording::Recording;
     use crate::response::{ContactPoints, Footprint, Response, ResponseForm};
@@ -211,8 +211,14 @@ mod tests {
             let q: Vec<f64> = omegas.iter().enumerate().map(mode).collect();
             let p = DVec3::new(angle(0.3), angle(0.6), angle(0.9)) * 0.12;
             let reach = 0.05 * (1.0 + angle(0.2));
-            let mut surface =
-                DeformedSurface::new(&body, reading, &state, &points, &mut cache, Moment::Coordinates(&q));
+            let mut surface = DeformedSurface::new(
+                &body,
+                reading,
+                &state,
+                &points,
+                &mut cache,
+                SurfaceTime::Coordinates(&q),
+            );
             query.triangles_within(&mut surface, p, reach);
             let mut all: Vec<u32> = (0..recording.surface.triangles.len() as u32)
                 .filter(|&t| surface.project_on_triangle(t, p).distance < reach)

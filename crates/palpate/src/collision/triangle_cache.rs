@@ -214,7 +214,7 @@ fn descend(surface: &mut DeformedSurface, triangle: u32, p: DVec3) -> TrianglePr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::deformed_surface::Moment;
+    use crate::collision::deformed_surface::SurfaceTime;
     use crate::collision::node_cache::NodePositionCache;
     use crate::recording::Recording;
     use crate::response::{ContactPoints, Footprint, Response, ResponseForm};
@@ -256,7 +256,7 @@ mod tests {
                     &state,
                     &points,
                     &mut cache,
-                    Moment::Coordinates(&q),
+                    SurfaceTime::Coordinates(&q),
                 );
                 counts[3] += u32::from(
                     triangles.current.reach - reach - triangles.current.displacement_since_build(&surface, p)
@@ -287,7 +287,7 @@ mod tests {
                         &state,
                         &points,
                         &mut cache,
-                        Moment::Coordinates(&moment),
+                        SurfaceTime::Coordinates(&moment),
                     );
                     triangles.continue_rebuild(&mut surface);
                     triangles.return_rebuild_coordinates(moment, &body);

@@ -165,7 +165,8 @@ impl Solver {
             let is_last = iterations == MAX_ITERATIONS || sweeps >= MAX_SWEEPS || !residual.is_finite();
             if residual <= tolerance || is_last {
                 report.iterations = report.iterations.max(iterations);
-                report.residual_m = report.residual_m.max(if residual.is_finite() { residual } else { reach });
+                report.residual_m =
+                    report.residual_m.max(if residual.is_finite() { residual } else { reach });
                 let allowed = if touches { ROUGH * size } else { UNSOLVED * reach };
                 // Dependent held points can't be met where their devices differ, and need not be.
                 let is_solved = residual <= allowed || dependent > 0 && residual <= first_residual;
@@ -197,7 +198,8 @@ impl Solver {
         }
         problem.write_ends(&self.members);
         // A rough solution is used, and reported as unsolved: by its residual, or by what the last sweep moved.
-        let is_rough = last_residual > LOOSE * size || problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
+        let is_rough =
+            last_residual > LOOSE * size || problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
         report.unsolved_islands += u32::from(is_solved && touches && is_rough);
     }
 

@@ -9,7 +9,7 @@ use super::point_surface::{MARGIN, MovingPoint, point_against_surface};
 use crate::collision::candidate::{CandidateList, CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
 use crate::collision::context::CollisionContext;
-use crate::collision::deformed_surface::{DeformedSurface, Moment};
+use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
 use crate::object::ObjectState;
 use crate::obstacle::Obstacle;
 use crate::response::{Body, ContactLocation, Footprint};
@@ -80,7 +80,7 @@ impl CollisionContext<'_> {
             query.level = self.levels[level].level;
             let footprint = body.footprint_at_level(query.level);
             let positions = &mut self.workspace.positions[at];
-            let moment = Moment::StepStart(self.step);
+            let moment = SurfaceTime::StepStart(self.step);
             let surface =
                 &mut DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
             surface.cover_prediction();
@@ -308,7 +308,7 @@ impl ObstacleQuery<'_> {
         let workspace = &mut *context.workspace;
         let (query, candidates) = (&mut workspace.query, &mut workspace.candidates);
         let positions = &mut workspace.positions[self.object];
-        let moment = Moment::StepStart(context.step);
+        let moment = SurfaceTime::StepStart(context.step);
         let (response, points) = (&self.own.response, &self.own.points);
         let surface =
             &mut DeformedSurface::new(self.body, Footprint::Point, response, points, positions, moment);

@@ -7,7 +7,7 @@ use crate::collision::broad_phase::HalfSpace;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, OtherSide};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
-use crate::collision::deformed_surface::{DeformedSurface, Moment};
+use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
 use crate::collision::proximity::ProximityQuery;
 use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
@@ -92,7 +92,7 @@ impl CollisionContext<'_> {
         let Ok([cache, base_cache]) = positions.get_disjoint_mut([nodes_of, surface_of]) else { return 0 };
         let side = |number: usize, footprint, cache| {
             let (own, object) = (&states[number], &scene.objects[number]);
-            let moment = Moment::StepStart(*step);
+            let moment = SurfaceTime::StepStart(*step);
             let surface =
                 DeformedSurface::new(&object.body, footprint, &own.response, &own.points, cache, moment);
             Side { number, own, object, footprint, surface }

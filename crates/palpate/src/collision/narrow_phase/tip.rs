@@ -8,7 +8,9 @@ use super::phong_projection::phong_project;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
 use crate::collision::context::CollisionContext;
-use crate::collision::deformed_surface::{DeformedSurface, MAX_TIP_CONTACTS, Moment, TriangleProjection};
+use crate::collision::deformed_surface::{
+    DeformedSurface, MAX_TIP_CONTACTS, SurfaceTime, TriangleProjection,
+};
 use crate::collision::proximity::{ProximityQuery, SAME_FACE};
 use crate::device::{DeviceParameters, DeviceState};
 use crate::response::{Body, ContactLocation, Footprint};
@@ -72,7 +74,7 @@ impl CollisionContext<'_> {
         let triangle_cache = self.triangle_cache(number, at);
         let workspace = &mut *self.workspace;
         let positions = &mut workspace.positions[at];
-        let moment = Moment::StepStart(self.step);
+        let moment = SurfaceTime::StepStart(self.step);
         let mut surface =
             DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
         if start.length() - motion - tip > object.radius + surface.max_displacement() {
@@ -127,7 +129,7 @@ impl CollisionContext<'_> {
         let parameters = &self.scene.devices[number];
         let footprint = body.footprint(parameters.patch_radius);
         let positions = &mut self.workspace.positions[at];
-        let moment = Moment::Coordinates(&coordinates[..own.response.coordinates().len()]);
+        let moment = SurfaceTime::Coordinates(&coordinates[..own.response.coordinates().len()]);
         let mut surface =
             DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
@@ -164,7 +166,7 @@ impl CollisionContext<'_> {
             let mut t = 0.0;
             for _ in 0..MAX_ADVANCEMENTS {
                 interpolate(t, blend);
-                let moment = Moment::Coordinates(blend);
+                let moment = SurfaceTime::Coordinates(blend);
                 let mut surface =
                     DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
                 let p = start.lerp(free, t);
@@ -196,7 +198,7 @@ impl CollisionContext<'_> {
         for k in 1..=count as u32 {
             let t = f64::from(k) / count;
             interpolate(t, blend);
-            let moment = Moment::Coordinates(blend);
+            let moment = SurfaceTime::Coordinates(blend);
             let mut surface =
                 DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
             let p = start + slide * t;
