@@ -97,10 +97,10 @@ impl Page {
     /// Wait for a picture that is so.
     fn see(&mut self, is: impl Fn(&Picture) -> bool) {
         loop {
-            if let Message::Binary(bytes) = self.0.read().expect("pictures come")
-                && is(&Picture::read(&bytes))
-            {
-                return;
+            match self.0.read().expect("pictures come") {
+                Message::Binary(bytes) if is(&Picture::read(&bytes)) => return,
+                Message::Text(text) => assert!(!text.contains(r#""type":"error""#), "{text}"),
+                _ => {}
             }
         }
     }
@@ -206,7 +206,7 @@ fn what_is_done_with_a_pointer_is_logged_and_every_scene_is_a_log_of_its_own() {
     page.send(r#"{"type":"move","pointers":[{"pointer":1,"position":[-0.045,0.001,0.05]}]}"#);
     page.see(|picture| picture.force > 0.02);
     assert!(!workplace.path("run.mcap").exists(), "it is hidden until it is whole");
-    page.send(r#"{"type":"set","friction":0.1}"#);
+    page.send(r#"{"type":"set_physics","friction":0.1}"#);
     page.see(|picture| picture.generation == 2 && picture.step > 20);
     page.send(r#"{"type":"reset"}"#);
     page.see(|picture| picture.generation == 3 && picture.step > 20);
