@@ -43,6 +43,11 @@
 #![no_std]
 extern crate alloc;
 
+/// Compiles the README's program.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod collision;
 mod contact;
 mod device;
