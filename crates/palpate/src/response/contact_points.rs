@@ -51,10 +51,10 @@ pub(crate) struct ContactPoints {
     /// Forces g [N, body] and displacements C·g [m, body], three numbers per point.
     forces: Vec<f64>,
     moved: Vec<f64>,
-    /// Forces and displacements before a sweep, and along the search direction of the conjugate gradients.
+    /// The same before a sweep, and along the direction of search (see `solver`).
     before: [Vec<f64>; 2],
     along: [Vec<f64>; 2],
-    /// Displacement [m] below which a change of force is postponed.
+    /// Changes of force that move their point by less than this [m] wait until they have added up.
     pub(crate) least_move: f64,
     unused: Vec<usize>,
     /// Index in `points` of each slot's point.
@@ -227,7 +227,7 @@ impl ContactPoints {
         self.points[at].free + DVec3::from_slice(&self.moved[3 * at..])
     }
 
-    /// Store forces and displacements for [`Self::accelerate`].
+    /// Keep forces and displacements for [`Self::accelerate`].
     ///
     /// # Real time
     pub(crate) fn remember(&mut self) {
@@ -236,7 +236,7 @@ impl ContactPoints {
         self.before[1][..n].copy_from_slice(&self.moved[..n]);
     }
 
-    /// Move by β times the last search direction, and update it: d ← β·d + (now − before).
+    /// Go on by β times the last direction, and renew it: d ← β·d + (now − before).
     ///
     /// # Real time
     pub(crate) fn accelerate(&mut self, beta: f64) {
@@ -256,7 +256,7 @@ impl ContactPoints {
         }
     }
 
-    /// Recompute rows of C·g, number `part` of `of` parts, so that round-off does not accumulate.
+    /// Sum part number `part` of so many of C·g up anew, so that roundings don't add up.
     ///
     /// # Real time
     /// Costs the square of the number of points, over the parts.
