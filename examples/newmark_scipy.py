@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The columns of R[s] as a SciPy user would record them: Newmark's average-acceleration rule, factored once.
+"""Columns of R[s] with SciPy: Newmark's average-acceleration rule, factored once.
 
-    M·ü + C·u̇ + K·u = f,   C = α·M + β·K,   f a unit force held over the first sample [N]
+    M·ü + C·u̇ + K·u = f,   C = α·M + β·K,   f a unit force that is constant over the first sample [N]
 
     A·v̄ = f − K·u + (2/h)·M·v,   A = 2/h·M + C + h/2·K,   u ← u + h·v̄,   v ← 2·v̄ − v
 
@@ -25,9 +25,9 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-# What was quickest of SuperLU's orderings and ways of pivoting (see --try-options; other block sizes changed nothing).
+# Fastest ordering and pivoting of SuperLU (see --try-options; other block sizes make no difference).
 SYMMETRIC = dict(diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))
-QUICKEST = dict(permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
+FASTEST = dict(permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
 TRIED = [
     dict(permc_spec=ordering, **mode) for ordering in ("COLAMD", "MMD_ATA", "MMD_AT_PLUS_A") for mode in ({}, SYMMETRIC)
 ]
@@ -148,7 +148,7 @@ def main():
     if arguments.try_options:
         return
     assembled = time.perf_counter()
-    factor = splu(A, **QUICKEST)
+    factor = splu(A, **FASTEST)
     factored = time.perf_counter()
     columns = respond(factor, M, loads, observed, a, c, h, arguments.samples, arguments.substeps, arguments.dtype)
     stepped = time.perf_counter()

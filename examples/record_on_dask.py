@@ -4,9 +4,9 @@
     python record_on_dask.py -- palpate record cube.msh ... --dense OUT.zarr
     python record_on_dask.py --scheduler tcp://10.0.0.5:8786 -- palpate record ... --dense s3://bucket/OUT.zarr
 
-Each task is the given command with `--shard K/N`. A shard is written at once or not at all, and one that is there is
-kept; so a task whose worker died is run again elsewhere, and this script itself may be stopped and run again. Every
-worker needs `palpate`, the mesh, and the store under the same address: a shared folder, written in full, or s3://.
+Each task is the given command with `--shard K/N`. A shard is written at once or not at all, and an existing shard is
+kept. So a task of a lost worker is repeated on another one, and this script can be stopped and started again. Every
+worker needs `palpate`, the mesh, and the store under the same address: the full path of a shared folder, or s3://.
 
 A cluster that Slurm starts (pip install dask-jobqueue); give its `cluster.scheduler_address` as --scheduler:
     from dask_jobqueue import SLURMCluster
@@ -30,13 +30,15 @@ import time
 import dask
 from dask.distributed import Client, KilledWorker, LocalCluster, as_completed
 
-# How often a task is tried again when the command fails, and how many workers may die under it.
+# Number of retries of a failed command.
 RETRIES = 2
+
+# Number of workers that a task may lose before it is given up.
 DEATHS = 5
 
 
 def run(command):
-    """What the command prints, on a worker; its error text is carried to the user."""
+    """Output of the command on a worker; raises its error text."""
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     except OSError as error:
@@ -47,7 +49,7 @@ def run(command):
 
 
 def place_of_store(command):
-    """The address after --dense."""
+    """Address after --dense."""
     if any(word.partition("=")[0] == "--shard" for word in command):
         raise SystemExit("the command has a --shard already; leave it out, this script adds its own")
     for word, following in zip(command, [*command[1:], ""]):

@@ -1,6 +1,6 @@
 import { defineConfig } from "vite";
 
-// `npm run dev` shows the page with what a server on this port says: the stand-in, or `palpate serve --listen 127.0.0.1:8123`.
+// `npm run dev` proxies to a server on this port: the stand-in, or `palpate serve --listen 127.0.0.1:8123`.
 const server = process.env.PALPATE_SERVER ?? "http://127.0.0.1:8123";
 
 export default defineConfig({
@@ -12,7 +12,7 @@ export default defineConfig({
       "/scene": { target: server, changeOrigin: true },
       "/log": { target: server, changeOrigin: true },
       "/record": { target: server, changeOrigin: true },
-      "/picture": { target: server, changeOrigin: true },
+      "/image": { target: server, changeOrigin: true },
     },
   },
 });

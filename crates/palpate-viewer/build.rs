@@ -1,4 +1,4 @@
-//! The page is built by `cargo xtask viewer`, and embedded as it lies in `viewer/dist`.
+//! Rebuilds the crate when the embedded page in `viewer/dist` changes; `cargo xtask viewer` builds it.
 
 fn main() {
     println!("cargo:rerun-if-changed=../../viewer/dist");

@@ -1,4 +1,4 @@
-// Numbers for people: three digits, a unit, a prefix that keeps them short.
+// Number formatting: significant digits, SI prefix and unit.
 
 const PREFIXES: readonly [number, string][] = [
   [1e9, "G"],
@@ -13,23 +13,23 @@ const PREFIXES: readonly [number, string][] = [
 const MINUS = "\u2212";
 const NARROW_SPACE = "\u202f";
 
-/** `digits` significant digits, without an exponent for what people meet here, with a real minus. */
+/** Decimal text with `count` significant digits and a typographic minus; an exponent below 1e−4 and from 1e6 on. */
 export function digits(value: number, count = 3): string {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
-  // Of the rounded number: 0.9999 is 1.00.
+  // Size of the rounded number: 0.9999 gives 1.00.
   const size = Math.abs(Number(value.toPrecision(count)));
   if (size >= 1e6 || size < 1e-4) return value.toExponential(count - 1).replace("e+", "e").replaceAll("-", MINUS);
   const behind = Math.max(0, count - 1 - Math.floor(Math.log10(size)));
   return value.toFixed(Math.min(behind, 8)).replace("-", MINUS);
 }
 
-/** 0.0123, "N" → "12.3 mN". Below `floor` it is 0: what is smaller is noise. */
+/** Value with SI prefix and unit: 0.0123, "N" → "12.3 mN". Values up to `floor` give 0. */
 export function withUnit(value: number, unit: string, floor = 0, count = 3): string {
   if (!Number.isFinite(value)) return `– ${unit}`;
   const size = Math.abs(value);
   if (size <= floor || size < 1e-12) return `0${NARROW_SPACE}${unit}`;
-  // The prefix is of the rounded number: 999.9 mN is 1.00 N.
+  // Prefix of the rounded number: 999.9 mN gives 1.00 N.
   const rounded = Number(size.toPrecision(count));
   const [factor, prefix] = PREFIXES.find(([least]) => rounded >= least) ?? PREFIXES[PREFIXES.length - 1];
   return `${digits(value / factor, count)}${NARROW_SPACE}${prefix}${unit}`;
@@ -39,8 +39,8 @@ export function newtons(value: number): string {
   return withUnit(value, "N", 5e-5);
 }
 
-/** A force beside a place: two digits behind the point from 0.1 N on, so that the number keeps its width. */
-export function forceReading(value: number): string {
+/** Force label of nearly constant width: two decimals from 0.1 N on. */
+export function formatForce(value: number): string {
   const size = Math.abs(value);
   if (size < 5e-4) return `0.00${NARROW_SPACE}N`;
   if (size < 0.0995) return `${digits(value * 1000, size < 0.00995 ? 2 : 3)}${NARROW_SPACE}mN`;
@@ -63,11 +63,11 @@ export function count(value: number): string {
   return Math.round(value).toString().replace(/\B(?=(\d{3})+$)/g, NARROW_SPACE);
 }
 
-export function slownessName(slowness: number): string {
-  return slowness === 1 ? "1×" : `1/${slowness}×`;
+export function slowdownLabel(slowdown: number): string {
+  return slowdown === 1 ? "1×" : `1/${slowdown}×`;
 }
 
-/** A pressure as people say it: 2 kPa, 0.1 MPa. */
+/** Pressure or modulus with SI prefix: 2 kPa, 0.1 MPa. */
 export function pascals(value: number): string {
   return withUnit(value, "Pa");
 }

@@ -1,167 +1,167 @@
-// The page: waits for what the server says it is, and becomes that.
+// Entry point: connects to the server and starts the page mode that its hello message names.
 
 import "./style.css";
-import type { Kind } from "./kind";
-import { Live } from "./live";
-import { Logs } from "./logs";
-import { Frame } from "./panels/frame";
-import { helpSheet } from "./panels/help";
-import { LookPanel } from "./panels/look";
-import { Notes } from "./panels/notes";
-import { Stage } from "./picture/stage";
-import type { Look } from "./picture/world";
-import { prefersDark, rememberedLook, rememberLook } from "./preferences";
+import type { PageMode } from "./modes/page_mode";
+import { LiveMode } from "./modes/live_mode";
+import { LogMode } from "./modes/log_mode";
+import { PageLayout } from "./ui/page_layout";
+import { helpDialog } from "./ui/help_dialog";
+import { DisplayPanel } from "./ui/display_panel";
+import { Notifications } from "./ui/notifications";
+import { SceneView } from "./rendering/scene_view";
+import type { DisplaySettings } from "./rendering/scene_graph";
+import { prefersDark, loadPreferences, savePreferences } from "./preferences";
 import { Connection, type ConnectionState } from "./protocol/connection";
-import type { FromServer, Hello } from "./protocol/messages";
-import { Render } from "./render";
+import type { ServerMessage, Hello } from "./protocol/messages";
+import { RenderMode } from "./modes/render_mode";
 
-const PROTOCOL = 1;
-const MOST_RATIO = 2;
+const PROTOCOL = 2;
+const MAX_PIXEL_RATIO = 2;
 
-const notes = new Notes();
+const notifications = new Notifications();
 let themeChosen = false;
-let kind: Kind | null = null;
-let kindName: Hello["kind"] | null = null;
+let mode: PageMode | null = null;
+let modeName: Hello["kind"] | null = null;
 
 function start(): void {
-  const remembered = rememberedLook();
+  const remembered = loadPreferences();
   themeChosen = remembered.themeChosen;
-  let stage: Stage;
+  let sceneView: SceneView;
   try {
-    stage = new Stage(remembered);
+    sceneView = new SceneView(remembered);
   } catch {
     document.body.append("This page needs WebGL 2, which this browser does not offer here.");
     return;
   }
-  const applyTheme = (look: Look) => {
-    document.documentElement.dataset.theme = look.dark ? "dark" : "light";
+  const applyTheme = (display: DisplaySettings) => {
+    document.documentElement.dataset.theme = display.dark ? "dark" : "light";
   };
   applyTheme(remembered);
-  const look = new LookPanel(remembered, (changed, theme) => {
-    stage.look = changed;
+  const display = new DisplayPanel(remembered, (changed, theme) => {
+    sceneView.settings = changed;
     themeChosen ||= theme;
-    rememberLook(changed, themeChosen);
+    savePreferences(changed, themeChosen);
     applyTheme(changed);
-    if (theme) kind?.dress();
-    stage.redraw();
+    if (theme) mode?.applyTheme();
+    sceneView.requestRender();
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     if (themeChosen) return;
-    look.set({ dark: prefersDark() });
-    kind?.dress();
+    display.set({ dark: prefersDark() });
+    mode?.applyTheme();
   });
 
   let help: HTMLDialogElement | null = null;
-  const frame = new Frame(stage, {
+  const layout = new PageLayout(sceneView, {
     help: () => help?.showModal(),
-    theme: () => look.toggle("dark"),
+    theme: () => display.toggle("dark"),
   });
-  frame.upper.append(notes.banner, notes.list);
-  document.body.append(frame.page);
+  layout.overlayTop.append(notifications.banner, notifications.list);
+  document.body.append(layout.page);
 
-  const fit = () => stage.resize(frame.stageArea.clientWidth, frame.stageArea.clientHeight, Math.min(MOST_RATIO, devicePixelRatio || 1));
+  const fit = () => sceneView.resize(layout.viewArea.clientWidth, layout.viewArea.clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio || 1));
   const observer = new ResizeObserver(fit);
-  observer.observe(frame.stageArea);
+  observer.observe(layout.viewArea);
 
   const connection = new Connection({
-    message: (message) => hear(message),
-    picture: (picture) => kind?.pictureCame(picture),
+    message: (message) => handleMessage(message),
+    frame: (frame) => mode?.frameReceived(frame),
     state: (state) => showState(state),
-    unreadable: (what) => notes.sayOnce("unreadable", `The server sent something that this page cannot read; it was dropped (${what}).`),
+    decodeFailed: (what) => notifications.notifyOnce("unreadable", `The server sent a message that this page cannot read; it was dropped (${what}).`),
   });
 
-  function hear(message: FromServer): void {
+  function handleMessage(message: ServerMessage): void {
     if (message.type === "hello") {
-      become(message);
+      selectMode(message);
       return;
     }
-    if (message.type === "note") notes.say(message.text);
-    else if (message.type === "error") notes.say(message.text, "error");
-    else if (message.type === "scene") kind?.scene(message);
-    else if (message.type === "status") kind?.status(message);
-    else if (message.type === "granted") kind?.granted(message);
-    else if (message.type === "progress") kind?.progress(message);
+    if (message.type === "info") notifications.notify(message.text);
+    else if (message.type === "error") notifications.notify(message.text, "error");
+    else if (message.type === "scene") mode?.scene(message);
+    else if (message.type === "status") mode?.status(message);
+    else if (message.type === "assigned") mode?.assigned(message);
+    else if (message.type === "progress") mode?.progress(message);
   }
 
-  function become(hello: Hello): void {
+  function selectMode(hello: Hello): void {
     if (hello.protocol !== PROTOCOL) {
-      notes.showBanner(`This page speaks protocol ${PROTOCOL}, the server ${hello.protocol}. Loading the page again may help.`, {
-        text: "Load again",
-        act: () => location.reload(),
+      notifications.showBanner(`This page speaks protocol ${PROTOCOL}, the server ${hello.protocol}. Reload the page.`, {
+        text: "Reload",
+        run: () => location.reload(),
       });
       return;
     }
-    if (kindName !== null && kindName !== hello.kind) {
+    if (modeName !== null && modeName !== hello.kind) {
       location.reload();
       return;
     }
-    if (kindName === null) {
-      kindName = hello.kind;
+    if (modeName === null) {
+      modeName = hello.kind;
       document.documentElement.dataset.kind = hello.kind;
       if (hello.kind === "render") {
-        frame.page.remove();
+        layout.page.remove();
         observer.disconnect();
-        kind = new Render(stage);
-        kind.hello(hello);
+        mode = new RenderMode(sceneView);
+        mode.hello(hello);
         return;
       }
-      help = helpSheet(hello.kind);
-      frame.page.append(help);
-      kind = hello.kind === "live" ? new Live(stage, frame, notes, look, connection) : new Logs(stage, frame, notes, look);
+      help = helpDialog(hello.kind);
+      layout.page.append(help);
+      mode = hello.kind === "live" ? new LiveMode(sceneView, layout, notifications, display, connection) : new LogMode(sceneView, layout, notifications, display);
       requestAnimationFrame(draw);
     }
-    kind?.hello(hello);
+    mode?.hello(hello);
   }
 
   function showState(state: ConnectionState): void {
     if (state.name === "open") {
-      notes.hideBanner();
+      notifications.hideBanner();
     } else if (state.name === "lost") {
-      kind?.lost();
+      mode?.connectionLost();
       const why = state.reason === "" ? "" : ` (${state.reason})`;
-      notes.showBanner(`The connection to palpate is lost${why}. Trying again by itself …`, { text: "Now", act: () => connection.retryNow() });
+      notifications.showBanner(`The connection to palpate is lost${why}. Reconnecting …`, { text: "Reconnect now", run: () => connection.retryNow() });
     }
   }
 
   function draw(now: number): void {
     requestAnimationFrame(draw);
-    kind?.frame(now);
-    stage.draw(now / 1000);
+    mode?.animate(now);
+    sceneView.draw(now / 1000);
   }
 
-  document.addEventListener("visibilitychange", () => kind?.visibility());
-  stage.canvas.addEventListener("webglcontextlost", (event) => {
+  document.addEventListener("visibilitychange", () => mode?.visibilityChanged());
+  sceneView.canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
-    stage.lost = true;
-    notes.showBanner("The graphics card was reset. Waiting for it …", null);
+    sceneView.lost = true;
+    notifications.showBanner("The WebGL context was lost. Waiting for it …", null);
   });
-  stage.canvas.addEventListener("webglcontextrestored", () => {
-    stage.lost = false;
-    notes.hideBanner();
-    kind?.reload();
+  sceneView.canvas.addEventListener("webglcontextrestored", () => {
+    sceneView.lost = false;
+    notifications.hideBanner();
+    mode?.contextRestored();
   });
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
     const target = event.target as HTMLElement;
-    // A sheet that was just closed may still have the focus.
+    // A dialog that was just closed may still have the focus.
     const at = target.closest("dialog:not([open])") === null ? target : document.body;
     if (at.closest("input:not([type=radio], [type=checkbox], [type=range]), select, dialog") !== null) return;
     if (event.key === " " && at.closest("button, summary, input") !== null) return;
-    const acts: Record<string, () => void> = {
+    const shortcuts: Record<string, () => void> = {
       "?": () => help?.showModal(),
-      v: () => stage.home(),
-      c: () => look.nextColour(),
-      a: () => look.toggle("arrows"),
-      w: () => look.toggle("wires"),
-      t: () => look.toggle("dark"),
+      v: () => sceneView.resetView(),
+      c: () => display.nextColour(),
+      a: () => display.toggle("arrows"),
+      w: () => display.toggle("wireframe"),
+      t: () => display.toggle("dark"),
     };
-    if (event.key in acts) acts[event.key]();
-    else if (kind?.key(event) !== true) return;
+    if (event.key in shortcuts) shortcuts[event.key]();
+    else if (mode?.handleKey(event) !== true) return;
     event.preventDefault();
   });
-  // For tests, and for those who look with the browser's tools.
-  Object.assign(window, { palpate: { stage, connection, notes } });
-  connection.begin();
+  // For tests and the browser's console.
+  Object.assign(window, { palpate: { sceneView, connection, notifications } });
+  connection.start();
 }
 
 start();

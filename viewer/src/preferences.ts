@@ -1,35 +1,36 @@
-// What the page remembers of how somebody likes it.
+// Display settings stored in the browser.
 
-import { isColourMode } from "./picture/colours";
-import type { Look } from "./picture/world";
+import { isColourMode } from "./rendering/colours";
+import type { DisplaySettings } from "./rendering/scene_graph";
 
-const KEY = "palpate.look";
+const STORAGE_KEY = "palpate.display";
 
 export function prefersDark(): boolean {
   return window.matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-export function rememberedLook(): Look & { themeChosen: boolean } {
-  const look = { colour: "displacement" as const, arrows: true, wires: true, dark: prefersDark(), themeChosen: false };
+/** Stored display settings, completed with defaults; `themeChosen`: whether the user chose the theme. */
+export function loadPreferences(): DisplaySettings & { themeChosen: boolean } {
+  const defaults = { colour: "displacement" as const, arrows: true, wireframe: true, dark: prefersDark(), themeChosen: false };
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "{}") as Partial<Record<string, unknown>>;
+    const stored = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "{}") as Partial<Record<string, unknown>>;
     return {
-      colour: typeof kept.colour === "string" && isColourMode(kept.colour) ? kept.colour : look.colour,
-      arrows: typeof kept.arrows === "boolean" ? kept.arrows : look.arrows,
-      wires: typeof kept.wires === "boolean" ? kept.wires : look.wires,
-      dark: typeof kept.dark === "boolean" ? kept.dark : look.dark,
-      themeChosen: typeof kept.dark === "boolean",
+      colour: typeof stored.colour === "string" && isColourMode(stored.colour) ? stored.colour : defaults.colour,
+      arrows: typeof stored.arrows === "boolean" ? stored.arrows : defaults.arrows,
+      wireframe: typeof stored.wireframe === "boolean" ? stored.wireframe : defaults.wireframe,
+      dark: typeof stored.dark === "boolean" ? stored.dark : defaults.dark,
+      themeChosen: typeof stored.dark === "boolean",
     };
   } catch {
-    return look;
+    return defaults;
   }
 }
 
-export function rememberLook(look: Look, themeChosen: boolean): void {
-  const { colour, arrows, wires, dark } = look;
+export function savePreferences(settings: DisplaySettings, themeChosen: boolean): void {
+  const { colour, arrows, wireframe, dark } = settings;
   try {
-    localStorage.setItem(KEY, JSON.stringify(themeChosen ? { colour, arrows, wires, dark } : { colour, arrows, wires }));
+    localStorage.setItem(STORAGE_KEY, JSON.stringify(themeChosen ? { colour, arrows, wireframe, dark } : { colour, arrows, wireframe }));
   } catch {
-    // Without storage it is as at first next time.
+    // Without storage the defaults apply next time.
   }
 }

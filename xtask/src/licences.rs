@@ -1,5 +1,6 @@
 //! Licences of the dependencies.
 
+use crate::process::root;
 use serde_json::Value;
 use std::process::Command;
 
@@ -27,10 +28,9 @@ const ALLOWED: &[&str] = &[
 
 /// Check every package of the lock file.
 pub fn check() -> Result<(), String> {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
     let output = Command::new("cargo")
         .args(["metadata", "--locked", "--format-version", "1"])
-        .current_dir(root)
+        .current_dir(root())
         .output()
         .map_err(|e| format!("cargo metadata: {e}"))?;
     let metadata: Value =

@@ -1,6 +1,7 @@
-//! What the machine must have, and how it gets it.
+//! Programs that chores need of the machine, and their installation.
 
-use std::path::{Path, PathBuf};
+use crate::process::root;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// Whether a command can be run and succeeds.
@@ -28,9 +29,8 @@ pub fn need_c_compiler() -> Result<(), String> {
 
 /// A Python with what the tests in python/tests need, in an environment of its own under target/.
 pub fn need_python() -> Result<PathBuf, String> {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    let environment = root.join("target/python-tests");
-    let requirements = root.join("python/tests/requirements.txt");
+    let environment = root().join("target/python-tests");
+    let requirements = root().join("python/tests/requirements.txt");
     let python = environment.join("bin/python");
     // Renewed when the list of packages changes.
     let wanted =
@@ -86,7 +86,7 @@ pub fn need_chromium() -> Result<PathBuf, String> {
     })
 }
 
-/// Where a program of the path lies.
+/// File of a program on the path.
 fn place(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file())

@@ -1,42 +1,163 @@
-//! The project's chores: `cargo xtask demo | test | viewer | verify | licences`.
+//! Chores of the project: `cargo xtask` lists them, `cargo xtask CHORE --help` tells what one does.
 //!
 //! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
 
+mod bare;
 mod licences;
 mod machine;
+mod process;
+mod tests;
 mod viewer;
 
-use std::path::Path;
+use process::{palpate, root, run};
 use std::process::{Command, ExitCode};
+use xtask::{layers, words};
 
-const USAGE: &str = "cargo xtask CHORE
+/// A chore of the command line.
+struct Chore {
+    name: &'static str,
+    /// One line of the list.
+    summary: &'static str,
+    /// Flags that it takes, each with its values, if any, and its meaning.
+    flags: &'static [(&'static str, &'static [&'static str], &'static str)],
+    run: fn(&Flags) -> Result<(), String>,
+}
 
-  demo       build palpate with its viewer and run its demo: elastic objects to touch in the browser
-  test       install what the tests need, and run all of them
-  viewer     build the page that palpate serves (viewer/, with Node.js), which builds of palpate embed
-  verify     the slow proofs: computed numbers against analytic ones, in release mode
-  licences   check that every dependency's licence fits MIT OR Apache-2.0";
+const CHORES: &[Chore] = &[
+    Chore {
+        name: "demo",
+        summary: "build palpate with its viewer and run its demo: elastic objects to touch in the browser",
+        flags: &[],
+        run: |_| demo(),
+    },
+    Chore {
+        name: "test",
+        summary: "install what the tests need, and run all of them",
+        flags: &[("--only", tests::PARTS, "one part of the tests")],
+        run: |flags| tests::run_parts(flags.value("--only")),
+    },
+    Chore {
+        name: "verify",
+        summary: "the slow proofs: computed numbers against analytic ones",
+        flags: &[],
+        run: |_| verify(),
+    },
+    Chore {
+        name: "viewer",
+        summary: "build the page that palpate serves (viewer/, with Node.js), which builds of palpate embed",
+        flags: &[],
+        run: |_| viewer::build(),
+    },
+    Chore {
+        name: "licences",
+        summary: "check that every dependency's licence fits MIT OR Apache-2.0",
+        flags: &[],
+        run: |_| licences::check(),
+    },
+    Chore {
+        name: "layers",
+        summary: "find import circles between modules, and imports against the floors of the runtime",
+        flags: &[("--deep", &[], "also the modules of every folder")],
+        run: |flags| check_layers(flags.has("--deep")),
+    },
+    Chore {
+        name: "words",
+        summary: "find retired words, doc comments that name nothing, and citations of equations that do not exist",
+        flags: &[("--list", &[], "list them as warnings, and succeed")],
+        run: |flags| check_words(flags.has("--list")),
+    },
+    Chore {
+        name: "bare",
+        summary: "build the runtime for a target without an operating system (no_std)",
+        flags: &[],
+        run: |_| bare::build(),
+    },
+];
+
+/// Flags of a call.
+struct Flags(Vec<(String, Option<String>)>);
+
+impl Flags {
+    fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|(own, _)| own == name)
+    }
+
+    fn value(&self, name: &str) -> Option<&str> {
+        self.0.iter().find(|(own, _)| own == name).and_then(|(_, value)| value.as_deref())
+    }
+}
 
 fn main() -> ExitCode {
-    let chore = std::env::args().nth(1);
-    let done = match chore.as_deref() {
-        Some("demo") => demo(),
-        Some("test") => test(),
-        Some("viewer") => viewer::build(),
-        Some("verify") => verify(),
-        Some("licences") => licences::check(),
-        _ => {
-            eprintln!("{USAGE}");
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let is_help = |argument: &String| ["--help", "-h", "help"].contains(&argument.as_str());
+    let Some(first) = arguments.first().filter(|first| !is_help(first)) else {
+        print!("{}", list());
+        return ExitCode::SUCCESS;
+    };
+    let Some(chore) = CHORES.iter().find(|chore| chore.name == first) else {
+        eprintln!("xtask: there is no chore {first:?}\n\n{}", list());
+        return ExitCode::from(2);
+    };
+    if arguments.iter().any(is_help) {
+        print!("{}", help(chore));
+        return ExitCode::SUCCESS;
+    }
+    let flags = match flags(chore, &arguments[1..]) {
+        Ok(flags) => flags,
+        Err(what) => {
+            eprintln!("xtask {}: {what}\n\n{}\n{}", chore.name, help(chore), list());
             return ExitCode::from(2);
         }
     };
-    match done {
+    match (chore.run)(&flags) {
         Ok(()) => ExitCode::SUCCESS,
         Err(what) => {
-            eprintln!("xtask: {what}");
+            eprintln!("xtask {}: {what}", chore.name);
             ExitCode::FAILURE
         }
     }
+}
+
+/// All chores with one line each.
+fn list() -> String {
+    let mut text = String::from("cargo xtask CHORE [--help]\n\n");
+    for chore in CHORES {
+        text += &format!("  {:<10}{}\n", chore.name, chore.summary);
+    }
+    text
+}
+
+/// One chore with its flags.
+fn help(chore: &Chore) -> String {
+    let usage = |(flag, values, _): &(&str, &[&str], &str)| {
+        if values.is_empty() { format!(" [{flag}]") } else { format!(" [{flag} {}]", values.join("|")) }
+    };
+    let usage: String = chore.flags.iter().map(usage).collect();
+    let mut text = format!("cargo xtask {}{usage}\n\n  {}\n", chore.name, chore.summary);
+    for (flag, _, meaning) in chore.flags {
+        text += &format!("\n  {flag:<10}{meaning}\n");
+    }
+    text
+}
+
+/// Flags of a call of a chore.
+fn flags(chore: &Chore, arguments: &[String]) -> Result<Flags, String> {
+    let mut found = Vec::new();
+    let mut arguments = arguments.iter();
+    while let Some(argument) = arguments.next() {
+        let known = chore.flags.iter().find(|(flag, ..)| flag == argument);
+        let Some((flag, values, _)) = known else { return Err(format!("unknown argument {argument:?}")) };
+        let mut value = None;
+        if !values.is_empty() {
+            let given = arguments.next().map(String::as_str).unwrap_or_default();
+            if !values.contains(&given) {
+                return Err(format!("{flag} {given:?}: expected one of {}", values.join(", ")));
+            }
+            value = Some(given.to_string());
+        }
+        found.push(((*flag).to_string(), value));
+    }
+    Ok(Flags(found))
 }
 
 fn demo() -> Result<(), String> {
@@ -44,60 +165,74 @@ fn demo() -> Result<(), String> {
     if let Err(what) = viewer::build() {
         eprintln!("xtask: {what}: palpate is built without its viewer");
     }
-    eprintln!("building palpate (some minutes the first time)");
-    // Without object storage, which takes as long to build as all the rest and is of no use here.
-    let package = ["--release", "--locked", "--package", "palpate-cli", "--no-default-features"];
-    cargo(&[&["build"], &package[..]].concat())?;
-    cargo(&[&["run", "--quiet"], &package[..], &["--", "demo", "--output", "target/demo"]].concat())
-}
-
-fn test() -> Result<(), String> {
-    machine::need_c_compiler()?;
-    let python = machine::need_python()?;
-    viewer::build()?;
-    cargo(&["test", "--workspace", "--locked", "--doc"])?;
-    cargo(&["build", "--locked", "--package", "palpate-cli"])?;
-    python_tests(&python)?;
-    viewer::test(&root().join("target/debug/palpate"))?;
-    if machine::runs("cargo", &["nextest", "--version"]) {
-        return cargo(&["nextest", "run", "--workspace", "--locked", "--no-fail-fast"]);
-    }
-    eprintln!("cargo-nextest is not installed: using cargo test, which comes to the same end more slowly");
-    cargo(&["test", "--workspace", "--locked", "--no-fail-fast", "--lib", "--bins", "--tests", "--examples"])
-}
-
-/// What Python sees of stores, and the recording on Dask and Slurm, with the binary of the tests.
-fn python_tests(python: &Path) -> Result<(), String> {
-    let status = Command::new(python)
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"])
-        .env("PALPATE", root().join("target/debug/palpate"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .current_dir(root())
-        .status();
-    match status {
-        Ok(status) if status.success() => Ok(()),
-        Ok(_) => Err("the Python tests failed".into()),
-        Err(error) => Err(format!("{} can't be started: {error}", python.display())),
-    }
-}
-
-/// The repository's root.
-fn root() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+    run(Command::new(palpate()?).args(["demo", "--output", "target/demo"]))
 }
 
 fn verify() -> Result<(), String> {
     machine::need_c_compiler()?;
-    cargo(&["run", "--release", "--locked", "--quiet", "--package", "palpate-cli", "--", "verify"])
+    run(Command::new(palpate()?).arg("verify"))
 }
 
-/// Run cargo in the workspace's root; its output goes to ours.
-fn cargo(arguments: &[&str]) -> Result<(), String> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let status = Command::new(cargo).args(arguments).current_dir(root()).status();
-    match status {
-        Ok(status) if status.success() => Ok(()),
-        Ok(_) => Err(format!("cargo {} failed", arguments.join(" "))),
-        Err(error) => Err(format!("cargo can't be started: {error}")),
+fn check_layers(deep: bool) -> Result<(), String> {
+    let report = layers::check(root(), deep)?;
+    for text in report.circles.iter().chain(&report.against_floors) {
+        println!("{text}");
+    }
+    if !report.against_floors.is_empty() {
+        println!("against the floors: {}", report.against_floors.len());
+    }
+    println!("circles: {}", report.circles.len());
+    if report.is_clean() {
+        Ok(())
+    } else {
+        Err("modules must not import each other (ARCHITECTURE.md)".into())
+    }
+}
+
+fn check_words(list: bool) -> Result<(), String> {
+    let report = words::check(root())?;
+    for text in report.retired.iter().chain(&report.doc_comments).chain(&report.citations) {
+        println!("{text}");
+    }
+    let words::Report { retired, doc_comments, citations } = &report;
+    println!(
+        "retired words: {}, doc comments that name nothing: {}, citations: {}",
+        retired.len(),
+        doc_comments.len(),
+        citations.len()
+    );
+    if report.is_clean() || list {
+        return Ok(());
+    }
+    Err(format!("the terms are in docs/glossary.md, the retired ones in {}", words::RETIRED_WORDS))
+}
+
+#[cfg(test)]
+mod command_line_tests {
+    use super::*;
+
+    fn chore(name: &str) -> &'static Chore {
+        CHORES.iter().find(|chore| chore.name == name).expect("a chore")
+    }
+
+    #[test]
+    fn the_list_has_a_line_for_every_chore() {
+        assert!(
+            CHORES.iter().all(|chore| list().contains(&format!("\n  {:<10}{}\n", chore.name, chore.summary)))
+        );
+    }
+
+    #[test]
+    fn flags_are_known_with_their_values_or_refused() {
+        let given = |text: &str| text.split(' ').map(str::to_string).collect::<Vec<_>>();
+        assert_eq!(
+            flags(chore("test"), &given("--only rust")).map(|f| f.value("--only") == Some("rust")),
+            Ok(true)
+        );
+        assert!(flags(chore("words"), &given("--list")).is_ok_and(|flags| flags.has("--list")));
+        let refused = |name: &str, text: &str| flags(chore(name), &given(text)).err();
+        assert_eq!(refused("demo", "--fast").as_deref(), Some("unknown argument \"--fast\""));
+        let expected = "--only \"all\": expected one of build, python, viewer, doc, rust";
+        assert_eq!(refused("test", "--only all").as_deref(), Some(expected));
     }
 }

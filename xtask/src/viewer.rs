@@ -1,11 +1,11 @@
 //! The page that palpate serves: built and tested by npm in `viewer/`.
 
-use crate::{machine, root};
+use crate::machine;
+use crate::process::{newest, root, run_in};
 use std::path::Path;
 use std::process::Command;
-use std::time::SystemTime;
 
-/// Build it, where what stands in `viewer/dist` is older than its sources.
+/// Build the page if `viewer/dist` is older than its sources.
 pub fn build() -> Result<(), String> {
     let folder = root().join("viewer");
     if is_built(&folder) {
@@ -17,7 +17,7 @@ pub fn build() -> Result<(), String> {
     npm(&folder, &["run", "build", "--silent"], &[])
 }
 
-/// Its unit tests, and those in a real browser: against a stand-in for the server, which can also do what no server should, and
+/// Unit tests of the page, and tests in a real browser: against a stand-in for the server, which can also do what no server should, and
 /// against a palpate.
 pub fn test(palpate: &Path) -> Result<(), String> {
     let folder = root().join("viewer");
@@ -30,7 +30,7 @@ pub fn test(palpate: &Path) -> Result<(), String> {
     npm(&folder, &browser, &[("PALPATE", palpate), ("CHROMIUM", &chromium)])
 }
 
-/// The packages of `package-lock.json`, if they are not there.
+/// Packages of `package-lock.json`, if they are not there.
 fn install(folder: &Path) -> Result<(), String> {
     let lock = |path: &str| std::fs::metadata(folder.join(path)).and_then(|file| file.modified()).ok();
     match (lock("node_modules/.package-lock.json"), lock("package-lock.json")) {
@@ -44,23 +44,6 @@ fn is_built(folder: &Path) -> bool {
     built.is_ok_and(|built| newest(folder).is_some_and(|source| source <= built))
 }
 
-/// When anything under a folder that is not made from the rest was changed last.
-fn newest(folder: &Path) -> Option<SystemTime> {
-    let entries = std::fs::read_dir(folder).ok()?.flatten();
-    let made = |name: &str| ["dist", "node_modules", "tests"].contains(&name) || name.starts_with('.');
-    let entries = entries.filter(|entry| !entry.file_name().to_str().is_some_and(made));
-    let time = |entry: std::fs::DirEntry| {
-        if entry.path().is_dir() { newest(&entry.path()) } else { entry.metadata().ok()?.modified().ok() }
-    };
-    entries.filter_map(time).max()
-}
-
 fn npm(folder: &Path, arguments: &[&str], variables: &[(&str, &Path)]) -> Result<(), String> {
-    let status =
-        Command::new("npm").args(arguments).envs(variables.iter().copied()).current_dir(folder).status();
-    match status {
-        Ok(status) if status.success() => Ok(()),
-        Ok(_) => Err(format!("npm {} failed in viewer/", arguments.join(" "))),
-        Err(error) => Err(format!("npm can't be started: {error}")),
-    }
+    run_in(folder, Command::new("npm").args(arguments).envs(variables.iter().copied()))
 }

@@ -1,6 +1,7 @@
 //! Failure of a command: a message for the person at the terminal.
 
 use palpate_export::{ExportError, TimeWindowError};
+use palpate_render::RenderError;
 use std::fmt;
 use std::path::Path;
 
@@ -37,10 +38,9 @@ macro_rules! from_display {
 from_display!(
     palpate::Error,
     palpate_fem::mesh::MeshError,
-    palpate_fem::record::RecordError,
+    palpate_fem::RecordError,
     palpate_fem::table::TableError,
     palpate_haptics::Error,
-    palpate_render::RenderError,
     palpate_reproduce::ReproduceError,
     palpate_scene::ReplayError,
     palpate_scene::SceneError,
@@ -48,6 +48,17 @@ from_display!(
     palpate_verify::UnknownCase,
     palpate_verify::VerifyError,
 );
+
+impl From<RenderError> for Failure {
+    /// Names the option for another browser.
+    fn from(error: RenderError) -> Self {
+        Self(match error {
+            RenderError::NoBrowser | RenderError::BrowserTimeout { .. } => format!("{error} with --browser"),
+            RenderError::Export(error) => return error.into(),
+            error => error.to_string(),
+        })
+    }
+}
 
 impl From<ExportError> for Failure {
     /// Names the options that the numbers and files are from.

@@ -2,7 +2,7 @@
 
 use crate::terminal::notify;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_fem::progress::Progress;
+use palpate_fem::Progress;
 use palpate_reproduce::StageProgress;
 use std::io::IsTerminal;
 use std::time::Instant;
@@ -73,7 +73,7 @@ impl Progress for Bars {
         }
     }
 
-    fn remark(&mut self, text: &str) {
+    fn warn(&mut self, text: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| notify(&format!("warning: {text}"))),
             None => notify(&format!("warning: {text}")),
@@ -133,7 +133,7 @@ impl Progress for CountBar {
         }
     }
 
-    fn remark(&mut self, text: &str) {
+    fn warn(&mut self, text: &str) {
         self.bar.suspend(|| notify(&format!("warning: {text}")));
     }
 }

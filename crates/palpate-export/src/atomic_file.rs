@@ -60,7 +60,7 @@ impl AtomicFile {
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-        let file = register(&temporary, |place| File::create(place));
+        let file = register(&temporary, |path| File::create(path));
         let file = file.map_err(|e| {
             unregister(&temporary);
             ExportError::io("write", &path, e)

@@ -210,11 +210,11 @@ impl Content {
     /// Adds a child of the root; returns its index.
     pub fn child(&mut self, node: Value) -> usize {
         self.nodes.push(node);
-        let place = self.nodes.len() - 1;
+        let index = self.nodes.len() - 1;
         if let Some(children) = self.nodes[0]["children"].as_array_mut() {
-            children.push(json!(place));
+            children.push(json!(index));
         }
-        place
+        index
     }
 
     /// Adds a mesh; returns its index.

@@ -188,7 +188,7 @@ impl GlbAnimation {
             self.channel(glb, *node, "translation", values, ("VEC3", 3));
         }
         if poses.iter().any(|pose| pose.orientation != first.orientation) {
-            let values = the_short_way(poses).flat_map(|q| q.to_array()).map(|v| v as f32);
+            let values = shortest_rotations(poses).flat_map(|q| q.to_array()).map(|v| v as f32);
             self.channel(glb, *node, "rotation", values, ("VEC4", 4));
         }
         // Scale 0 hides the node.
@@ -206,7 +206,7 @@ impl GlbAnimation {
 }
 
 /// Orientations with the signs that interpolate the short way: q and −q are the same rotation.
-fn the_short_way(poses: &[Pose]) -> impl Iterator<Item = DQuat> + '_ {
+fn shortest_rotations(poses: &[Pose]) -> impl Iterator<Item = DQuat> + '_ {
     poses.iter().scan(DQuat::IDENTITY, |before, pose| {
         let q = pose.orientation;
         *before = if before.dot(q) < 0.0 { -q } else { q };

@@ -91,7 +91,7 @@ fn square(normal: DVec3, centre: DVec3, half: f64) -> RigidSurface {
 }
 
 fn cuboid(half: DVec3) -> RigidSurface {
-    let mut solid = RigidSurface::default();
+    let mut surface = RigidSurface::default();
     for turn in [
         DQuat::IDENTITY,
         DQuat::from_rotation_y(0.5 * PI),
@@ -101,12 +101,12 @@ fn cuboid(half: DVec3) -> RigidSurface {
         DQuat::from_rotation_x(-0.5 * PI),
     ] {
         // Rounding removes the error of the rotation from corners ±1.
-        let first = solid.positions.len() as u32;
+        let first = surface.positions.len() as u32;
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        solid.positions.extend(corners.map(|(x, y)| (turn * DVec3::new(x, y, 1.0)).round() * half));
-        solid.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        surface.positions.extend(corners.map(|(x, y)| (turn * DVec3::new(x, y, 1.0)).round() * half));
+        surface.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
-    solid
+    surface
 }
 
 /// Capsule about the y axis; a sphere for a half length of 0.
@@ -155,20 +155,20 @@ mod tests {
     use std::collections::HashSet;
 
     /// 6·volume by the divergence theorem: positive when triangles face outwards.
-    fn volume(solid: &RigidSurface) -> f64 {
-        let corner = |n: u32| solid.positions[n as usize];
-        solid.triangles.iter().map(|[a, b, c]| corner(*a).dot(corner(*b).cross(corner(*c)))).sum::<f64>()
+    fn volume(surface: &RigidSurface) -> f64 {
+        let corner = |n: u32| surface.positions[n as usize];
+        surface.triangles.iter().map(|[a, b, c]| corner(*a).dot(corner(*b).cross(corner(*c)))).sum::<f64>()
             / 6.0
     }
 
-    fn is_closed(solid: &RigidSurface) -> bool {
-        // By places: a box's faces have corners of their own.
-        let place = |n: u32| solid.positions[n as usize].to_array().map(|x| (1e9 * x).round() as i64);
-        let edges: Vec<_> = solid
+    fn is_closed(surface: &RigidSurface) -> bool {
+        // By position: the faces of a box do not share nodes.
+        let position = |n: u32| surface.positions[n as usize].to_array().map(|x| (1e9 * x).round() as i64);
+        let edges: Vec<_> = surface
             .triangles
             .iter()
             .flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(a, b)| (place(*a), place(*b)))
+            .map(|(a, b)| (position(*a), position(*b)))
             .collect();
         let known: HashSet<_> = edges.iter().collect();
         known.len() == edges.len() && edges.iter().all(|(a, b)| known.contains(&(*b, *a)))
@@ -190,8 +190,8 @@ mod tests {
         let half = DVec3::new(0.1, 0.2, 0.3);
         let block = cuboid(half);
         assert!(is_closed(&block) && (volume(&block) / (8.0 * 0.006) - 1.0).abs() < 1e-12);
-        for solid in [ball, rod] {
-            assert!(solid.normals.iter().flatten().all(|n| (n.length() - 1.0).abs() < 1e-12));
+        for surface in [ball, rod] {
+            assert!(surface.normals.iter().flatten().all(|n| (n.length() - 1.0).abs() < 1e-12));
         }
     }
 

@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn a_box_breaks_at_its_edges_and_is_flat_between_them() {
         let surface =
-            SurfaceMesh::around(box_mesh([0.2, 0.1, 0.1], [2, 2, 2]).expect("a box")).expect("closed");
+            SurfaceMesh::from_boundary(box_mesh([0.2, 0.1, 0.1], [2, 2, 2]).expect("a box")).expect("closed");
         let shaded = ShadedSurface::new(&surface.positions, &surface.triangles);
         // Of 26 nodes 8 corners are drawn thrice, 12 middles of edges twice, 6 middles of faces once.
         assert_eq!((surface.positions.len(), shaded.nodes.len()), (26, 8 * 3 + 12 * 2 + 6));
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_ball_is_smooth_and_its_normals_point_outwards() {
-        let surface = SurfaceMesh::around(ball_mesh(0.05, 4).expect("a ball")).expect("closed");
+        let surface = SurfaceMesh::from_boundary(ball_mesh(0.05, 4).expect("a ball")).expect("closed");
         let shaded = ShadedSurface::new(&surface.positions, &surface.triangles);
         assert_eq!(shaded.nodes.len(), surface.positions.len());
         for (normal, node) in shaded.normals(&surface.positions).iter().zip(&shaded.nodes) {

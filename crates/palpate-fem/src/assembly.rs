@@ -1,7 +1,7 @@
-//! Stiffness and mass of the whole body, in 3×3 blocks by node pairs.
+//! Assembly of the stiffness and mass matrices, in 3×3 blocks by node pairs.
 //!
 //! K [N/m] has a block for each pair of nodes that share an element; the consistent mass M [kg] is a
-//! number times the unit matrix for each, so both live on one sparsity.
+//! number times the unit matrix for each, so both share one sparsity.
 
 use crate::discretisation::Discretisation;
 use crate::element::{Elasticity, ElementMatrices};
@@ -11,10 +11,10 @@ use glam::DMat3;
 use palpate::Material;
 use rayon::prelude::*;
 
-/// K and M on a common pattern, both triangles, rows sorted.
+/// Stiffness K and mass M on a common sparsity, both triangles, rows sorted.
 #[derive(Debug, Clone)]
 pub struct Assembly {
-    /// Where each node's row starts; length nodes + 1.
+    /// Start of each node's row; length nodes + 1.
     pub offsets: Vec<usize>,
     /// Column nodes, ascending within a row.
     pub columns: Vec<u32>,
@@ -24,17 +24,17 @@ pub struct Assembly {
     pub mass: Vec<f64>,
 }
 
-/// Which of the two matrices.
+/// Selection of a matrix of the system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Which {
-    /// K.
+pub enum SystemMatrix {
+    /// Stiffness K [N/m].
     Stiffness,
-    /// M.
+    /// Mass M [kg].
     Mass,
 }
 
 impl Assembly {
-    /// Sum the element matrices; `materials` has one entry per region.
+    /// Sums the element matrices; `materials` has one entry per region.
     pub fn new(discretisation: &Discretisation, materials: &[Material]) -> Self {
         let n = discretisation.nodes.len();
         let per = discretisation.order.nodes();
@@ -96,8 +96,8 @@ impl Assembly {
         self.offsets.len() - 1
     }
 
-    /// K·X or M·X for a block of columns with 3·nodes rows.
-    pub fn multiply(&self, which: Which, x: MatRef<'_, f64>) -> Mat<f64> {
+    /// Product K·X or M·X with a block of columns of 3·nodes rows.
+    pub fn multiply(&self, which: SystemMatrix, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
         y.par_col_iter_mut().zip(x.par_col_iter()).for_each(|(mut out, column)| {
             let at = |node: u32| {
@@ -108,8 +108,10 @@ impl Assembly {
                 let row = self.offsets[node]..self.offsets[node + 1];
                 let nodes = self.columns[row.clone()].iter();
                 let sum: glam::DVec3 = match which {
-                    Which::Stiffness => nodes.zip(&self.stiffness[row]).map(|(&c, k)| *k * at(c)).sum(),
-                    Which::Mass => nodes.zip(&self.mass[row]).map(|(&c, &m)| at(c) * m).sum(),
+                    SystemMatrix::Stiffness => {
+                        nodes.zip(&self.stiffness[row]).map(|(&c, k)| *k * at(c)).sum()
+                    }
+                    SystemMatrix::Mass => nodes.zip(&self.mass[row]).map(|(&c, &m)| at(c) * m).sum(),
                 };
                 for (axis, value) in sum.to_array().into_iter().enumerate() {
                     out[3 * node + axis] = value;
@@ -119,7 +121,7 @@ impl Assembly {
         y
     }
 
-    /// X·M for vectors that lie side by side, a row each, in whole columns: 3·nodes columns.
+    /// Product X·M with vectors that are rows, of 3·nodes columns.
     pub fn mass_times_rows(&self, x: &Mat<f64>, y: &mut Mat<f64>) {
         for node in 0..self.nodes() {
             for axis in 0..3 {

@@ -1,13 +1,13 @@
 //! Force-error certificate: the recording against the unreduced finite element model.
 //!
-//! At sampled points and patches of the surface, three directions each, the recording's response is compared with that
-//! of all modes (see `reference`): R[0], static compliance, dynamic compliance over frequency, and the force of a press.
-//! The certificate states how far the reference itself has converged.
+//! At sampled points and patches of the surface, in three directions each, the response of the recording is compared with
+//! that of all modes (see `krylov`): R[0], static compliance, dynamic compliance over frequency, and the force of an
+//! imposed displacement. The certificate also states the convergence error of this reference.
 
-use crate::factor::FactorError;
-use crate::modes::{Modes, ModesError};
+use crate::krylov::{KrylovSpaces, LoadedMode};
+use crate::modes::ElasticModes;
 use crate::progress::Progress;
-use crate::reference::{LoadedMode, Reference};
+use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::Mat;
 use glam::{DMat3, DVec3};
@@ -15,78 +15,73 @@ use palpate::{
     Certificate, CertificateEvent, Damping, OscillatorState, ResidualCompliance, SampledOscillator, Surface,
 };
 
-/// Sampled points, and how many of them carry a patch as well.
+/// Number of sampled points.
 const POINTS: usize = 8;
+
+/// Number of sampled points that are the centre of a patch as well.
 const PATCHES: usize = 4;
 
-/// Radius of a patch as a share of the body's diagonal (a fingertip on the paper's cube), and in mean edges
-/// at least.
+/// Radius of a patch as a share of the body's diagonal: a fingertip on the paper's cube.
 const PATCH_DIAGONAL: f64 = 0.03;
+
+/// Least radius of a patch in mean edges of the surface.
 const PATCH_EDGES: f64 = 2.0;
 
-/// Krylov blocks of the reference, and how many are left out to see whether it has converged.
+/// Number of Krylov blocks of the reference.
 const BLOCKS: usize = 18;
-const LEFT_OUT: usize = 2;
 
-/// The dynamic compliance may be off by this share of the static one within the bandwidth.
+/// Number of last blocks that the convergence error of the reference is measured with.
+const CONVERGENCE_BLOCKS: usize = 2;
+
+/// Error of the dynamic compliance that ends the bandwidth, as a share of the static compliance.
 const BANDWIDTH_TOLERANCE: f64 = 0.05;
 
-/// Force error above which a recording gets a remark, and above which the remark says that it is worth nothing.
-pub const DOUBTFUL: f64 = 0.05;
-/// See [`DOUBTFUL`].
-pub const WORTHLESS: f64 = 10.0;
+/// Relative force error of a certificate above which [`record`](crate::record) warns.
+pub const FORCE_ERROR_WARNING: f64 = 0.05;
 
-/// What stands for an error without bound: too few modes without residual can't be held in every direction at all.
+/// Relative force error above which the warning says that the recording is unusable.
+pub(crate) const FORCE_ERROR_UNUSABLE: f64 = 10.0;
+
+/// Value for an unbounded error: too few modes without residual compliance have directions without any compliance.
 const UNBOUNDED: f64 = 1e6;
 
-/// Why no certificate could be made.
-#[derive(Debug, thiserror::Error)]
-pub enum CertificateError {
-    /// The shifted factor failed.
-    #[error("certificate: {0}")]
-    Factor(#[from] FactorError),
-    /// A small eigenproblem failed.
-    #[error("certificate: {0}")]
-    Modes(#[from] ModesError),
-}
-
-/// A place where the recording is tried: surface nodes with weights that sum to one.
+/// Sampled point or patch: surface nodes with weights that sum to one.
 struct Sample {
     nodes: Vec<(usize, f64)>,
     centre: DVec3,
     radius: f64,
 }
 
-/// A sample's responses, kept and left out.
+/// Response of a sample: kept modes, substitutes of the truncated modes, residual compliance [m/N].
 struct Response {
     kept: Vec<LoadedMode>,
-    left_out: Vec<LoadedMode>,
+    truncated: Vec<LoadedMode>,
     residual: DMat3,
 }
 
-/// The press that forces are compared on.
-pub const EVENT: CertificateEvent = CertificateEvent { step_s: 1e-3, rise_s: 0.05, duration_s: 0.5 };
+/// Imposed displacement of the force comparison: a smooth ramp, then held.
+pub(crate) const EVENT: CertificateEvent = CertificateEvent { step_s: 1e-3, rise_s: 0.05, duration_s: 0.5 };
 
-/// Measure the certificate of a recording's parts.
+/// Measures the certificate of a recording.
 ///
 /// # Errors
-/// When a factor or a small eigenproblem fails.
+/// [`SolveError`] when a factor or a small eigenproblem fails, or on interruption.
 #[allow(clippy::too_many_arguments)]
-pub fn certificate(
+pub(crate) fn certificate(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface: &Surface,
     surface_nodes: &[u32],
     residual: &ResidualCompliance,
     damping: Damping,
     progress: &mut dyn Progress,
-) -> Result<Certificate, CertificateError> {
-    // A fixed place has no compliance to compare.
+) -> Result<Certificate, SolveError> {
+    // A fixed node has no compliance to compare.
     let movable = |node: usize| !system.is_fixed(3 * surface_nodes[node] as usize);
     let samples = samples(surface, &movable);
     progress.begin("certificate", (BLOCKS + samples.len()) as u64);
     let loads = loads(system, surface_nodes, &samples);
-    let reference = Reference::new(system, modes, loads, EVENT.step_s, BLOCKS, progress)?;
+    let reference = KrylovSpaces::new(system, modes, loads, EVENT.step_s, BLOCKS, progress)?;
     let mut worst = Certificate {
         force_error_max: 0.0,
         force_error_median: 0.0,
@@ -112,22 +107,22 @@ pub fn certificate(
             .collect();
         let mut response = Response {
             kept,
-            left_out: reference.left_out(system, at, BLOCKS - LEFT_OUT)?,
+            truncated: reference.truncated_modes(system, at, BLOCKS - CONVERGENCE_BLOCKS)?,
             residual: residual_at(residual, sample),
         };
-        let coarse = (response.instantaneous(damping), response.presses(damping, true));
-        response.left_out = reference.left_out(system, at, BLOCKS)?;
-        let (instantaneous, exact) = (response.instantaneous(damping), response.presses(damping, true));
-        let change = relative(coarse.0, instantaneous).max(apart(&coarse.1, &exact));
+        let coarse = (response.instantaneous(damping), response.ramp_forces(damping, true));
+        response.truncated = reference.truncated_modes(system, at, BLOCKS)?;
+        let (instantaneous, exact) = (response.instantaneous(damping), response.ramp_forces(damping, true));
+        let change = relative(coarse.0, instantaneous).max(relative_difference(&coarse.1, &exact));
 
-        let force_error = apart(&response.presses(damping, false), &exact);
+        let force_error = relative_difference(&response.ramp_forces(damping, false), &exact);
         if force_error >= worst.force_error_max || force_error.is_nan() {
             worst.force_error_max = force_error;
             worst.worst_at_m = sample.centre.to_array();
             worst.worst_patch_radius_m = sample.radius;
         }
         force_errors.push(force_error);
-        // An error that is no number is the worst of all.
+        // NaN counts as the largest error.
         let raise = |worst: &mut f64, error: f64| {
             *worst = if error > *worst || error.is_nan() { error } else { *worst }
         };
@@ -157,7 +152,7 @@ pub fn certificate(
     Ok(worst)
 }
 
-/// Points spread over the surface, each as far from the others as it gets, and patches about the first of them.
+/// Points spread over the surface by farthest-point sampling, and patches about the last of them.
 fn samples(surface: &Surface, movable: &dyn Fn(usize) -> bool) -> Vec<Sample> {
     let positions = &surface.positions;
     let candidates: Vec<usize> = (0..positions.len()).filter(|&node| movable(node)).collect();
@@ -185,12 +180,12 @@ fn samples(surface: &Surface, movable: &dyn Fn(usize) -> bool) -> Vec<Sample> {
         }
     };
     let point = |&node: &usize| Sample { nodes: vec![(node, 1.0)], centre: positions[node], radius: 0.0 };
-    // Patches where the last points fell: those lie on faces rather than at corners.
+    // The last points lie on faces rather than at corners.
     let patches = points.iter().rev().take(PATCHES).map(patch);
     points.iter().map(point).chain(patches).collect()
 }
 
-/// Area [m²] of the surface that belongs to each node: a third of its triangles.
+/// Area of each surface node [m²]: a third of its triangles.
 fn node_areas(surface: &Surface) -> Vec<f64> {
     let mut areas = vec![0.0; surface.positions.len()];
     for triangle in &surface.triangles {
@@ -201,11 +196,13 @@ fn node_areas(surface: &Surface) -> Vec<f64> {
     areas
 }
 
+/// Weighted mean over the nodes of a sample.
 fn weighted(sample: &Sample, value: impl Fn(usize, usize) -> f64) -> DVec3 {
     let part = |axis| sample.nodes.iter().map(|&(node, weight)| weight * value(node, axis)).sum();
     DVec3::new(part(0), part(1), part(2))
 }
 
+/// Residual compliance of a sample [m/N].
 fn residual_at(residual: &ResidualCompliance, sample: &Sample) -> DMat3 {
     let mut sum = DMat3::ZERO;
     for &(i, wi) in &sample.nodes {
@@ -216,7 +213,7 @@ fn residual_at(residual: &ResidualCompliance, sample: &Sample) -> DMat3 {
     sum
 }
 
-/// Unit forces on the samples: three columns each.
+/// Unit forces on the samples [N], three columns each.
 fn loads(system: &System, surface_nodes: &[u32], samples: &[Sample]) -> Mat<f64> {
     let mut loads = Mat::zeros(system.discretisation.dofs(), 3 * samples.len());
     for (at, sample) in samples.iter().enumerate() {
@@ -230,6 +227,7 @@ fn loads(system: &System, surface_nodes: &[u32], samples: &[Sample]) -> Mat<f64>
     loads
 }
 
+/// Outer product a·aᵀ.
 fn outer(a: DVec3) -> DMat3 {
     DMat3::from_cols(a * a.x, a * a.y, a * a.z)
 }
@@ -245,41 +243,45 @@ fn relative(a: DMat3, b: DMat3) -> f64 {
 }
 
 /// √(Σ|a − b|² / Σ|b|²).
-fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+fn relative_difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     let difference: f64 = a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared()).sum();
     (difference / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
+/// Sampled oscillator of a mode.
 fn oscillator(mode: &LoadedMode, damping: Damping) -> SampledOscillator {
     let omega = mode.square.sqrt();
     SampledOscillator::new(omega, damping.ratio(omega), EVENT.step_s)
 }
 
 impl Response {
+    /// Sum of γγᵀ over modes, weighted.
     fn sum(modes: &[LoadedMode], weight: impl Fn(&LoadedMode) -> f64) -> DMat3 {
         modes.iter().map(|mode| outer(mode.gain) * weight(mode)).fold(DMat3::ZERO, |a, b| a + b)
     }
 
+    /// Static compliance of all modes [m/N].
     fn exact_static(&self) -> DMat3 {
-        Self::sum(&self.kept, |m| 1.0 / m.square) + Self::sum(&self.left_out, |m| 1.0 / m.square)
+        Self::sum(&self.kept, |m| 1.0 / m.square) + Self::sum(&self.truncated, |m| 1.0 / m.square)
     }
 
+    /// Static compliance of the recording [m/N].
     fn modelled_static(&self) -> DMat3 {
         Self::sum(&self.kept, |m| 1.0 / m.square) + self.residual
     }
 
-    /// R[0] of all modes.
+    /// Instantaneous compliance R[0] of all modes [m/N].
     fn instantaneous(&self, damping: Damping) -> DMat3 {
         let compliance = |m: &LoadedMode| oscillator(m, damping).instantaneous_compliance();
-        Self::sum(&self.kept, compliance) + Self::sum(&self.left_out, compliance)
+        Self::sum(&self.kept, compliance) + Self::sum(&self.truncated, compliance)
     }
 
-    /// R[0] of the recording.
+    /// Instantaneous compliance R[0] of the recording [m/N].
     fn modelled_instantaneous(&self, damping: Damping) -> DMat3 {
         Self::sum(&self.kept, |m| oscillator(m, damping).instantaneous_compliance()) + self.residual
     }
 
-    /// Up to where the left-out modes answer as if they were a spring. The kept ones are the same in both.
+    /// Frequency [Hz] up to which the truncated modes respond quasi-statically. The kept modes are equal in both models.
     fn bandwidth_hz(&self, damping: Damping) -> f64 {
         let allowed = BANDWIDTH_TOLERANCE * norm(self.exact_static());
         let first = self.kept.first().map_or(1.0, |m| m.square.sqrt());
@@ -295,8 +297,8 @@ impl Response {
                 );
                 (a / (a * a + b * b), -b / (a * a + b * b))
             };
-            let real = Self::sum(&self.left_out, |m| parts(m).0) - self.residual;
-            let imaginary = Self::sum(&self.left_out, |m| parts(m).1);
+            let real = Self::sum(&self.truncated, |m| parts(m).0) - self.residual;
+            let imaginary = Self::sum(&self.truncated, |m| parts(m).1);
             if norm(real).hypot(norm(imaginary)) > allowed {
                 return within;
             }
@@ -306,16 +308,16 @@ impl Response {
         within
     }
 
-    /// Forces [N] when the sample is moved by a smooth ramp along each axis in turn, with all modes or as recorded.
-    fn presses(&self, damping: Damping, all: bool) -> Vec<DVec3> {
+    /// Forces [N] of the imposed displacement [`EVENT`] along each axis in turn, with all modes or as recorded.
+    fn ramp_forces(&self, damping: Damping, all: bool) -> Vec<DVec3> {
         let steps = (EVENT.duration_s / EVENT.step_s).round() as usize;
         let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-        axes.into_iter().flat_map(|axis| self.press(damping, axis, steps, all)).collect()
+        axes.into_iter().flat_map(|axis| self.ramp_force(damping, axis, steps, all)).collect()
     }
 
-    /// Forces [N] of a press of 1 m by equation (9), without rigid motion.
-    fn press(&self, damping: Damping, axis: DVec3, steps: usize, all: bool) -> Vec<DVec3> {
-        let modes = self.kept.iter().chain(self.left_out.iter().filter(|_| all));
+    /// Forces [N] of an imposed displacement of 1 m along one axis by equation (9), without rigid motion.
+    fn ramp_force(&self, damping: Damping, axis: DVec3, steps: usize, all: bool) -> Vec<DVec3> {
+        let modes = self.kept.iter().chain(self.truncated.iter().filter(|_| all));
         let mut modes: Vec<_> =
             modes.map(|m| (oscillator(m, damping), m.gain, OscillatorState::default())).collect();
         let compliance = if all { self.instantaneous(damping) } else { self.modelled_instantaneous(damping) };

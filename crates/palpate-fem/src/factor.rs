@@ -1,10 +1,11 @@
-//! Sparse factors of K + s·M: the only place that knows faer's and METIS' types.
+//! Sparse factors of K + s·M: the only module that uses faer's sparse matrices and METIS.
 //!
 //! Constrained degrees of freedom keep their row with a diagonal entry alone, so that sizes never change;
 //! a right-hand side is zero there. For s ≥ 0 the factor is Cholesky's; for s < 0 the inertia of
 //! L·B·Lᵀ (pivots of size one and two) counts the eigenvalues of the pencil below −s (Sylvester).
 
 use crate::assembly::Assembly;
+use crate::solve_error::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -20,32 +21,7 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Accum, Conj, Mat, MatMut, Par, Side, unzip, zip};
 use std::sync::Arc;
 
-/// Why a factor could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum FactorError {
-    /// The matrix is not positive definite: the body can still move without resistance.
-    #[error(
-        "the stiffness matrix is not positive definite to the digits of f64: a part of the body hangs on a hinge, the mesh \
-         has slivers, or its materials differ by too many orders"
-    )]
-    NotPositiveDefinite,
-    /// More memory is needed than there is.
-    #[error(
-        "the mesh needs about {needed_gb:.1} GB of memory for its factors and modes, and {available_gb:.1} GB are free: use \
-         fewer elements or modes, or --order 1"
-    )]
-    Memory {
-        /// Estimate.
-        needed_gb: f64,
-        /// What the system says is free.
-        available_gb: f64,
-    },
-    /// The ordering or the symbolic analysis failed; most likely memory ran out.
-    #[error("the sparse factor cannot be set up ({0})")]
-    Setup(String),
-}
-
-/// Elimination order and pattern of the factor: made once per mesh.
+/// Elimination order and sparsity of the factor: made once per mesh.
 #[derive(Debug, Clone)]
 pub struct Pattern {
     symbolic: Arc<SymbolicCholesky<usize>>,
@@ -59,22 +35,23 @@ pub struct Factor {
     values: Vec<f64>,
 }
 
-/// Below this many nodes the ordering is left as it is: there is nothing to gain.
-const ORDER_FROM: usize = 64;
+/// Number of nodes from which nested dissection reduces fill-in.
+const NESTED_DISSECTION_FROM: usize = 64;
 
 fn parallel() -> Par {
     Par::rayon(0)
 }
 
 impl Pattern {
-    /// Analyse the pattern of a body.
+    /// Symbolic factorisation of a body.
     ///
     /// # Errors
-    /// [`FactorError::Setup`].
-    pub fn new(assembly: &Assembly) -> Result<Self, FactorError> {
+    /// [`SolveError::SymbolicFactor`].
+    pub fn new(assembly: &Assembly) -> Result<Self, SolveError> {
         let n = assembly.nodes();
-        let setup = |e: &dyn std::fmt::Debug| FactorError::Setup(format!("{e:?}"));
-        let order: Vec<usize> = if n < ORDER_FROM { (0..n).collect() } else { nested_dissection(assembly)? };
+        let setup = |e: &dyn std::fmt::Debug| SolveError::SymbolicFactor(format!("{e:?}"));
+        let order: Vec<usize> =
+            if n < NESTED_DISSECTION_FROM { (0..n).collect() } else { nested_dissection(assembly)? };
         let forward: Vec<usize> =
             order.iter().flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
         let mut inverse = vec![0; forward.len()];
@@ -91,7 +68,7 @@ impl Pattern {
         Ok(Self { symbolic: Arc::new(symbolic) })
     }
 
-    /// Memory of one factor [bytes].
+    /// Size of one factor [bytes].
     pub fn factor_bytes(&self) -> u64 {
         8 * self.symbolic.len_val() as u64
     }
@@ -99,13 +76,13 @@ impl Pattern {
     /// Cholesky factor of K + `shift`·M; `constrained` has one entry per degree of freedom.
     ///
     /// # Errors
-    /// [`FactorError::NotPositiveDefinite`].
+    /// [`SolveError::NotPositiveDefinite`].
     pub fn factor(
         &self,
         assembly: &Assembly,
         constrained: &[bool],
         shift: f64,
-    ) -> Result<Factor, FactorError> {
+    ) -> Result<Factor, SolveError> {
         let matrix = lower_triangle(assembly, constrained, shift);
         let mut values = vec![0.0; self.symbolic.len_val()];
         let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
@@ -120,7 +97,7 @@ impl Pattern {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|_| FactorError::NotPositiveDefinite)?;
+            .map_err(|_| SolveError::NotPositiveDefinite)?;
         let constrained = (0..constrained.len()).filter(|&row| constrained[row]).collect();
         Ok(Factor { symbolic: self.symbolic.clone(), constrained, values })
     }
@@ -171,8 +148,8 @@ impl Pattern {
 }
 
 impl Factor {
-    /// Solve for a block of columns in place; rows of constrained degrees of freedom are zeroed first,
-    /// so that their solution is zero.
+    /// Solves in place for loads that are columns. Rows of constrained degrees of freedom are zeroed first, so that
+    /// their solution is zero.
     pub fn solve(&self, mut columns: MatMut<'_, f64>) {
         for &row in &self.constrained {
             columns.as_mut().row_mut(row).fill(0.0);
@@ -189,29 +166,29 @@ impl Factor {
     }
 }
 
-/// Fewer loads than this are solved one after the other.
-const SIDE_BY_SIDE_FROM: usize = 8;
+/// Number of loads from which they are solved row-wise.
+const ROW_SOLVE_FROM: usize = 8;
 
-/// Room for solving with loads that lie side by side; see [`Factor::solve_side_by_side`].
+/// Workspace of [`Factor::solve_rows`].
 #[derive(Debug)]
-pub struct SolveRoom {
+pub struct RowWorkspace {
     permuted: Mat<f64>,
     below: Mat<f64>,
 }
 
-impl Default for SolveRoom {
+impl Default for RowWorkspace {
     fn default() -> Self {
         Self { permuted: Mat::zeros(0, 0), below: Mat::zeros(0, 0) }
     }
 }
 
 impl Factor {
-    /// Solve for loads whose values lie side by side: a row per load, a column per degree of freedom. For many solves
-    /// with a few dozen loads quicker than [`Self::solve`]: what is gathered and scattered are whole columns. The bits
-    /// depend on the number of loads.
-    pub fn solve_side_by_side(&self, mut loads: MatMut<'_, f64>, room: &mut SolveRoom) {
+    /// Solves in place for loads that are rows: a row per load, a column per degree of freedom. Faster than
+    /// [`Self::solve`] for many solves with a few dozen loads, since whole columns are gathered and scattered. The last
+    /// bits depend on the number of loads.
+    pub fn solve_rows(&self, mut loads: MatMut<'_, f64>, workspace: &mut RowWorkspace) {
         let (k, n) = (loads.nrows(), loads.ncols());
-        if k < SIDE_BY_SIDE_FROM {
+        if k < ROW_SOLVE_FROM {
             let mut columns = loads.rb().transpose().to_owned();
             self.solve(columns.as_mut());
             loads.copy_from(columns.transpose());
@@ -223,18 +200,18 @@ impl Factor {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return };
         let factor = SupernodalLltRef::new(symbolic, &self.values);
         let supernodes = || (0..symbolic.n_supernodes()).map(|s| factor.supernode(s));
-        if room.permuted.nrows() != k || room.permuted.ncols() != n {
+        if workspace.permuted.nrows() != k || workspace.permuted.ncols() != n {
             let widest = supernodes().map(|supernode| supernode.pattern().len()).max().unwrap_or(0);
-            *room = SolveRoom { permuted: Mat::zeros(k, n), below: Mat::zeros(k, widest) };
+            *workspace = RowWorkspace { permuted: Mat::zeros(k, n), below: Mat::zeros(k, widest) };
         }
-        let SolveRoom { permuted: x, below } = room;
+        let RowWorkspace { permuted: x, below } = workspace;
         let order = self.symbolic.perm();
         let forward = order.as_ref().map(|order| order.arrays().0);
         let at = |new: usize| forward.map_or(new, |forward| forward[new]);
         for new in 0..n {
             x.col_mut(new).copy_from(loads.as_ref().col(at(new)));
         }
-        // Xᵀ ← L⁻¹·Xᵀ, supernode by supernode; X is what is stored.
+        // Xᵀ ← L⁻¹·Xᵀ, supernode by supernode; the matrix holds X.
         for supernode in supernodes() {
             let (block, rows) = (supernode.val(), supernode.pattern());
             let (start, width) = (supernode.start(), block.ncols());
@@ -269,8 +246,8 @@ impl Factor {
 /// Lower triangle of K + `shift`·M in compressed columns.
 fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> SparseColMat<usize, f64> {
     let n = assembly.nodes();
-    // Struck-out entries stay as zeros, so that one pattern serves every set of constraints; on the diagonal
-    // they keep their own stiffness, so that scaling stays even.
+    // Constrained entries stay as zeros, so that one pattern serves every set of constraints; on the diagonal
+    // they keep their own stiffness, so that the scaling stays even.
     let (mut offsets, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
     for node in 0..n {
         let row = assembly.offsets[node]..assembly.offsets[node + 1];
@@ -283,13 +260,13 @@ fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> Spar
                     if line < column {
                         continue;
                     }
-                    let struck_out = constrained[line] || constrained[column];
+                    let is_constrained = constrained[line] || constrained[column];
                     // K is symmetric: entry (line, column) is block(node, other)[axis][part].
                     let mut value = assembly.stiffness[at].col(part)[axis];
-                    if part == axis && !struck_out {
+                    if part == axis && !is_constrained {
                         value += shift * assembly.mass[at];
                     }
-                    if struck_out && line != column {
+                    if is_constrained && line != column {
                         value = 0.0;
                     }
                     rows.push(line);
@@ -303,31 +280,10 @@ fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> Spar
     SparseColMat::new(symbolic, values)
 }
 
-/// Memory that is free [bytes], where the system tells.
-fn available_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
-    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(1024.0 * kilobytes)
-}
-
-/// Refuse work that would need more memory than is free.
-///
-/// # Errors
-/// [`FactorError::Memory`].
-pub fn check_memory(needed_bytes: f64) -> Result<(), FactorError> {
-    match available_memory() {
-        Some(available) if needed_bytes > available => {
-            Err(FactorError::Memory { needed_gb: needed_bytes / 1e9, available_gb: available / 1e9 })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Nested dissection of the node graph by METIS; gives old numbers in elimination order.
-fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, FactorError> {
+/// Nested dissection of the node graph by METIS; node numbers in elimination order.
+fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, SolveError> {
     let n = assembly.nodes();
-    let too_large = |_| FactorError::Setup("more than 2³¹ entries".into());
+    let too_large = |_| SolveError::SymbolicFactor("more than 2³¹ entries".into());
     let mut starts = vec![0_i32];
     let mut neighbours = Vec::new();
     for node in 0..n {
@@ -351,7 +307,7 @@ fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, FactorError> {
         )
     };
     if status != metis_sys::rstatus_et_METIS_OK {
-        return Err(FactorError::Setup(format!("METIS returned {status}")));
+        return Err(SolveError::SymbolicFactor(format!("METIS returned {status}")));
     }
     Ok(order.into_iter().map(|node| node as usize).collect())
 }
@@ -360,30 +316,30 @@ fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, FactorError> {
 mod tests {
     use super::*;
     use crate::discretisation::Discretisation;
-    use crate::element::Order;
+    use crate::element::ElementOrder;
     use crate::mesh::box_mesh;
     use palpate::Material;
 
     #[test]
-    fn solutions_side_by_side_are_those_of_the_columns() {
+    fn row_solutions_are_those_of_the_columns() {
         let mesh = box_mesh([0.3, 0.2, 0.1], [5, 4, 3]).expect("a good box");
-        let discretisation = Discretisation::new(&mesh, Order::Linear);
+        let discretisation = Discretisation::new(&mesh, ElementOrder::Linear);
         let material = Material { region: String::new(), young_pa: 1e4, poisson: 0.3, density_kg_m3: 1000.0 };
         let assembly = Assembly::new(&discretisation, &[material]);
         let pattern = Pattern::new(&assembly).expect("a pattern");
-        let mut held = vec![false; discretisation.dofs()];
-        held[..9].fill(true);
-        for constrained in [held.clone(), vec![false; held.len()]] {
+        let mut constrained = vec![false; discretisation.dofs()];
+        constrained[..9].fill(true);
+        for constrained in [constrained.clone(), vec![false; constrained.len()]] {
             let factor = pattern.factor(&assembly, &constrained, 1e3).expect("a factor");
             for loads in [1, 7, 8, 48] {
                 let mut columns =
                     Mat::from_fn(discretisation.dofs(), loads, |i, j| ((7 * i + 13 * j) % 101) as f64 - 50.0);
                 let mut rows = columns.transpose().to_owned();
                 factor.solve(columns.as_mut());
-                factor.solve_side_by_side(rows.as_mut(), &mut SolveRoom::default());
-                let apart = (columns.transpose() - &rows).norm_max();
+                factor.solve_rows(rows.as_mut(), &mut RowWorkspace::default());
+                let difference = (columns.transpose() - &rows).norm_max();
                 // Round-off of a system of condition up to 1e4.
-                assert!(apart < 1e-11 * columns.norm_max(), "{loads}: {apart:e}");
+                assert!(difference < 1e-11 * columns.norm_max(), "{loads}: {difference:e}");
             }
         }
     }

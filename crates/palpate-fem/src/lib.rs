@@ -1,21 +1,44 @@
-//! Mesh in, recording out: the finite elements behind palpate.
+//! Records elastic bodies by the finite element method: tetrahedral mesh in, [`palpate::Recording`] out.
 //!
-//! The way is [`record::record`]: a checked [`mesh::Mesh`], elements and [`assembly`], the [`system`] with its
-//! sparse factor, the lowest [`modes`], the [`residual`] compliance, and the [`certificate`].
-//! Small strain, linear isotropic elasticity; SI units throughout.
+//! [`record`] checks the mesh, assembles stiffness and mass, computes the lowest elastic modes and the residual
+//! compliance of the truncated ones, and measures a certificate of the force error. Small strain, linear isotropic
+//! elasticity, linear or quadratic tetrahedra; SI units throughout.
+//!
+//! - [`mesh`]: readers (Gmsh, VTK; OBJ and STL surfaces), boxes and balls.
+//! - [`RecordParameters`]: materials, element order, modes, damping, supports.
+//! - [`table`]: impulse responses for direct convolution, from a [`RecordedBody`].
+//! - [`reference`]: the unreduced finite element solution, for verification.
+#![doc = "\n"]
+#![doc = include_str!("../README.md")]
 
-pub mod assembly;
-pub mod certificate;
-pub mod discretisation;
-pub mod element;
-pub mod factor;
-pub mod material;
+mod assembly;
+mod body;
+mod certificate;
+mod discretisation;
+mod element;
+mod factor;
+mod krylov;
+mod material;
+mod memory;
 pub mod mesh;
-pub mod modes;
-pub mod progress;
-pub mod record;
+mod modes;
+mod progress;
+mod record;
+mod record_error;
 pub mod reference;
-pub mod residual;
-pub mod system;
+mod residual;
+mod solve_error;
+mod system;
 pub mod table;
-pub mod transient;
+mod transient;
+
+pub use body::RecordedBody;
+pub use certificate::FORCE_ERROR_WARNING;
+pub use element::ElementOrder;
+pub use material::{MaterialError, materials_from_toml};
+pub use memory::check_memory;
+pub use progress::{Progress, SilentProgress};
+pub use record::{RecordExtent, RecordParameters, record};
+pub use record_error::RecordError;
+pub use residual::ResidualChoice;
+pub use solve_error::SolveError;

@@ -1,4 +1,4 @@
-//! Linear isotropic elasticity, per region.
+//! Linear isotropic elastic materials, one per region.
 //!
 //! λ = E·ν / ((1 + ν)(1 − 2ν)), μ = E / (2(1 + ν)) [Pa].
 
@@ -6,79 +6,117 @@ use crate::mesh::{Mesh, Region};
 use palpate::Material;
 use serde::Deserialize;
 
-/// What is wrong with a material.
+/// A material that is out of range, or a material file that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MaterialError {
-    /// A number is out of its range.
-    #[error("{what}")]
-    Range {
-        /// Value and range in words.
-        what: String,
+    /// Young's modulus is out of range.
+    #[error("{}Young's modulus is {value:e} Pa, expected {:e} to {:e} Pa", of(region), YOUNG_PA[0], YOUNG_PA[1])]
+    Young {
+        /// Name of the region; empty if the body has one material.
+        region: String,
+        /// The given value [Pa].
+        value: f64,
     },
-    /// The material file can't be read as TOML of the expected form.
-    #[error("material file: {0}")]
-    File(String),
+    /// Poisson's ratio is that of an incompressible material, or above.
+    #[error(
+        "{}Poisson's ratio is {value}, expected below 0.5: at 0.5 the material is incompressible and has no \
+         displacement-only stiffness; use 0.49 for rubber or soft tissue",
+        of(region)
+    )]
+    Incompressible {
+        /// Name of the region; empty if the body has one material.
+        region: String,
+        /// The given value.
+        value: f64,
+    },
+    /// Poisson's ratio is out of range.
+    #[error("{}Poisson's ratio is {value}, expected above -1 and below 0.5", of(region))]
+    Poisson {
+        /// Name of the region; empty if the body has one material.
+        region: String,
+        /// The given value.
+        value: f64,
+    },
+    /// The density is out of range.
+    #[error("{}density is {value:e} kg/m³, expected {:e} to {:e} kg/m³", of(region), DENSITY_KG_M3[0], DENSITY_KG_M3[1])]
+    Density {
+        /// Name of the region; empty if the body has one material.
+        region: String,
+        /// The given value [kg/m³].
+        value: f64,
+    },
+    /// The material file is not TOML of the expected form.
+    #[error("material file: {message}")]
+    Syntax {
+        /// Message of the TOML parser, with line and column.
+        message: String,
+    },
+    /// The material file has two materials for one region.
+    #[error("material file: region {region} has more than one material")]
+    Duplicate {
+        /// Name or number of the region.
+        region: String,
+    },
     /// A region of the mesh has no material.
-    #[error("region {region} of the mesh has no material; the file has materials for: {known}")]
+    #[error("region {region} of the mesh has no material; the file has materials for: {}", known.join(", "))]
     Missing {
-        /// Name or number.
+        /// Name or number of the region.
         region: String,
-        /// The regions that the file names.
-        known: String,
+        /// Regions in the material file.
+        known: Vec<String>,
     },
-    /// The file names a region that the mesh does not have.
-    #[error("the material file names region {region}, which the mesh does not have; it has: {known}")]
+    /// The material file has a region that the mesh does not have.
+    #[error("the material file names region {region}, which the mesh does not have; it has: {}", known.join(", "))]
     Unknown {
-        /// Name or number.
+        /// Name or number of the region.
         region: String,
-        /// The mesh's regions.
-        known: String,
+        /// Regions of the mesh.
+        known: Vec<String>,
     },
 }
 
-/// Lamé's constants (λ, μ) [Pa] of a material.
-pub fn lame_constants(material: &Material) -> (f64, f64) {
+fn of(region: &str) -> String {
+    if region.is_empty() { String::new() } else { format!("region {region}: ") }
+}
+
+/// Lamé constants (λ, μ) [Pa].
+pub(crate) fn lame_constants(material: &Material) -> (f64, f64) {
     let (young, poisson) = (material.young_pa, material.poisson);
     let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
     (lambda, young / (2.0 * (1.0 + poisson)))
 }
 
-/// Young's moduli that are computed [Pa]: wide around foam and diamond, for scaled units, within what f64 squares safely.
+/// Range of Young's moduli [Pa]: wide around foam and diamond, for scaled units, within what f64 squares safely.
 const YOUNG_PA: [f64; 2] = [1e-6, 1e18];
 
-/// Densities that are computed [kg/m³].
+/// Range of densities [kg/m³].
 const DENSITY_KG_M3: [f64; 2] = [1e-9, 1e12];
 
-/// Refuse a material outside of what linear elasticity allows.
+/// Refuses a material outside of what linear elasticity allows.
 ///
 /// # Errors
-/// Names the number and its range.
-pub fn check(material: &Material) -> Result<(), MaterialError> {
+/// [`MaterialError`] with the region, the value and its range.
+pub(crate) fn check(material: &Material) -> Result<(), MaterialError> {
     let Material { region, young_pa, poisson, density_kg_m3 } = material;
-    let place = if region.is_empty() { String::new() } else { format!("region {region}: ") };
-    let range = |what: String| Err(MaterialError::Range { what: format!("{place}{what}") });
+    let region = region.clone();
     let within = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
     if !within(*young_pa, YOUNG_PA) {
-        let [low, high] = YOUNG_PA;
-        return range(format!("Young's modulus is {young_pa:e} Pa, expected {low:e} to {high:e} Pa"));
+        return Err(MaterialError::Young { region, value: *young_pa });
     }
     if *poisson >= 0.5 {
-        return range(format!(
-            "Poisson's ratio is {poisson}, expected below 0.5: at 0.5 the material is incompressible \
-             and has no displacement-only stiffness; use 0.49 for rubber or soft tissue"
-        ));
+        return Err(MaterialError::Incompressible { region, value: *poisson });
     }
     if !(*poisson > -1.0 && poisson.is_finite()) {
-        return range(format!("Poisson's ratio is {poisson}, expected above -1 and below 0.5"));
+        return Err(MaterialError::Poisson { region, value: *poisson });
     }
     if !within(*density_kg_m3, DENSITY_KG_M3) {
-        let [low, high] = DENSITY_KG_M3;
-        return range(format!("density is {density_kg_m3:e} kg/m³, expected {low:e} to {high:e} kg/m³"));
+        return Err(MaterialError::Density { region, value: *density_kg_m3 });
     }
     Ok(())
 }
 
-/// The form of a material file.
+/// Schema of a material file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MaterialFile {
@@ -102,14 +140,14 @@ enum RegionKey {
 }
 
 impl RegionKey {
-    fn fits(&self, region: &Region) -> bool {
+    fn matches(&self, region: &Region) -> bool {
         match self {
             Self::Number(tag) => region.tag == *tag,
             Self::Name(name) => region.name.as_ref() == Some(name) || region.tag.to_string() == *name,
         }
     }
 
-    fn text(&self) -> String {
+    fn label(&self) -> String {
         match self {
             Self::Number(tag) => tag.to_string(),
             Self::Name(name) => name.clone(),
@@ -117,12 +155,7 @@ impl RegionKey {
     }
 }
 
-/// A region's name, or its number where it has none.
-pub fn region_text(region: &Region) -> String {
-    region.name.clone().unwrap_or_else(|| region.tag.to_string())
-}
-
-/// One material per region of the mesh, in its order, from the text of a material file:
+/// Materials from the text of a material file, one per region of the mesh, in its order:
 ///
 /// ```toml
 /// [[material]]
@@ -133,30 +166,26 @@ pub fn region_text(region: &Region) -> String {
 /// ```
 ///
 /// # Errors
-/// When the text is not of this form, a number is out of range, or regions don't match the mesh.
+/// [`MaterialError`] when the text is not of this form, a number is out of range, or regions don't match the mesh.
 pub fn materials_from_toml(text: &str, mesh: &Mesh) -> Result<Vec<Material>, MaterialError> {
-    let file: MaterialFile =
-        toml::from_str(text).map_err(|e| MaterialError::File(e.to_string().trim_end().into()))?;
-    let join = |names: Vec<String>| names.join(", ");
+    let file: MaterialFile = toml::from_str(text)
+        .map_err(|e| MaterialError::Syntax { message: e.to_string().trim_end().into() })?;
     for entry in &file.material {
-        if !mesh.regions.iter().any(|region| entry.region.fits(region)) {
-            let known = join(mesh.regions.iter().map(region_text).collect());
-            return Err(MaterialError::Unknown { region: entry.region.text(), known });
+        if !mesh.regions.iter().any(|region| entry.region.matches(region)) {
+            let known = mesh.regions.iter().map(Region::label).collect();
+            return Err(MaterialError::Unknown { region: entry.region.label(), known });
         }
     }
     let for_region = |region: &Region| {
-        if file.material.iter().filter(|entry| entry.region.fits(region)).count() > 1 {
-            return Err(MaterialError::File(format!(
-                "region {} has more than one material",
-                region_text(region)
-            )));
+        if file.material.iter().filter(|entry| entry.region.matches(region)).count() > 1 {
+            return Err(MaterialError::Duplicate { region: region.label() });
         }
-        let Some(entry) = file.material.iter().find(|entry| entry.region.fits(region)) else {
-            let known = join(file.material.iter().map(|entry| entry.region.text()).collect());
-            return Err(MaterialError::Missing { region: region_text(region), known });
+        let Some(entry) = file.material.iter().find(|entry| entry.region.matches(region)) else {
+            let known = file.material.iter().map(|entry| entry.region.label()).collect();
+            return Err(MaterialError::Missing { region: region.label(), known });
         };
         let material = Material {
-            region: region_text(region),
+            region: region.label(),
             young_pa: entry.young,
             poisson: entry.poisson,
             density_kg_m3: entry.density,

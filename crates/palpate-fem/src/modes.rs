@@ -1,188 +1,177 @@
 //! The lowest elastic modes: K·φ = ω²·M·φ.
 //!
 //! Block Krylov on the operator G·M (see `system`), whose eigenvalues on the elastic motions are 1/ω²:
-//! a random block, M-orthonormal, is multiplied again and again, every new block is made orthogonal to all
-//! before (twice), and the operator is projected on the basis (Rayleigh-Ritz). A mode counts as found when
+//! a random block, M-orthonormal, is multiplied repeatedly, every new block is orthogonalised against all
+//! previous ones (twice), and the operator is projected on the basis (Rayleigh-Ritz). A mode has converged when
 //! |G·M·φ − φ/ω²| in the norm of M is below `TOLERANCE`/ω². A block finds as many copies of
-//! a repeated eigenvalue as it has columns; that none is missed is checked with the inertia of K − s·M for
-//! an s in a gap just above the last mode, and the basis is extended by a fresh random block if one is.
+//! a repeated eigenvalue as it has columns. The inertia of K − s·M for an s in a gap just above the last mode counts
+//! all modes below s; if one is missing, the basis is extended by a new random block.
 //! References: Golub & Underwood 1977 (block Lanczos); Grimes, Lewis & Simon 1994, SIAM J. Matrix Anal. 15, 228.
 
 use crate::progress::Progress;
+use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::{Mat, MatRef, Side};
 
-/// Elastic modes of a body.
+/// Elastic modes of a body, orthonormal in the mass matrix.
 #[derive(Debug, Clone)]
-pub struct Modes {
+pub struct ElasticModes {
     /// ω² [rad²/s²], ascending.
-    pub squares: Vec<f64>,
+    pub(crate) squares: Vec<f64>,
     /// Φ [1/√kg], a column per mode, orthonormal in M.
-    pub shapes: Mat<f64>,
+    pub(crate) shapes: Mat<f64>,
 }
 
-impl Modes {
+impl ElasticModes {
     /// No modes.
     pub(crate) fn none(system: &System) -> Self {
         Self { squares: Vec::new(), shapes: Mat::zeros(system.discretisation.dofs(), 0) }
     }
+
+    /// Number of modes.
+    pub fn count(&self) -> usize {
+        self.squares.len()
+    }
+
+    /// Squared angular frequencies ω² [rad²/s²], ascending.
+    pub fn squared_frequencies(&self) -> &[f64] {
+        &self.squares
+    }
+
+    /// Frequencies [Hz], ascending.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        self.squares.iter().map(|square| square.sqrt() / std::f64::consts::TAU).collect()
+    }
+
+    /// Shape of a mode [1/√kg] at all degrees of freedom, 3·node + axis.
+    pub fn shape(&self, mode: usize) -> &[f64] {
+        self.shapes.col_as_slice(mode)
+    }
 }
 
-/// Why modes could not be found.
-#[derive(Debug, thiserror::Error)]
-pub enum ModesError {
-    /// More modes are asked for than there are.
-    #[error(
-        "{wanted} modes are wanted, the model has {available} elastic modes: use a finer mesh or --modes {available}"
-    )]
-    TooMany {
-        /// Asked for.
-        wanted: usize,
-        /// What can be found.
-        available: usize,
-    },
-    /// The iteration did not reach its tolerance.
-    #[error(
-        "the modes did not converge: {found} of {wanted} after a basis of {basis}, largest residual {residual:e}; \
-         the mesh may have slivers or materials that differ by many orders"
-    )]
-    NoConvergence {
-        /// Modes within tolerance.
-        found: usize,
-        /// Asked for.
-        wanted: usize,
-        /// Columns of the basis.
-        basis: usize,
-        /// Relative residual of the last wanted mode.
-        residual: f64,
-    },
-    /// The inertia count and the modes found disagree.
-    #[error("{counted} modes lie below {frequency_hz} Hz, but {found} were found")]
-    Missed {
-        /// By inertia.
-        counted: usize,
-        /// By the iteration.
-        found: usize,
-        /// The bound.
-        frequency_hz: f64,
-    },
-    /// A dense decomposition failed.
-    #[error("dense eigenproblem: {0}")]
-    Dense(String),
-}
-
-/// Relative residual of a mode; the frequency's error is of its square, the shape's of its size over the gap.
+/// Relative residual of a converged mode. The error of the frequency is of its square, the error of the shape is the
+/// residual over the gap to the next eigenvalue.
 const TOLERANCE: f64 = 1e-9;
 
-/// Columns that are multiplied at once: more than any multiplicity that symmetry forces (3 for a cube, 7 for
+/// Block size: more than any multiplicity that symmetry forces (3 for a cube, 7 for
 /// the low modes of a ball), and enough for the solves to run at full speed.
 const BLOCK: usize = 16;
 
-/// Up to this many degrees of freedom all modes are computed densely, in about a second.
+/// Degrees of freedom up to which all modes are computed densely, in about a second.
 const DENSE_UP_TO: usize = 900;
 
-/// Beyond this dense work is announced, and beyond the other (30 minutes, 5 GB) refused: up to a third of the modes of a
-/// mesh are found sparsely, whatever its size.
+/// Degrees of freedom beyond which the dense route is announced by a warning.
 const DENSE_SLOW: usize = 3_000;
+
+/// Degrees of freedom beyond which the dense route is refused: it would take 30 minutes and 5 GB. The sparse route finds
+/// up to a third of the modes of any mesh.
 const DENSE_AT_MOST: usize = 14_000;
 
-/// Two neighbours in the spectrum are a gap when ω² differs by this share.
+/// Relative difference of neighbouring ω² that makes a gap in the spectrum.
 const GAP: f64 = 1e-5;
 
-/// The `wanted` lowest elastic modes.
+/// The `requested` lowest elastic modes.
 ///
 /// # Errors
-/// See [`ModesError`].
+/// [`SolveError::TooManyModes`], [`SolveError::NoConvergence`], [`SolveError::ModeCount`],
+/// [`SolveError::DenseEigenproblem`] or [`SolveError::Interrupted`].
 pub fn lowest_modes(
     system: &System,
-    wanted: usize,
+    requested: usize,
     progress: &mut dyn Progress,
-) -> Result<Modes, ModesError> {
+) -> Result<ElasticModes, SolveError> {
     let available = system.elastic_modes();
-    if wanted > available {
-        return Err(ModesError::TooMany { wanted, available });
+    if requested > available {
+        return Err(SolveError::TooManyModes { requested, available });
     }
     // The Krylov basis needs room: several columns per mode.
     let dofs = system.discretisation.dofs();
-    let dense = dofs <= DENSE_UP_TO || 3 * wanted + 8 * BLOCK > available;
+    let dense = dofs <= DENSE_UP_TO || 3 * requested + 8 * BLOCK > available;
     if dense && dofs > DENSE_AT_MOST {
-        return Err(ModesError::TooMany { wanted, available: (available - 8 * BLOCK) / 3 });
+        return Err(SolveError::TooManyModes { requested, available: (available - 8 * BLOCK) / 3 });
     }
     if dense && dofs > DENSE_SLOW {
-        progress.remark(&format!("so many of the {available} modes are found densely, which takes minutes"));
+        progress.warn(&format!("so many of the {available} modes are found densely, which takes minutes"));
     }
-    if dense { all_modes(system, wanted, progress) } else { krylov(system, wanted, progress) }
+    if dense { all_modes(system, requested, progress) } else { krylov(system, requested, progress) }
 }
 
-fn krylov(system: &System, wanted: usize, progress: &mut dyn Progress) -> Result<Modes, ModesError> {
+fn krylov(
+    system: &System,
+    requested: usize,
+    progress: &mut dyn Progress,
+) -> Result<ElasticModes, SolveError> {
     let n = system.discretisation.dofs();
     let available = system.elastic_modes();
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let mut basis = Basis { columns: Mat::zeros(n, 0), projected: Vec::new() };
     let mut block = random_block(system, &mut random);
-    progress.begin("modes", wanted as u64);
-    let (mut reported, mut checked_missing) = (0, 0);
+    progress.begin("modes", requested as u64);
+    let (mut reported, mut extensions) = (0, 0);
     loop {
+        if progress.is_interrupted() {
+            return Err(SolveError::Interrupted);
+        }
         let Some(accepted) = basis.append(system, block) else {
-            return Err(no_convergence(0, wanted, basis.len(), f64::NAN));
+            return Err(no_convergence(0, requested, basis.len(), f64::NAN));
         };
         let image = system.elastic_compliance(system.mass_times(accepted.as_ref()));
         let (next, coefficients) = basis.orthogonalise(system, image);
         basis.projected.push(coefficients);
         block = next;
 
-        // Rayleigh-Ritz now and then: it costs the cube of the basis.
+        // Rayleigh-Ritz every few blocks: it costs the cube of the basis.
         let full = basis.len() + BLOCK > available;
-        if basis.len() < wanted + 2 * BLOCK || !(basis.len() / BLOCK).is_multiple_of(6) && !full {
+        if basis.len() < requested + 2 * BLOCK || !(basis.len() / BLOCK).is_multiple_of(6) && !full {
             continue;
         }
         let ritz = basis.ritz(system, &block)?;
         let found = ritz.residuals.iter().take_while(|r| **r < TOLERANCE).count();
-        progress.advance((found.min(wanted) - reported) as u64);
-        reported = found.min(wanted);
-        // A gap at or above the last wanted mode, among those found.
-        let gap = (wanted..found).find(|&at| ritz.squares[at] > ritz.squares[at - 1] * (1.0 + GAP));
+        progress.advance((found.min(requested) - reported) as u64);
+        reported = found.min(requested);
+        // A gap at or above the last requested mode, among those found.
+        let gap = (requested..found).find(|&at| ritz.squares[at] > ritz.squares[at - 1] * (1.0 + GAP));
         let Some(gap) = gap else {
-            if full || basis.len() > 12 * wanted + 40 * BLOCK {
-                let residual = ritz.residuals.get(wanted - 1).copied().unwrap_or(f64::NAN);
-                return Err(no_convergence(found, wanted, basis.len(), residual));
+            if full || basis.len() > 12 * requested + 40 * BLOCK {
+                let residual = ritz.residuals.get(requested - 1).copied().unwrap_or(f64::NAN);
+                return Err(no_convergence(found, requested, basis.len(), residual));
             }
             continue;
         };
         let bound = (ritz.squares[gap - 1] * ritz.squares[gap]).sqrt();
         let counted = system.elastic_modes_below(bound);
         if counted == gap {
-            return Ok(Modes {
-                squares: ritz.squares[..wanted].to_vec(),
-                shapes: &basis.columns * ritz.vectors.subcols(0, wanted),
+            return Ok(ElasticModes {
+                squares: ritz.squares[..requested].to_vec(),
+                shapes: &basis.columns * ritz.vectors.subcols(0, requested),
             });
         }
-        checked_missing += 1;
-        if checked_missing > 4 || counted < gap {
+        extensions += 1;
+        if extensions > 4 || counted < gap {
             let frequency_hz = bound.sqrt() / std::f64::consts::TAU;
-            return Err(ModesError::Missed { counted, found: gap, frequency_hz });
+            return Err(SolveError::ModeCount { counted, found: gap, frequency_hz });
         }
-        // Something hides from this Krylov space: fresh directions beside the next ones find it.
+        // A mode is missing in this Krylov space: new random directions beside the next block find it.
         let (fresh, _) = basis.orthogonalise(system, random_block(system, &mut random));
         let width = block.ncols();
         block.resize_with(fresh.nrows(), width + fresh.ncols(), |i, j| fresh[(i, j - width)]);
     }
 }
 
-fn no_convergence(found: usize, wanted: usize, basis: usize, residual: f64) -> ModesError {
-    ModesError::NoConvergence { found, wanted, basis, residual }
+fn no_convergence(found: usize, requested: usize, basis: usize, residual: f64) -> SolveError {
+    SolveError::NoConvergence { found, requested, basis, residual }
 }
 
 /// M-orthonormal columns and the operator projected on them.
 struct Basis {
     columns: Mat<f64>,
-    /// Per block: Vᵀ·M·G·M·V_block for the columns that stood when it was multiplied.
+    /// Per block: Vᵀ·M·G·M·V_block for the columns of the basis when the block was multiplied.
     projected: Vec<Mat<f64>>,
 }
 
 struct Ritz {
     squares: Vec<f64>,
-    /// Relative residuals.
+    /// Relative residuals of the Ritz pairs.
     residuals: Vec<f64>,
     vectors: Mat<f64>,
 }
@@ -192,7 +181,7 @@ impl Basis {
         self.columns.ncols()
     }
 
-    /// Take the part of a block that is orthogonal to the basis; gives coefficients too.
+    /// Part of a block that is orthogonal to the basis, and the coefficients of the rest.
     fn orthogonalise(&self, system: &System, mut block: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
         let mut coefficients = Mat::zeros(self.len(), block.ncols());
         for _ in 0..2 {
@@ -203,7 +192,7 @@ impl Basis {
         (block, coefficients)
     }
 
-    /// Make a block M-orthonormal and append it; none when the block has lost its rank.
+    /// Makes a block M-orthonormal and appends it; none if the block is rank deficient.
     fn append(&mut self, system: &System, mut block: Mat<f64>) -> Option<Mat<f64>> {
         system.remove_rigid(&mut block);
         orthonormalise(system, &mut block)?;
@@ -212,14 +201,14 @@ impl Basis {
         Some(block)
     }
 
-    /// Eigenpairs of the projected operator; `next` is the part of its last image that leaves the basis.
-    fn ritz(&self, system: &System, next: &Mat<f64>) -> Result<Ritz, ModesError> {
+    /// Eigenpairs of the projected operator; `next` is the part of the last image that is orthogonal to the basis.
+    fn ritz(&self, system: &System, next: &Mat<f64>) -> Result<Ritz, SolveError> {
         let dim = self.len();
         let mut h = Mat::<f64>::zeros(dim, dim);
         let mut start = 0;
         for block in &self.projected {
             for (j, i) in (0..block.ncols()).flat_map(|j| (0..block.nrows()).map(move |i| (j, i))) {
-                // Rows that came after the block are given by symmetry.
+                // Rows of later blocks follow by symmetry.
                 h[(i, start + j)] = block[(i, j)];
                 h[(start + j, i)] = block[(i, j)];
             }
@@ -228,7 +217,8 @@ impl Basis {
         // faer's eigensolver wants entries near 1.
         let scale = h.norm_max();
         h *= faer::Scale(1.0 / scale);
-        let eigen = h.self_adjoint_eigen(Side::Lower).map_err(|e| ModesError::Dense(format!("{e:?}")))?;
+        let eigen =
+            h.self_adjoint_eigen(Side::Lower).map_err(|e| SolveError::DenseEigenproblem(format!("{e:?}")))?;
         let vectors = Mat::from_fn(dim, dim, |i, j| eigen.U()[(i, dim - 1 - j)]);
         let values: Vec<f64> = (0..dim).map(|j| eigen.S()[dim - 1 - j] * scale).collect();
         // |G·M·φ − θφ| = |next·(last rows of y)|, with the Gram matrix of `next`.
@@ -247,7 +237,7 @@ impl Basis {
     }
 }
 
-/// Cholesky-QR in the product of M, twice for full precision. None when columns are dependent.
+/// Cholesky-QR in the inner product of M, twice for full precision; none if columns are dependent.
 fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
     for _ in 0..2 {
         // Columns to unit size first: Krylov blocks shrink by many orders.
@@ -272,11 +262,11 @@ fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
 
 fn random_block(system: &System, random: &mut Random) -> Mat<f64> {
     let noise = Mat::from_fn(system.discretisation.dofs(), BLOCK, |_, _| random.next());
-    // One application of the operator damps the jagged part of the noise.
+    // One application of the operator damps the high-frequency part of the noise.
     system.elastic_compliance(system.mass_times(noise.as_ref()))
 }
 
-/// A fixed sequence of numbers in −½…½, so that the same mesh gives the same bits (Marsaglia's xorshift).
+/// Deterministic random numbers in −½…½ (Marsaglia's xorshift), so that a mesh always gives the same bits.
 struct Random(u64);
 
 impl Random {
@@ -288,24 +278,29 @@ impl Random {
     }
 }
 
-/// All modes by a dense decomposition of L⁻¹·K·L⁻ᵀ with M = L·Lᵀ; the second route, and the one for small bodies.
+/// The `requested` lowest modes by a dense decomposition of L⁻¹·K·L⁻ᵀ with M = L·Lᵀ: the route for small bodies, and the
+/// reference for the sparse one.
 ///
 /// # Errors
-/// [`ModesError::Dense`].
-pub fn all_modes(system: &System, wanted: usize, progress: &mut dyn Progress) -> Result<Modes, ModesError> {
+/// [`SolveError::DenseEigenproblem`].
+pub fn all_modes(
+    system: &System,
+    requested: usize,
+    progress: &mut dyn Progress,
+) -> Result<ElasticModes, SolveError> {
     progress.begin("all modes, densely", 1);
     let assembly = &system.assembly;
     let dofs = system.discretisation.dofs();
     let free: Vec<usize> = (0..dofs).filter(|&dof| !system.is_fixed(dof)).collect();
-    let mut place = vec![usize::MAX; dofs];
-    free.iter().enumerate().for_each(|(at, &dof)| place[dof] = at);
+    let mut free_index = vec![usize::MAX; dofs];
+    free.iter().enumerate().for_each(|(at, &dof)| free_index[dof] = at);
     let n = free.len();
     let (mut k, mut m) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
     for node in 0..assembly.nodes() {
         for at in assembly.offsets[node]..assembly.offsets[node + 1] {
             let other = assembly.columns[at] as usize;
             for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
-                let (row, column) = (place[3 * node + a], place[3 * other + b]);
+                let (row, column) = (free_index[3 * node + a], free_index[3 * other + b]);
                 if row != usize::MAX && column != usize::MAX {
                     k[(row, column)] = assembly.stiffness[at].col(b)[a];
                     m[(row, column)] = if a == b { assembly.mass[at] } else { 0.0 };
@@ -313,8 +308,8 @@ pub fn all_modes(system: &System, wanted: usize, progress: &mut dyn Progress) ->
             }
         }
     }
-    let dense = |e: &dyn std::fmt::Debug| ModesError::Dense(format!("{e:?}"));
-    let llt = m.llt(Side::Lower).map_err(|e| dense(&e))?;
+    let failed = |e: &dyn std::fmt::Debug| SolveError::DenseEigenproblem(format!("{e:?}"));
+    let llt = m.llt(Side::Lower).map_err(|e| failed(&e))?;
     let lower_solve = |x: &mut Mat<f64>| {
         faer::linalg::triangular_solve::solve_lower_triangular_in_place(
             llt.L(),
@@ -327,24 +322,24 @@ pub fn all_modes(system: &System, wanted: usize, progress: &mut dyn Progress) ->
     lower_solve(&mut k);
     let scale = k.norm_max();
     let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) / scale);
-    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|e| dense(&e))?;
+    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|e| failed(&e))?;
     let skip = system.rigid_motions();
-    let mut vectors = eigen.U().subcols(skip, wanted).to_owned();
+    let mut vectors = eigen.U().subcols(skip, requested).to_owned();
     faer::linalg::triangular_solve::solve_upper_triangular_in_place(
         llt.L().transpose(),
         vectors.as_mut(),
         faer::Par::rayon(0),
     );
-    let mut shapes = Mat::zeros(dofs, wanted);
-    for (j, (at, &dof)) in (0..wanted).flat_map(|j| free.iter().enumerate().map(move |f| (j, f))) {
+    let mut shapes = Mat::zeros(dofs, requested);
+    for (j, (at, &dof)) in (0..requested).flat_map(|j| free.iter().enumerate().map(move |f| (j, f))) {
         shapes[(dof, j)] = vectors[(at, j)];
     }
     system.remove_rigid(&mut shapes);
     progress.advance(1);
-    Ok(Modes { squares: (0..wanted).map(|j| eigen.S()[skip + j] * scale).collect(), shapes })
+    Ok(ElasticModes { squares: (0..requested).map(|j| eigen.S()[skip + j] * scale).collect(), shapes })
 }
 
-/// Largest entry of |ΦᵀMΦ − I|.
+/// Orthonormality error: the largest entry of |ΦᵀMΦ − I|.
 pub fn orthonormality_error(system: &System, shapes: MatRef<'_, f64>) -> f64 {
     let gram = shapes.transpose() * system.mass_times(shapes);
     let error = |i: usize, j: usize| (gram[(i, j)] - f64::from(u8::from(i == j))).abs();

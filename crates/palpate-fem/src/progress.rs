@@ -1,21 +1,25 @@
-//! How long work tells what it is doing.
+//! Progress and interruption of offline work.
 
-/// Listener to the stages of offline work.
+/// Listener to the progress of offline work, which can also interrupt it.
 pub trait Progress {
-    /// A stage begins: what is being done, and how many units of work it has.
+    /// A stage begins, with a total of this many units of work.
     fn begin(&mut self, stage: &str, total: u64);
-    /// Some units are done.
+    /// Units of work of the present stage are done.
     fn advance(&mut self, units: u64);
-    /// Something that the user should know.
-    fn remark(&mut self, text: &str);
+    /// A warning for the user, one sentence.
+    fn warn(&mut self, text: &str);
+    /// Whether the work is to stop at the next opportunity with an `Interrupted` error. Asked a few times a second.
+    fn is_interrupted(&self) -> bool {
+        false
+    }
 }
 
-/// Tells nothing.
+/// Listener that ignores everything.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Silent;
+pub struct SilentProgress;
 
-impl Progress for Silent {
+impl Progress for SilentProgress {
     fn begin(&mut self, _stage: &str, _total: u64) {}
     fn advance(&mut self, _units: u64) {}
-    fn remark(&mut self, _text: &str) {}
+    fn warn(&mut self, _text: &str) {}
 }

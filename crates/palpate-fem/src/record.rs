@@ -1,113 +1,105 @@
-//! The whole way from a mesh to a recording.
+//! Recording of a mesh: from nodes and tetrahedra to modes, residual compliance and certificate.
 
 use crate::assembly::Assembly;
-use crate::certificate::{CertificateError, DOUBTFUL, WORTHLESS, certificate};
+use crate::body::RecordedBody;
+use crate::certificate::{FORCE_ERROR_UNUSABLE, FORCE_ERROR_WARNING, certificate};
 use crate::discretisation::Discretisation;
-use crate::element::Order;
-use crate::factor::check_memory;
-use crate::material::{self, MaterialError};
-use crate::mesh::{Mesh, MeshError, check};
-use crate::modes::{Modes, ModesError, lowest_modes};
+use crate::element::ElementOrder;
+use crate::material;
+use crate::memory::check_memory;
+use crate::mesh::Mesh;
+use crate::modes::{ElasticModes, lowest_modes};
 use crate::progress::Progress;
+use crate::record_error::RecordError;
 use crate::residual::{ResidualChoice, gravity_response, residual_compliance};
-use crate::system::{System, SystemError};
+use crate::solve_error::SolveError;
+use crate::system::System;
 use glam::DVec3;
 use palpate::{
     Certificate, Damping, FORMAT_VERSION, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording,
     Support, Surface,
 };
 
-/// What is recorded and how.
+/// Parameters of a recording.
 #[derive(Debug, Clone)]
 pub struct RecordParameters {
-    /// One material per region of the mesh.
+    /// Materials, one per region of the mesh.
     pub materials: Vec<Material>,
     /// Order of the elements.
-    pub order: Order,
-    /// Number of elastic modes to keep.
+    pub order: ElementOrder,
+    /// Number of elastic modes to keep; all of them if the body has fewer.
     pub modes: usize,
     /// Damping of the elastic modes.
     pub damping: Damping,
-    /// What is kept of the residual compliance.
+    /// Part of the residual compliance to keep.
     pub residual: ResidualChoice,
-    /// Nodes of the mesh that are fixed; none for a free body.
+    /// Fixed nodes of the mesh; none for a free body.
     pub fixed_nodes: Vec<u32>,
-    /// Where the mesh came from, for the file.
+    /// Name of the mesh, for the file.
     pub source: String,
-    /// How much is computed.
-    pub extent: Extent,
+    /// Extent of the computation.
+    pub extent: RecordExtent,
 }
 
-/// How much of a recording is computed.
+/// Extent of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Extent {
+pub enum RecordExtent {
     /// Modes, residual compliance and certificate.
     #[default]
-    Whole,
-    /// Without the certificate: for tables in closed form.
-    Uncertified,
-    /// The body alone, without modes: for tables by time integration.
-    Body,
+    Full,
+    /// Modes and residual compliance: for tables in closed form.
+    NoCertificate,
+    /// Surface and mass alone: for tables by time integration.
+    NoModes,
 }
 
-/// Why no recording could be made.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// The mesh.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A material.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-    /// Supports or factor.
-    #[error(transparent)]
-    System(#[from] SystemError),
-    /// The modes.
-    #[error(transparent)]
-    Modes(#[from] ModesError),
-    /// The certificate.
-    #[error(transparent)]
-    Certificate(#[from] CertificateError),
-    /// Another option.
-    #[error("{0}")]
-    Option(String),
-}
+/// Share of fixed nodes above which the user is warned.
+const MANY_FIXED: f64 = 0.3;
 
-/// Share of fixed nodes above which the user is asked whether that was meant.
-const MUCH_FIXED: f64 = 0.3;
-
-/// Everything about a recorded body, for checks that need more than the recording.
-pub struct Recorded {
-    /// What is written.
-    pub recording: Recording,
-    /// The assembled body.
-    pub system: System,
-    /// The modes at all nodes.
-    pub modes: Modes,
-}
-
-/// Record a mesh: check, assemble, factor, modes, residual compliance, certificate.
+/// Records a mesh: checks and assembles it, computes modes, residual compliance and certificate.
 ///
 /// # Errors
-/// Says what is wrong with the mesh, the material or the options.
+/// [`RecordError`] when the mesh, a material or a parameter is not usable, the body cannot be solved, or the listener
+/// interrupts.
 pub fn record(
     mesh: Mesh,
     parameters: &RecordParameters,
     progress: &mut dyn Progress,
-) -> Result<Recorded, RecordError> {
+) -> Result<Recording, RecordError> {
+    RecordedBody::new(mesh, parameters, progress).map(|body| body.recording)
+}
+
+impl RecordedBody {
+    /// Records a mesh like [`record`], and keeps the finite element model for tables and reference solutions.
+    ///
+    /// # Errors
+    /// As of [`record`].
+    pub fn new(
+        mesh: Mesh,
+        parameters: &RecordParameters,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, RecordError> {
+        record_body(mesh, parameters, progress)
+    }
+}
+
+fn record_body(
+    mesh: Mesh,
+    parameters: &RecordParameters,
+    progress: &mut dyn Progress,
+) -> Result<RecordedBody, RecordError> {
     check_parameters(&mesh, parameters)?;
     progress.begin("mesh, assembly, factor", 4);
-    let mesh = check(mesh)?;
-    mesh.remarks.iter().for_each(|remark| progress.remark(remark));
-    remark_on_locking(parameters, progress);
+    let mesh = mesh.checked()?;
+    mesh.warnings.iter().for_each(|warning| progress.warn(warning));
+    warn_about_locking(parameters, progress);
     progress.advance(1);
     let discretisation = Discretisation::new(&mesh, parameters.order);
-    check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))
-        .map_err(SystemError::from)?;
+    check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))?;
     let fixed_nodes = fixed_nodes(&discretisation, &parameters.fixed_nodes)?;
     let share = fixed_nodes.len() as f64 / discretisation.nodes.len() as f64;
-    if share > MUCH_FIXED {
-        progress.remark(&format!(
+    if share > MANY_FIXED {
+        progress.warn(&format!(
             "{:.0} % of the nodes are fixed; conditions are in metres of the mesh",
             100.0 * share
         ));
@@ -117,15 +109,15 @@ pub fn record(
     let system = System::new(discretisation, assembly, fixed_nodes)?;
     progress.advance(2);
 
-    let body_only = parameters.extent == Extent::Body;
-    let wanted = if body_only { 0 } else { parameters.modes.min(system.elastic_modes()) };
-    if wanted < parameters.modes && !body_only {
-        progress.remark(&format!(
-            "{} modes are wanted, the model has {wanted} elastic modes: all of them are kept",
+    let no_modes = parameters.extent == RecordExtent::NoModes;
+    let count = if no_modes { 0 } else { parameters.modes.min(system.elastic_modes()) };
+    if count < parameters.modes && !no_modes {
+        progress.warn(&format!(
+            "{} modes are requested, the model has {count} elastic modes: all of them are kept",
             parameters.modes
         ));
     }
-    let modes = if body_only { Modes::none(&system) } else { lowest_modes(&system, wanted, progress)? };
+    let modes = if no_modes { ElasticModes::none(&system) } else { lowest_modes(&system, count, progress)? };
     let surface_nodes = system.discretisation.surface_nodes();
     let surface = surface(&system, &surface_nodes);
     let residual = residual_compliance(
@@ -133,14 +125,15 @@ pub fn record(
         &modes,
         &surface_nodes,
         surface.mean_edge(),
-        if body_only { ResidualChoice::None } else { parameters.residual },
+        if no_modes { ResidualChoice::None } else { parameters.residual },
         progress,
-    );
+    )?;
     let mut stated = None;
-    if parameters.extent == Extent::Whole {
+    if parameters.extent == RecordExtent::Full {
         let certificate =
-            certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)?;
-        remark_on_certificate(&certificate, progress);
+            certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)
+                .map_err(certificate_error)?;
+        warn_about_certificate(&certificate, progress);
         stated = Some(certificate);
     }
 
@@ -155,7 +148,7 @@ pub fn record(
         mesh: MeshCounts {
             nodes: system.discretisation.nodes.len() as u64,
             elements: mesh.tets.len() as u64,
-            order: if parameters.order == Order::Linear { 1 } else { 2 },
+            order: if parameters.order == ElementOrder::Linear { 1 } else { 2 },
             fixed_nodes: system.fixed_nodes.len() as u64,
         },
         mass: system.mass.clone(),
@@ -173,70 +166,75 @@ pub fn record(
         residual,
         gravity: (!free).then(|| gravity_response(&system, &modes, &surface_nodes)),
     };
-    Ok(Recorded { recording, system, modes })
+    Ok(RecordedBody { recording, system, modes })
 }
 
 fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), RecordError> {
-    let fail = |what: String| Err(RecordError::Option(what));
     parameters.materials.iter().try_for_each(material::check)?;
-    if parameters.materials.len() != mesh.regions.len() {
-        return fail(format!("{} materials for {} regions", parameters.materials.len(), mesh.regions.len()));
+    let (materials, regions) = (parameters.materials.len(), mesh.regions.len());
+    if materials != regions {
+        return Err(RecordError::MaterialCount { materials, regions });
     }
     if parameters.modes == 0 {
-        return fail("0 modes are wanted, expected 1 or more".into());
+        return Err(RecordError::NoModes);
     }
     if let ResidualChoice::NearField(radius) = parameters.residual
         && !(radius.is_finite() && radius > 0.0)
     {
-        return fail(format!("residual radius is {radius} m, expected a positive number"));
+        return Err(RecordError::ResidualRadius { radius });
     }
     match parameters.damping {
         Damping::Rayleigh { alpha, beta }
             if !(alpha >= 0.0 && beta >= 0.0 && alpha.is_finite() && beta.is_finite()) =>
         {
-            fail(format!(
-                "Rayleigh damping is {alpha} 1/s, {beta} s, expected two numbers that are not negative"
-            ))
+            Err(RecordError::RayleighDamping { alpha, beta })
         }
-        Damping::Ratio(zeta) if !(zeta >= 0.0 && zeta.is_finite()) => {
-            fail(format!("damping ratio is {zeta}, expected a number that is not negative"))
+        Damping::Ratio(ratio) if !(ratio >= 0.0 && ratio.is_finite()) => {
+            Err(RecordError::DampingRatio { ratio })
         }
         _ => Ok(()),
     }
 }
 
-/// A rough estimate before anything large is made: the factor grows with dofs^(4/3) (measured: 0.6 GB at 81 000 with
-/// linear elements), the basis of the modes holds about four columns per mode, three times over.
+fn certificate_error(error: SolveError) -> RecordError {
+    match error {
+        SolveError::Interrupted => RecordError::Interrupted,
+        error => RecordError::Certificate(error),
+    }
+}
+
+/// Rough estimate of the needed memory [bytes]: the factor grows with dofs^(4/3) (measured: 0.6 GB at 81 000 with
+/// linear elements), the Krylov basis holds about four columns per mode, in three copies.
 fn needed_bytes(dofs: f64, modes: f64) -> f64 {
     0.6e9 * (dofs / 81e3).powf(4.0 / 3.0) + 3.0 * 8.0 * dofs * (4.0 * modes).min(dofs)
 }
 
-fn remark_on_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
-    let stiffest = parameters.materials.iter().map(|m| m.poisson).fold(0.0, f64::max);
-    if parameters.order == Order::Linear && stiffest > 0.45 {
-        progress.remark(&format!(
-            "linear elements lock at Poisson's ratio {stiffest}: frequencies come out some per cent too high; \
+fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
+    let largest = parameters.materials.iter().map(|m| m.poisson).fold(0.0, f64::max);
+    if parameters.order == ElementOrder::Linear && largest > 0.45 {
+        progress.warn(&format!(
+            "linear elements lock at Poisson's ratio {largest}: frequencies come out some per cent too high; \
              --order 2 avoids it"
         ));
     }
-    if stiffest > 0.4999 {
-        progress.remark(&format!(
-            "Poisson's ratio {stiffest} is so near to 0.5 that even quadratic elements lock; 0.49 is usual for rubber"
+    if largest > 0.4999 {
+        progress.warn(&format!(
+            "Poisson's ratio {largest} is so near to 0.5 that even quadratic elements lock; 0.49 is usual for rubber"
         ));
     }
 }
 
-fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
+fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
     let error = certificate.force_error_max;
-    let place = DVec3::from_array(certificate.worst_at_m);
-    if error > WORTHLESS {
-        progress.remark(&format!(
+    let worst_at = DVec3::from_array(certificate.worst_at_m);
+    if error > FORCE_ERROR_UNUSABLE {
+        progress.warn(&format!(
             "the force of this recording is worth nothing near ({:.4}, {:.4}, {:.4}) m from its centre of mass (see the \
              certificate): keep the residual compliance and more modes",
-            place.x, place.y, place.z
+            worst_at.x, worst_at.y, worst_at.z
         ));
-    } else if error > DOUBTFUL {
-        progress.remark(&format!(
+    } else if error > FORCE_ERROR_WARNING {
+        progress.warn(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
              certificate): keep the residual compliance and more modes",
             100.0 * error
@@ -244,18 +242,19 @@ fn remark_on_certificate(certificate: &Certificate, progress: &mut dyn Progress)
     }
 }
 
-/// Nodes of the discretisation that are fixed, from nodes of the mesh.
-fn fixed_nodes(discretisation: &Discretisation, wanted: &[u32]) -> Result<Vec<u32>, RecordError> {
-    let fixed = discretisation.among(wanted);
-    if !wanted.is_empty() && !fixed.contains(&true) {
-        return Err(RecordError::Option("the nodes to fix belong to no tetrahedron".into()));
+/// Fixed nodes of the discretisation, from nodes of the mesh.
+fn fixed_nodes(discretisation: &Discretisation, mesh_nodes: &[u32]) -> Result<Vec<u32>, RecordError> {
+    let fixed = discretisation.in_set(mesh_nodes);
+    if !mesh_nodes.is_empty() && !fixed.contains(&true) {
+        return Err(RecordError::FixedNodesUnused);
     }
     if !fixed.contains(&false) {
-        return Err(RecordError::Option("all nodes are fixed: nothing can move".into()));
+        return Err(RecordError::AllNodesFixed);
     }
     Ok((0..fixed.len()).filter(|&node| fixed[node]).map(|node| node as u32).collect())
 }
 
+/// Surface in the body frame, whose origin is the centre of mass.
 fn surface(system: &System, surface_nodes: &[u32]) -> Surface {
     let discretisation = &system.discretisation;
     let centre = DVec3::from_array(system.mass.center_of_mass_m);
@@ -268,7 +267,8 @@ fn surface(system: &System, surface_nodes: &[u32]) -> Surface {
     }
 }
 
-fn modal_basis(modes: &Modes, surface_nodes: &[u32], damping: Damping) -> ModalBasis {
+/// Modes at the surface nodes.
+fn modal_basis(modes: &ElasticModes, surface_nodes: &[u32], damping: Damping) -> ModalBasis {
     let angular_frequencies: Vec<f64> = modes.squares.iter().map(|square| square.sqrt()).collect();
     let rows = surface_nodes.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
     let mode_shapes = rows.flat_map(|row| (0..modes.squares.len()).map(move |i| (row, i)));
@@ -279,7 +279,7 @@ fn modal_basis(modes: &Modes, surface_nodes: &[u32], damping: Damping) -> ModalB
     }
 }
 
-/// BLAKE3 over nodes, tetrahedra and regions.
+/// BLAKE3 hash of nodes, tetrahedra and regions, in hexadecimal.
 fn mesh_hash(mesh: &Mesh) -> String {
     let mut hasher = blake3::Hasher::new();
     mesh.nodes.iter().flat_map(|p| p.to_array()).for_each(|v| {

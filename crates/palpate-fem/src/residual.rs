@@ -4,53 +4,57 @@
 //! itself, so each diagonal entry is raised by 2⁻²⁴ of its row's absolute sum, which keeps S positive
 //! semi-definite (Gershgorin) and changes it by less than a millionth.
 
-use crate::modes::Modes;
+use crate::modes::ElasticModes;
 use crate::progress::Progress;
+use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::Mat;
 use glam::DVec3;
 use palpate::{GravityResponse, NearField, ResidualCompliance};
 use rayon::prelude::*;
 
-/// What to keep of the residual compliance.
+/// Part of the residual compliance that a recording keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ResidualChoice {
-    /// Whole up to [`WHOLE_UP_TO`] touchable degrees of freedom, the near field beyond.
+    /// The whole matrix up to 12,000 touchable degrees of freedom (288 MB), the near field beyond.
     #[default]
     Automatic,
-    /// Whole, whatever it takes: 2·n² bytes for n touchable degrees of freedom.
+    /// The whole matrix: 2·n² bytes for n touchable degrees of freedom.
     Whole,
-    /// The near field within a radius [m].
+    /// Entries between nodes within a radius [m], tapered.
     NearField(f64),
-    /// Nothing: to see what the modes alone are worth.
+    /// Nothing: the modes alone.
     None,
 }
 
 /// Touchable degrees of freedom up to which S is kept whole: 288 MB.
-pub const WHOLE_UP_TO: usize = 12_000;
+const WHOLE_UP_TO: usize = 12_000;
 
 /// Radius of the automatic near field in mean edges of the surface. By 4 cells S has fallen below 5 % of its
 /// diagonal; the taper keeps 94 % of an entry one edge away.
 const NEAR_EDGES: f64 = 12.0;
 
-/// Columns that are solved together on one core.
-const COLUMNS: usize = 48;
+/// Columns that one thread solves together.
+const COLUMNS_PER_SOLVE: usize = 48;
 
-/// The largest that rounding to f32 moves a number, as a share of it.
+/// Largest relative rounding error of f32.
 const F32_ROUNDING: f64 = 1.0 / (1_u64 << 24) as f64;
 
-/// S on the surface nodes, given by their numbers in the discretisation.
+/// Residual compliance S [m/N] on the surface nodes, given by their numbers in the discretisation.
+///
+/// # Errors
+/// [`SolveError::Interrupted`].
 pub fn residual_compliance(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface_nodes: &[u32],
     mean_edge: f64,
     choice: ResidualChoice,
     progress: &mut dyn Progress,
-) -> ResidualCompliance {
+) -> Result<ResidualCompliance, SolveError> {
     let touchable = 3 * surface_nodes.len();
     match choice {
-        ResidualChoice::None => ResidualCompliance::None,
+        ResidualChoice::None => Ok(ResidualCompliance::None),
         ResidualChoice::Automatic if touchable > WHOLE_UP_TO => {
             near_field(system, modes, surface_nodes, NEAR_EDGES * mean_edge, progress)
         }
@@ -59,21 +63,26 @@ pub fn residual_compliance(
     }
 }
 
-/// Row of the surface's degree of freedom in the system.
+/// Degree of freedom of the system for a touchable degree of freedom of the surface.
 fn dof(surface_nodes: &[u32], touchable: usize) -> usize {
     3 * surface_nodes[touchable / 3] as usize + touchable % 3
 }
 
-/// Static displacements [m] under loads [N] that the kept modes miss, (G − Φ·Λ⁻¹·Φᵀ)·B; `gains` is Φᵀ·B.
-pub(crate) fn missed(system: &System, modes: &Modes, loads: Mat<f64>, gains: &Mat<f64>) -> Mat<f64> {
-    let shares = Mat::from_fn(gains.nrows(), gains.ncols(), |i, j| gains[(i, j)] / modes.squares[i]);
-    system.elastic_compliance(loads) - &modes.shapes * shares
+/// Static displacements of the truncated modes [m] under loads B [N], (G − Φ·Λ⁻¹·Φᵀ)·B; `gains` is Φᵀ·B.
+pub(crate) fn truncated_displacements(
+    system: &System,
+    modes: &ElasticModes,
+    loads: Mat<f64>,
+    gains: &Mat<f64>,
+) -> Mat<f64> {
+    let amplitudes = Mat::from_fn(gains.nrows(), gains.ncols(), |i, j| gains[(i, j)] / modes.squares[i]);
+    system.elastic_compliance(loads) - &modes.shapes * amplitudes
 }
 
 /// Columns of S at the surface for a range of touchable degrees of freedom: columns[j][i] = S_ij.
 fn columns(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface_nodes: &[u32],
     range: std::ops::Range<usize>,
 ) -> Vec<Vec<f64>> {
@@ -85,42 +94,48 @@ fn columns(
     let gains = Mat::from_fn(modes.squares.len(), range.len(), |i, column| {
         modes.shapes[(dof(surface_nodes, range.start + column), i)]
     });
-    let solved = missed(system, modes, loads, &gains);
+    let solved = truncated_displacements(system, modes, loads, &gains);
     let at_surface = |column: usize| {
         (0..3 * surface_nodes.len()).map(|row| solved[(dof(surface_nodes, row), column)]).collect()
     };
     (0..range.len()).map(at_surface).collect()
 }
 
-/// Visit every column of S once, a few blocks at a time on all cores.
+/// Visits every column of S once, a block per thread at a time.
 fn for_each_column(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface_nodes: &[u32],
     progress: &mut dyn Progress,
     mut visit: impl FnMut(usize, &[f64]),
-) {
+) -> Result<(), SolveError> {
     let touchable = 3 * surface_nodes.len();
     progress.begin("residual compliance", touchable as u64);
-    let starts: Vec<usize> = (0..touchable).step_by(COLUMNS).collect();
+    let starts: Vec<usize> = (0..touchable).step_by(COLUMNS_PER_SOLVE).collect();
     for batch in starts.chunks(rayon::current_num_threads()) {
+        if progress.is_interrupted() {
+            return Err(SolveError::Interrupted);
+        }
         let solved: Vec<_> = batch
             .par_iter()
-            .map(|&start| columns(system, modes, surface_nodes, start..(start + COLUMNS).min(touchable)))
+            .map(|&start| {
+                columns(system, modes, surface_nodes, start..(start + COLUMNS_PER_SOLVE).min(touchable))
+            })
             .collect();
         for (&start, block) in batch.iter().zip(&solved) {
             block.iter().enumerate().for_each(|(at, column)| visit(start + at, column));
             progress.advance(block.len() as u64);
         }
     }
+    Ok(())
 }
 
 fn whole(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface_nodes: &[u32],
     progress: &mut dyn Progress,
-) -> ResidualCompliance {
+) -> Result<ResidualCompliance, SolveError> {
     let touchable = 3 * surface_nodes.len();
     let mut packed = vec![0.0_f32; touchable * (touchable + 1) / 2];
     let mut diagonal = vec![0.0; touchable];
@@ -129,20 +144,20 @@ fn whole(
             packed[i * (i + 1) / 2 + j] = value as f32;
         }
         diagonal[j] = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
-    });
+    })?;
     for (i, value) in diagonal.into_iter().enumerate() {
         packed[i * (i + 1) / 2 + i] = value as f32;
     }
-    ResidualCompliance::Whole(packed)
+    Ok(ResidualCompliance::Whole(packed))
 }
 
 fn near_field(
     system: &System,
-    modes: &Modes,
+    modes: &ElasticModes,
     surface_nodes: &[u32],
     radius: f64,
     progress: &mut dyn Progress,
-) -> ResidualCompliance {
+) -> Result<ResidualCompliance, SolveError> {
     let positions: Vec<DVec3> =
         surface_nodes.iter().map(|&node| system.discretisation.nodes[node as usize]).collect();
     let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
@@ -170,7 +185,7 @@ fn near_field(
         if let Some(own) = row.into_iter().find(|&at| near.nodes[at] as usize == node) {
             near.blocks[9 * own + 4 * axis] = (column[j].max(0.0) + F32_ROUNDING * sum) as f32;
         }
-    });
+    })?;
     for node in 0..positions.len() {
         for at in near.offsets[node] as usize..near.offsets[node + 1] as usize {
             let other = near.nodes[at] as usize;
@@ -187,15 +202,15 @@ fn near_field(
             }
         }
     }
-    ResidualCompliance::NearField(near)
+    Ok(ResidualCompliance::NearField(near))
 }
 
-/// Response of a body with fixed nodes to uniform acceleration: modal forces Φᵀ·M·e and the static
-/// displacement (G − Φ·Λ⁻¹·Φᵀ)·M·e that the modes miss, for the three axes e.
-pub fn gravity_response(system: &System, modes: &Modes, surface_nodes: &[u32]) -> GravityResponse {
+/// Response of a body with fixed nodes to a uniform unit acceleration: modal forces Φᵀ·M·e and the static
+/// displacement (G − Φ·Λ⁻¹·Φᵀ)·M·e of the truncated modes, for the three axes e.
+pub fn gravity_response(system: &System, modes: &ElasticModes, surface_nodes: &[u32]) -> GravityResponse {
     let weight = system.uniform_weight();
     let forces = modes.shapes.transpose() * &weight;
-    let residual = missed(system, modes, weight, &forces);
+    let residual = truncated_displacements(system, modes, weight, &forces);
     GravityResponse {
         modal_forces: (0..3)
             .flat_map(|axis| (0..forces.nrows()).map(move |i| (i, axis)))

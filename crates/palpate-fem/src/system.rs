@@ -1,19 +1,22 @@
 //! The elastic body as one operator: G, its elastic static compliance.
 //!
 //! For a free body K has six zero modes, the rigid motions Φr. Inertia relief balances a load by the
-//! inertia it causes, holds six degrees of freedom, and takes the rigid part out again:
+//! inertia forces of the rigid motion that it causes, constrains six degrees of freedom, and removes the rigid part of
+//! the solution:
 //!
 //! ```text
 //! G = (I − Φr·Φrᵀ·M)·K⁻·(I − M·Φr·Φrᵀ)        ΦrᵀMΦr = I
 //! ```
 //!
-//! K⁻ is K's inverse with the six held degrees of freedom struck out; any six that stop all rigid
-//! motion give the same G. For a body with fixed nodes G is K's inverse on the free ones.
+//! K⁻ is the inverse of K with the six constrained degrees of freedom removed; any six that prevent all rigid
+//! motions give the same G. For a body with fixed nodes G is the inverse of K on the free ones.
 //! Reference: Géradin & Rixen, *Mechanical Vibrations*, 3.5.
 
-use crate::assembly::{Assembly, Which};
+use crate::assembly::{Assembly, SystemMatrix};
 use crate::discretisation::Discretisation;
-use crate::factor::{Factor, FactorError, Pattern, check_memory};
+use crate::factor::{Factor, Pattern};
+use crate::memory::check_memory;
+use crate::solve_error::SolveError;
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 use palpate::MassProperties;
@@ -22,9 +25,9 @@ use palpate::MassProperties;
 pub struct System {
     /// Nodes and elements.
     pub discretisation: Discretisation,
-    /// K and M.
+    /// Stiffness and mass matrices.
     pub assembly: Assembly,
-    /// Mass, centre, inertia.
+    /// Mass, centre of mass, inertia.
     pub mass: MassProperties,
     /// Fixed nodes, ascending; empty for a free body.
     pub fixed_nodes: Vec<u32>,
@@ -40,27 +43,16 @@ struct Rigid {
     weighted: Mat<f64>,
 }
 
-/// Why a system can't be set up.
-#[derive(Debug, thiserror::Error)]
-pub enum SystemError {
-    /// The fixed nodes don't hold the body.
-    #[error("{0}")]
-    Support(String),
-    /// The factor failed.
-    #[error(transparent)]
-    Factor(#[from] FactorError),
-}
-
 impl System {
-    /// Factor a body; `fixed_nodes` are nodes of the discretisation, ascending.
+    /// Factors a body; `fixed_nodes` are nodes of the discretisation, ascending.
     ///
     /// # Errors
-    /// When the fixed nodes leave a rigid motion, or the stiffness is not positive definite.
+    /// [`SolveError`] when the fixed nodes leave a rigid motion, memory is short, or the stiffness is not positive definite.
     pub fn new(
         discretisation: Discretisation,
         assembly: Assembly,
         fixed_nodes: Vec<u32>,
-    ) -> Result<Self, SystemError> {
+    ) -> Result<Self, SolveError> {
         let mass = mass_properties(&discretisation, &assembly);
         let shapes = rigid_shapes(&discretisation, &mass);
         let mut fixed = vec![false; discretisation.dofs()];
@@ -70,31 +62,29 @@ impl System {
         let pattern = Pattern::new(&assembly)?;
         // Its own factor and the two shifted ones of the certificate.
         check_memory(3.0 * pattern.factor_bytes() as f64)?;
-        let (mut held, mut rigid) = (fixed.clone(), None);
+        let (mut constrained, mut rigid) = (fixed.clone(), None);
         if fixed_nodes.is_empty() {
             for (row, _) in independent_rows(&shapes, 0..shapes.nrows()) {
-                held[row] = true;
+                constrained[row] = true;
             }
-            let weighted = assembly.multiply(Which::Mass, shapes.as_ref());
+            let weighted = assembly.multiply(SystemMatrix::Mass, shapes.as_ref());
             rigid = Some(Rigid { shapes, weighted });
         } else {
             let rows = fixed_nodes.iter().flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
             let pivots = independent_rows(&shapes, rows);
             if pivots.len() < 6 || pivots[5].1 < 1e-9 * pivots[0].1 {
-                return Err(SystemError::Support(
-                    "the fixed nodes leave the body free to turn: fix at least three nodes that are not on one line".into(),
-                ));
+                return Err(SolveError::RigidMotion);
             }
         }
-        let factor = pattern.factor(&assembly, &held, 0.0)?;
+        let factor = pattern.factor(&assembly, &constrained, 0.0)?;
         Ok(Self { discretisation, assembly, mass, fixed_nodes, pattern, fixed, factor, rigid })
     }
 
-    /// Cholesky factor of K + `shift`·M with the fixed nodes struck out; `shift` > 0 for a free body.
+    /// Cholesky factor of K + `shift`·M with the fixed degrees of freedom removed; `shift` > 0 for a free body.
     ///
     /// # Errors
-    /// When it is not positive definite.
-    pub fn shifted_factor(&self, shift: f64) -> Result<Factor, FactorError> {
+    /// [`SolveError::NotPositiveDefinite`].
+    pub fn shifted_factor(&self, shift: f64) -> Result<Factor, SolveError> {
         self.pattern.factor(&self.assembly, &self.fixed, shift)
     }
 
@@ -115,12 +105,12 @@ impl System {
         if self.rigid.is_some() { 6 } else { 0 }
     }
 
-    /// Number of elastic modes that the body has.
+    /// Number of elastic modes of the body.
     pub fn elastic_modes(&self) -> usize {
         self.discretisation.dofs() - 3 * self.fixed_nodes.len() - self.rigid_motions()
     }
 
-    /// G·B for a block of loads [N], one per column; displacements [m].
+    /// Elastic displacements G·B [m] for a block of loads B [N], one per column.
     pub fn elastic_compliance(&self, mut loads: Mat<f64>) -> Mat<f64> {
         self.balance(&mut loads);
         self.factor.solve(loads.as_mut());
@@ -128,19 +118,19 @@ impl System {
         loads
     }
 
-    /// Loads minus the inertia of the rigid motion they cause: (I − M·Φr·Φrᵀ)·B.
+    /// Subtracts from loads the inertia forces of the rigid motion that they cause: (I − M·Φr·Φrᵀ)·B.
     pub fn balance(&self, loads: &mut Mat<f64>) {
         if let Some(Rigid { shapes, weighted }) = &self.rigid {
-            let share = shapes.transpose() * &*loads;
-            *loads -= weighted * share;
+            let amplitudes = shapes.transpose() * &*loads;
+            *loads -= weighted * amplitudes;
         }
     }
 
-    /// Displacements minus their rigid part: (I − Φr·Φrᵀ·M)·U; zero at fixed nodes.
+    /// Subtracts from displacements their rigid part: (I − Φr·Φrᵀ·M)·U; zeroes fixed nodes.
     pub fn remove_rigid(&self, displacements: &mut Mat<f64>) {
         if let Some(Rigid { shapes, weighted }) = &self.rigid {
-            let share = weighted.transpose() * &*displacements;
-            *displacements -= shapes * share;
+            let amplitudes = weighted.transpose() * &*displacements;
+            *displacements -= shapes * amplitudes;
         }
         for &node in &self.fixed_nodes {
             for axis in 0..3 {
@@ -155,9 +145,9 @@ impl System {
         self.mass_times(Mat::from_fn(self.discretisation.dofs(), 3, along).as_ref())
     }
 
-    /// M·X.
+    /// Product M·X.
     pub fn mass_times(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        self.assembly.multiply(Which::Mass, x)
+        self.assembly.multiply(SystemMatrix::Mass, x)
     }
 }
 
@@ -218,7 +208,7 @@ fn independent_rows(shapes: &Mat<f64>, candidates: impl Iterator<Item = usize>) 
     let mut rows: Vec<(usize, [f64; 6])> =
         candidates.map(|row| (row, std::array::from_fn(|k| shapes[(row, k)]))).collect();
     let dot = |a: &[f64; 6], b: &[f64; 6]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let mut taken = Vec::new();
+    let mut chosen = Vec::new();
     for _ in 0..6 {
         let best = rows.iter().copied().max_by(|a, b| dot(&a.1, &a.1).total_cmp(&dot(&b.1, &b.1)));
         let Some((row, pivot)) = best else { break };
@@ -226,11 +216,11 @@ fn independent_rows(shapes: &Mat<f64>, candidates: impl Iterator<Item = usize>) 
         if size == 0.0 {
             break;
         }
-        taken.push((row, size.sqrt()));
+        chosen.push((row, size.sqrt()));
         for (_, other) in &mut rows {
             let share = dot(other, &pivot) / size;
             other.iter_mut().zip(pivot).for_each(|(o, p)| *o -= share * p);
         }
     }
-    taken
+    chosen
 }

@@ -1,115 +1,117 @@
 //! The impulse response by time integration of the whole finite element system.
 //!
-//! M·ü + C·u̇ + K·u = f, C = αM + βK, is ẋ = A·x + b with x = (u, u̇). Over a step h with b held,
+//! M·ü + C·u̇ + K·u = f, C = αM + βK, is ẋ = A·x + b with x = (u, u̇). Over a step h with constant b,
 //!
 //! ```text
 //! x⁺ = R(hA)·x + h·Q(hA)·b,   R(z) = Σ_k c_k·w^k ≈ e^z,   Q(z) = (R(z) − 1)/z = γ·Σ_k d_k·w^k,
 //! w = 1/(1 − γz),             d_k = c_k + c_{k+1} + … + c_s,   k = 1 … s = 5
 //! ```
 //!
-//! the rational approximation with a single pole, of order 5, A-stable, and R(∞) = 0: what is too fast for
-//! the step dies out, so that the table's R[0] can be inverted (the average-acceleration rule rings for ever).
-//! Multiplying by w solves with one matrix, factored once, for many loads at a time:
+//! the rational approximation with a single pole, of order 5, A-stable, and R(∞) = 0: modes that are too fast for
+//! the step are damped, so that the table's R[0] can be inverted (the average-acceleration rule never damps them).
+//! A multiplication by w is a solve with one matrix, factored once, for many loads at a time:
 //!
 //! ```text
 //! D·v' = M·v − γh·K·u,   u' = u + γh·v',   D = (1 + γhα)·M + (γhβ + γ²h²)·K
 //! ```
 //!
-//! K·u is carried along, since D·v' tells K·v'. A free body's load is balanced first, so that the rigid motion
-//! stays out. Reference: Hairer & Wanner, *Solving Ordinary Differential Equations II*, IV.6 (γ in table 6.4).
+//! K·u is carried along, since K·v' follows from D·v'. The load of a free body is balanced first, so that it causes no
+//! rigid motion. Reference: Hairer & Wanner, *Solving Ordinary Differential Equations II*, IV.6 (γ in table 6.4).
 
-use crate::factor::{Factor, FactorError, SolveRoom};
+use crate::factor::{Factor, RowWorkspace};
+use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::Mat;
 
-/// γ for which five stages give order 5.
+/// Pole parameter γ for which five stages give order 5.
 const GAMMA: f64 = 0.278_053_841_136_452_3;
 
-/// Stages, each one solve.
+/// Number of stages, one solve each.
 const STAGES: usize = 5;
 
-/// Integrator of one body at one step.
-pub struct Transient<'a> {
+/// Time integrator of one body at one step.
+pub(crate) struct Transient<'a> {
     system: &'a System,
     factor: Factor,
     step_s: f64,
-    /// 1 + γhα and γhβ + γ²h².
-    mass_share: f64,
-    stiffness_share: f64,
-    /// c_k and γ·h·d_k, k = 1 … s.
+    /// Coefficient of M in D, 1 + γhα.
+    mass_coefficient: f64,
+    /// Coefficient of K in D, γhβ + γ²h² [s²].
+    stiffness_coefficient: f64,
+    /// Weights c_k of the stages of the free response.
     homogeneous: [f64; STAGES],
-    held: [f64; STAGES],
+    /// Weights γ·h·d_k [s] of the stages of the forced response.
+    forced: [f64; STAGES],
 }
 
-/// Displacement u, velocity v, and K·u, M·v, a row per load and a column per degree of freedom, so that the loads' values
-/// lie side by side; with room for a step.
-pub struct Motion {
+/// State of the integration: displacement u, velocity v, K·u and M·v, a row per load and a column per degree of freedom,
+/// with the workspace of a step.
+pub(crate) struct TransientState {
     displacement: Mat<f64>,
     velocity: Mat<f64>,
     elastic_force: Mat<f64>,
     momentum: Mat<f64>,
-    /// The stage's K·u and M·v, its right-hand side, its v.
+    /// Values of the present stage: K·u, M·v, right-hand side, v.
     stage_force: Mat<f64>,
     stage_momentum: Mat<f64>,
     right: Mat<f64>,
     solved: Mat<f64>,
-    room: SolveRoom,
+    workspace: RowWorkspace,
 }
 
 impl<'a> Transient<'a> {
-    /// Prepare steps of `step_s` [s] with Rayleigh damping α [1/s], β [s].
+    /// Integrator with steps of `step_s` [s] and Rayleigh damping α [1/s], β [s].
     ///
     /// # Errors
-    /// When the factor fails.
-    pub fn new(system: &'a System, alpha: f64, beta: f64, step_s: f64) -> Result<Self, FactorError> {
+    /// [`SolveError::NotPositiveDefinite`].
+    pub fn new(system: &'a System, alpha: f64, beta: f64, step_s: f64) -> Result<Self, SolveError> {
         let g = GAMMA * step_s;
-        let (mass_share, stiffness_share) = (1.0 + g * alpha, g * beta + g * g);
-        let factor = system.shifted_factor(mass_share / stiffness_share)?;
+        let (mass_coefficient, stiffness_coefficient) = (1.0 + g * alpha, g * beta + g * g);
+        let factor = system.shifted_factor(mass_coefficient / stiffness_coefficient)?;
         let homogeneous = coefficients();
-        let held = std::array::from_fn(|k| g * homogeneous[k..].iter().sum::<f64>());
-        Ok(Self { system, factor, step_s, mass_share, stiffness_share, homogeneous, held })
+        let forced = std::array::from_fn(|k| g * homogeneous[k..].iter().sum::<f64>());
+        Ok(Self { system, factor, step_s, mass_coefficient, stiffness_coefficient, homogeneous, forced })
     }
 
-    /// The motion after a step from rest in which `loads` [N], balanced already, are held.
-    pub fn push(&self, loads: &Mat<f64>) -> Motion {
-        let mut motion = Motion::at_rest(loads.ncols(), loads.nrows());
-        self.hold(&mut motion, loads);
-        motion
+    /// State after the first step from rest, under constant balanced loads [N].
+    pub fn start(&self, loads: &Mat<f64>) -> TransientState {
+        let mut state = TransientState::at_rest(loads.ncols(), loads.nrows());
+        self.add_forced_response(&mut state, loads);
+        state
     }
 
-    /// The motion one step later, with `loads` held on.
-    pub fn push_on(&self, motion: &mut Motion, loads: &Mat<f64>) {
-        self.advance(motion);
-        self.hold(motion, loads);
+    /// Advances the state by a step under constant balanced loads [N].
+    pub fn advance_loaded(&self, state: &mut TransientState, loads: &Mat<f64>) {
+        self.advance(state);
+        self.add_forced_response(state, loads);
     }
 
-    /// Add what loads do that are held over the step.
-    fn hold(&self, motion: &mut Motion, loads: &Mat<f64>) {
+    /// Adds the response to loads that are constant over the step.
+    fn add_forced_response(&self, state: &mut TransientState, loads: &Mat<f64>) {
         // b = (0, M⁻¹·f): its first multiplication by w solves D·v' = f.
-        motion.stage_force.fill(0.0);
-        motion.stage_momentum.copy_from(loads.transpose());
-        self.stages(motion, self.held);
+        state.stage_force.fill(0.0);
+        state.stage_momentum.copy_from(loads.transpose());
+        self.stages(state, self.forced);
     }
 
-    /// The motion one step later, without load.
-    pub fn advance(&self, motion: &mut Motion) {
-        // Σ_k c_k·x_k with x_k = w·x_{k−1}, where u_k = u_{k−1} + γh·v_k and Σ_k c_k = 1: u stays in its sum.
-        motion.stage_force.copy_from(&motion.elastic_force);
-        motion.stage_momentum.copy_from(&motion.momentum);
-        motion.velocity.fill(0.0);
-        motion.momentum.fill(0.0);
-        self.stages(motion, self.homogeneous);
+    /// Advances the state by a step without load.
+    pub fn advance(&self, state: &mut TransientState) {
+        // Σ_k c_k·x_k with x_k = w·x_{k−1}, where u_k = u_{k−1} + γh·v_k and Σ_k c_k = 1: u is kept in the sum.
+        state.stage_force.copy_from(&state.elastic_force);
+        state.stage_momentum.copy_from(&state.momentum);
+        state.velocity.fill(0.0);
+        state.momentum.fill(0.0);
+        self.stages(state, self.homogeneous);
     }
 
-    /// Add Σ_k c_k·w^k of what stands in the stage to the motion; a displacement that the stage begins with is in the
-    /// motion's already.
-    fn stages(&self, motion: &mut Motion, coefficients: [f64; STAGES]) {
+    /// Adds Σ_k c_k·w^k of the stage's values to the state; the initial displacement of the stage is in the state already.
+    fn stages(&self, state: &mut TransientState, coefficients: [f64; STAGES]) {
         let g = GAMMA * self.step_s;
-        let (shift, share) = (self.mass_share / self.stiffness_share, self.stiffness_share);
+        let (shift, scale) = (self.mass_coefficient / self.stiffness_coefficient, self.stiffness_coefficient);
         for (k, &c) in coefficients.iter().enumerate() {
-            // How often v_k counts in Σ c·u.
+            // Coefficient of v_k in Σ c·u.
             let d = g * coefficients[k..].iter().sum::<f64>();
-            let Motion {
+            let TransientState {
                 displacement,
                 velocity,
                 elastic_force,
@@ -118,13 +120,13 @@ impl<'a> Transient<'a> {
                 stage_momentum,
                 right,
                 solved,
-                room,
-            } = motion;
+                workspace,
+            } = state;
             for_each([right, solved], [stage_momentum, stage_force], |to, [mv, ku]| {
-                to[0] = (mv - g * ku) / share;
+                to[0] = (mv - g * ku) / scale;
                 to[1] = to[0];
             });
-            self.factor.solve_side_by_side(solved.as_mut(), room);
+            self.factor.solve_rows(solved.as_mut(), workspace);
             self.system.assembly.mass_times_rows(solved, stage_momentum);
             for_each(
                 [displacement, velocity, elastic_force, momentum, stage_force],
@@ -143,8 +145,8 @@ impl<'a> Transient<'a> {
     }
 }
 
-impl Motion {
-    /// u [m], a column per load.
+impl TransientState {
+    /// Displacements u [m], a column per load.
     pub fn displacement(&self) -> Mat<f64> {
         self.displacement.transpose().to_owned()
     }
@@ -160,12 +162,12 @@ impl Motion {
             stage_momentum: zero(),
             right: zero(),
             solved: zero(),
-            room: SolveRoom::default(),
+            workspace: RowWorkspace::default(),
         }
     }
 }
 
-/// Change entries of some matrices by those of others, all of one shape, in one pass.
+/// Updates entries of some matrices from those of others of the same shape, in one pass.
 fn for_each<const N: usize, const M: usize>(
     to: [&mut Mat<f64>; N],
     from: [&Mat<f64>; M],
@@ -184,8 +186,8 @@ fn for_each<const N: usize, const M: usize>(
     }
 }
 
-/// Up to which frequency [Hz] the integrator follows a wave to 1 % over 0.1 s, with steps of `step_s` [s].
-pub fn follows_hz(step_s: f64) -> f64 {
+/// Frequency [Hz] up to which the integrator follows an oscillation to 1 % over 0.1 s, with steps of `step_s` [s].
+pub(crate) fn resolved_frequency_hz(step_s: f64) -> f64 {
     let c = coefficients();
     let error = |y: f64| {
         let [re, im] = on_imaginary_axis(c, y);
@@ -200,7 +202,7 @@ pub fn follows_hz(step_s: f64) -> f64 {
     low / (std::f64::consts::TAU * step_s)
 }
 
-/// R(iy), real and imaginary part, with w = (1 + iγy)/(1 + γ²y²).
+/// Amplification R(iy), real and imaginary part, with w = (1 + iγy)/(1 + γ²y²).
 fn on_imaginary_axis(c: [f64; STAGES], y: f64) -> [f64; 2] {
     let size = 1.0 + (GAMMA * y).powi(2);
     let w = [1.0 / size, GAMMA * y / size];
@@ -212,7 +214,7 @@ fn on_imaginary_axis(c: [f64; STAGES], y: f64) -> [f64; 2] {
     sum
 }
 
-/// c_k: Σ_k c_k·w^k agrees with e^z up to z⁴, and by the choice of γ up to z⁵.
+/// Coefficients c_k, for which Σ_k c_k·w^k agrees with e^z up to z⁴, and by the choice of γ up to z⁵.
 fn coefficients() -> [f64; STAGES] {
     // The coefficient of zⁿ in w^k is γⁿ·C(k + n − 1, n).
     let mut rows = [[0.0; STAGES + 1]; STAGES];
@@ -224,7 +226,7 @@ fn coefficients() -> [f64; STAGES] {
         }
         row[STAGES] = 1.0 / (factorial * GAMMA.powi(n as i32));
     }
-    // Gauss elimination; the matrix of binomials is well behaved without pivoting.
+    // Gaussian elimination; the matrix of binomials needs no pivoting.
     for i in 0..STAGES {
         let pivot = rows[i];
         for row in &mut rows[i + 1..] {
@@ -249,9 +251,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_the_step_follows_more_than_twice_the_frequency_less_what_more_steps_lose() {
+    fn resolved_frequency_grows_with_the_power_five_sixths_of_the_step_rate() {
         // Errors per step grow with the sixth power of ωh, steps with 1/h: the sixth root of 2 less than double.
-        let ratio = follows_hz(0.5e-3) / follows_hz(1e-3);
+        let ratio = resolved_frequency_hz(0.5e-3) / resolved_frequency_hz(1e-3);
         assert!((ratio - 2.0_f64.powf(5.0 / 6.0)).abs() < 0.05, "{ratio}");
     }
 

@@ -1,11 +1,8 @@
 //! Certificates of bodies with fixed nodes.
 
 use palpate::{Certificate, Damping, Material};
-use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
-use palpate_fem::progress::Silent;
-use palpate_fem::record::{Extent, RecordParameters, record};
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, ResidualChoice, SilentProgress, record};
 
 fn clamped_bar(residual: ResidualChoice, modes: usize) -> Certificate {
     let mesh = box_mesh([0.2, 0.05, 0.05], [8, 2, 2]).expect("a good box");
@@ -17,20 +14,20 @@ fn clamped_bar(residual: ResidualChoice, modes: usize) -> Certificate {
             poisson: 0.45,
             density_kg_m3: 1100.0,
         }],
-        order: Order::Quadratic,
+        order: ElementOrder::Quadratic,
         modes,
         damping: Damping::Ratio(0.05),
         residual,
         fixed_nodes: left.collect(),
         source: "bar".into(),
-        extent: Extent::Whole,
+        extent: RecordExtent::Full,
     };
-    let recorded = record(mesh.clone(), &parameters, &mut Silent).expect("a good bar");
-    recorded.recording.metadata.certificate.expect("a certificate")
+    let recording = record(mesh, &parameters, &mut SilentProgress).expect("a good bar");
+    recording.metadata.certificate.expect("a certificate")
 }
 
 #[test]
-fn fixed_places_are_not_sampled() {
+fn fixed_nodes_are_not_sampled() {
     // A sample on the clamp has no compliance: its relative errors would have no bound.
     let certificate = clamped_bar(ResidualChoice::Automatic, 60);
     assert!(certificate.worst_at_m[0] > -0.099, "{certificate:?}");
@@ -40,7 +37,7 @@ fn fixed_places_are_not_sampled() {
 }
 
 #[test]
-fn a_missing_residual_shows() {
+fn a_missing_residual_raises_the_errors() {
     let with = clamped_bar(ResidualChoice::Automatic, 20);
     let without = clamped_bar(ResidualChoice::None, 20);
     assert!(without.force_error_max > 3.0 * with.force_error_max, "{with:?} {without:?}");

@@ -1,7 +1,7 @@
-//! What `mesh::check` lets pass, turns, remarks on and refuses; what `merge_nodes` joins.
+//! `Mesh::checked`: what passes, is oriented, gives a warning, and is refused. `Mesh::merge_coincident_nodes`.
 
 use glam::DVec3;
-use palpate_fem::mesh::{Mesh, NodeGroup, ball_mesh, boundary, box_mesh, check, merge_nodes};
+use palpate_fem::mesh::{Mesh, MeshError, NodeGroup, ball_mesh, box_mesh};
 use proptest::prelude::*;
 
 /// A sum of a few hundred volumes keeps all but the last three digits of f64.
@@ -18,11 +18,11 @@ fn cell() -> Mesh {
 }
 
 fn sound(mesh: Mesh) -> Mesh {
-    check(mesh).expect("a sound mesh")
+    mesh.checked().expect("a sound mesh")
 }
 
 fn refusal(mesh: Mesh) -> String {
-    check(mesh).expect_err("an unusable mesh").to_string()
+    mesh.checked().expect_err("an unusable mesh").to_string()
 }
 
 fn volumes(mesh: &Mesh) -> impl Iterator<Item = f64> {
@@ -41,7 +41,7 @@ fn beside(mut mesh: Mesh, other: &Mesh, shift: DVec3) -> Mesh {
     mesh
 }
 
-/// The same tetrahedra, each with four nodes of its own.
+/// The tetrahedra of a mesh, each with four nodes of its own.
 fn torn(mesh: &Mesh) -> Mesh {
     let nodes = mesh.tets.iter().flatten().map(|&node| mesh.nodes[node as usize]).collect();
     let tets = (0..mesh.tets.len() as u32).map(|at| [0, 1, 2, 3].map(|corner| 4 * at + corner)).collect();
@@ -49,7 +49,7 @@ fn torn(mesh: &Mesh) -> Mesh {
 }
 
 #[test]
-fn a_sound_mesh_passes_unchanged_and_without_remarks() {
+fn a_sound_mesh_passes_unchanged_and_without_warnings() {
     for mesh in [cube(), ball_mesh(0.05, 3).expect("a good ball")] {
         assert_eq!(sound(mesh.clone()), mesh);
     }
@@ -61,15 +61,15 @@ fn inverted_tetrahedra_are_turned_and_counted() {
     inverted.tets.iter_mut().for_each(|tet| tet.swap(2, 3));
     let turned = sound(inverted);
     assert_eq!(turned.tets, cube().tets);
-    let remark = "40 of 40 tetrahedra were inverted (corners in the other order) and were turned";
-    assert_eq!(turned.remarks, [remark]);
+    let warning = "40 of 40 tetrahedra were inverted (corners in the other order) and were turned";
+    assert_eq!(turned.warnings, [warning]);
 
     let mut inverted = cube();
     inverted.tets[17].swap(0, 1);
     let turned = sound(inverted);
     assert!(volumes(&turned).all(|volume| volume > 0.0));
-    let remark = "1 of 40 tetrahedra were inverted (corners in the other order) and were turned";
-    assert_eq!(turned.remarks, [remark]);
+    let warning = "1 of 40 tetrahedra were inverted (corners in the other order) and were turned";
+    assert_eq!(turned.warnings, [warning]);
 }
 
 #[test]
@@ -148,6 +148,16 @@ fn nodes_that_are_not_finite_or_do_not_exist_are_named() {
 }
 
 #[test]
+fn errors_are_kinds_with_numbers() {
+    let mut mesh = cell();
+    mesh.tets[2][3] = 8;
+    let error = mesh.checked().expect_err("an unusable mesh");
+    assert!(matches!(error, MeshError::NodeNumber { tetrahedron: 2, node: 8, nodes: 8 }), "{error:?}");
+    let error = beside(cell(), &cube(), DVec3::X).checked().expect_err("an unusable mesh");
+    assert!(matches!(error, MeshError::Disconnected { pieces: 2, coincident: None, .. }), "{error:?}");
+}
+
+#[test]
 fn a_mesh_without_tetrahedra_is_refused() {
     let text = "the mesh has no tetrahedra; palpate needs a volume mesh, not a surface";
     assert_eq!(refusal(Mesh::default()), text);
@@ -174,7 +184,7 @@ fn bodies_that_share_only_an_edge_or_a_node_are_refused() {
                 && apart.contains("lie on the same point, --merge-nodes joins such nodes"),
             "{apart}"
         );
-        assert_eq!(merge_nodes(&mut mesh), shared);
+        assert_eq!(mesh.merge_coincident_nodes(), shared);
         let joined = refusal(mesh);
         assert!(
             joined.starts_with("the mesh is disconnected: 2 pieces that share no face (5 tetrahedra near ")
@@ -195,10 +205,10 @@ fn tetrahedra_with_own_nodes_are_refused_and_sound_once_merged() {
          --merge-nodes joins such nodes"
     );
     // 20 corners on 8 points.
-    assert_eq!(merge_nodes(&mut mesh), 12);
+    assert_eq!(mesh.merge_coincident_nodes(), 12);
     let merged = sound(mesh);
-    assert_eq!(merged.remarks, ["12 nodes belong to no tetrahedron and are left out"]);
-    assert_eq!(boundary(&merged.tets).len(), 12);
+    assert_eq!(merged.warnings, ["12 nodes belong to no tetrahedron and are left out"]);
+    assert_eq!(merged.boundary().len(), 12);
     let volume: f64 = volumes(&merged).sum();
     assert!((volume / 1e-3 - 1.0).abs() < SUMMED, "{volume}");
 }
@@ -210,11 +220,11 @@ fn merging_bridges_the_rounding_of_a_file_and_nothing_wider() {
         let mut mesh = torn(&cube());
         mesh.nodes.iter_mut().skip(1).step_by(3).for_each(|node| node.x += shift);
         mesh.nodes.iter_mut().skip(2).step_by(3).for_each(|node| node.z -= shift);
-        merge_nodes(&mut mesh);
-        let merged = check(mesh);
+        mesh.merge_coincident_nodes();
+        let merged = mesh.checked();
         assert_eq!(merged.is_ok(), joins, "shift {shift}: {merged:?}");
         if let Ok(mesh) = merged {
-            let surface = boundary(&mesh.tets);
+            let surface = mesh.boundary();
             assert_eq!(surface.len(), 6 * 4 * 2, "the surface of a whole cube");
         }
     }
@@ -225,7 +235,7 @@ fn merging_a_sound_mesh_changes_nothing() {
     let mut mesh = cube();
     mesh.groups.push(NodeGroup { name: "foot".into(), nodes: vec![0, 1, 2] });
     let before = mesh.clone();
-    assert_eq!(merge_nodes(&mut mesh), 0);
+    assert_eq!(mesh.merge_coincident_nodes(), 0);
     assert_eq!(mesh, before);
 }
 
@@ -237,14 +247,14 @@ fn groups_follow_their_nodes_when_these_are_merged() {
     };
     mesh.groups.push(NodeGroup { name: "foot".into(), nodes: foot(&mesh) });
     assert_eq!(mesh.groups[0].nodes.len(), 10);
-    merge_nodes(&mut mesh);
+    mesh.merge_coincident_nodes();
     let nodes = &mesh.groups[0].nodes;
     assert!(nodes.len() == 4 && nodes.is_sorted_by(|a, b| a < b), "{nodes:?}");
     assert!(nodes.iter().all(|node| mesh.tets.iter().flatten().any(|used| used == node)));
 }
 
 #[test]
-fn a_slit_gets_a_remark_and_stays_open_until_merged() {
+fn a_slit_gets_a_warning_and_stays_open_until_merged() {
     // The right half uses its own copy of the node in the middle of an edge of the cube: faces there come apart, the
     // halves still join through the others.
     let mut mesh = cube();
@@ -259,34 +269,35 @@ fn a_slit_gets_a_remark_and_stays_open_until_merged() {
     }
     let open = sound(mesh.clone());
     assert_eq!(
-        open.remarks,
+        open.warnings,
         [format!(
             "1 pairs of nodes lie on the same point (nodes {node} and {copy}, counted from 0, at (0.0000e0, 5.0000e-2, \
              5.0000e-2) m): the body is slit open there. If it should not be, use --merge-nodes"
         )]
     );
-    assert!(boundary(&open.tets).len() > 48, "the slit has faces of its own");
-    assert_eq!(merge_nodes(&mut mesh), 1);
-    assert_eq!(boundary(&sound(mesh).tets).len(), 48);
+    assert!(open.boundary().len() > 48, "the slit has faces of its own");
+    assert_eq!(mesh.merge_coincident_nodes(), 1);
+    assert_eq!(sound(mesh).boundary().len(), 48);
 }
 
 #[test]
-fn unused_nodes_get_a_remark_wherever_they_are() {
+fn unused_nodes_get_a_warning_wherever_they_are() {
     let mut mesh = cube();
     mesh.nodes.extend([DVec3::splat(1e4), DVec3::ZERO, DVec3::splat(f64::NAN)]);
-    assert_eq!(sound(mesh).remarks, ["3 nodes belong to no tetrahedron and are left out"]);
+    assert_eq!(sound(mesh).warnings, ["3 nodes belong to no tetrahedron and are left out"]);
 }
 
 #[test]
-fn sizes_that_look_like_another_unit_get_a_remark() {
-    let remarks = |size| sound(box_mesh([size, 0.5 * size, 0.5 * size], [2; 3]).expect("a good box")).remarks;
-    assert_eq!(remarks(10.0), ["the body is 10 m large; if the file is in millimetres, use --scale 0.001"]);
-    assert_eq!(remarks(1e-5), ["the body is only 0.00001 m large; is the scale right? (--scale)"]);
-    assert!(remarks(3.0).is_empty() && remarks(1e-3).is_empty());
+fn sizes_that_look_like_another_unit_get_a_warning() {
+    let warnings =
+        |size| sound(box_mesh([size, 0.5 * size, 0.5 * size], [2; 3]).expect("a good box")).warnings;
+    assert_eq!(warnings(10.0), ["the body is 10 m large; if the file is in millimetres, use --scale 0.001"]);
+    assert_eq!(warnings(1e-5), ["the body is only 0.00001 m large; is the scale right? (--scale)"]);
+    assert!(warnings(3.0).is_empty() && warnings(1e-3).is_empty());
 }
 
 #[test]
-fn slivers_get_a_remark_with_the_worst_and_its_quality() {
+fn slivers_get_a_warning_with_the_worst_and_its_quality() {
     // Node 0 at a height above the middle of the face of nodes 1, 2, 4, which has three sides of 0.1·√2 m.
     let (height, side_squared) = (1e-4, 0.02);
     let mut mesh = cell();
@@ -296,7 +307,7 @@ fn slivers_get_a_remark_with_the_worst_and_its_quality() {
     let squares = 3.0 * side_squared + 3.0 * (side_squared / 3.0 + height * height);
     let quality = 12.0 * (area * height).powf(2.0 / 3.0) / squares;
     assert_eq!(
-        sound(mesh).remarks,
+        sound(mesh).warnings,
         [format!(
             "1 tetrahedra are slivers, the worst is 0 near (-1.6681e-2, -1.6681e-2, -1.6681e-2) m with quality \
              {quality:.4} (1 is regular): responses are too stiff there"
@@ -307,7 +318,7 @@ fn slivers_get_a_remark_with_the_worst_and_its_quality() {
 #[test]
 fn the_boundary_is_closed_looks_outward_and_holds_the_volume() {
     for mesh in [cube(), cell(), ball_mesh(0.05, 2).expect("a good ball")] {
-        let triangles = boundary(&mesh.tets);
+        let triangles = mesh.boundary();
         let mut edges: Vec<_> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
         edges.sort_unstable();
         for [a, b] in &edges {
@@ -337,7 +348,7 @@ proptest! {
         }
         let mesh = sound(mesh);
         prop_assert!(volumes(&mesh).all(|volume| volume > 0.0));
-        prop_assert_eq!(boundary(&mesh.tets).len(), 48);
+        prop_assert_eq!(mesh.boundary().len(), 48);
     }
 
     #[test]
@@ -355,9 +366,9 @@ proptest! {
             mesh.nodes[node][axis] = value;
         }
         if merge {
-            merge_nodes(&mut mesh);
+            mesh.merge_coincident_nodes();
         }
-        if let Ok(mesh) = check(mesh) {
+        if let Ok(mesh) = mesh.checked() {
             prop_assert!(volumes(&mesh).all(|volume| volume > 0.0 && volume.is_finite()));
         }
     }

@@ -1,4 +1,4 @@
-//! The force process (paper, section 3.2): newest positions in, one step, forces out.
+//! Force process (paper, section 3.2): newest positions in, one step, forces out.
 
 use crate::motion_path::MotionPath;
 use crate::port::{Effort, ForcePort, Motion};
@@ -6,161 +6,170 @@ use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
 
-/// Where an obstacle is at a time of the simulation [s]. It must not allocate.
+/// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
 pub type ObstacleTrajectory = Box<dyn Fn(f64) -> Pose + Send>;
 
-/// A device as the force process sees it.
-struct Seat {
+/// Steps of the warm-up.
+const WARM_UP_STEPS: usize = 50;
+
+/// Device slot: a device as the force process sees it.
+struct DeviceSlot {
     port: ForcePort,
-    /// What it does while it is there and says nothing else.
+    /// Mode while the device is active and its motion names no other.
     mode: DeviceMode,
-    /// A path in simulated time that it follows, whatever its port tells.
+    /// Path in simulated time that the device follows in place of its port's motions.
     path: Option<MotionPath>,
-    /// The motion that was used last.
+    /// Motion that was used last.
     motion: Motion,
-    /// See [`Effort::taken_j`]: what went into the proxy, and the proxy then.
-    worked_j: f64,
+    /// Work that the proxy has done on the scene since the start [J], see [`Effort::absorbed_j`].
+    proxy_work_j: f64,
+    /// Proxy at the end of the last step [m, world].
     proxy: DVec3,
+    /// Stiffness of the virtual coupling [N/m].
     stiffness: f64,
     sequence: u64,
 }
 
-/// The force process without its thread: what happens in a cycle.
+/// Force process without its thread: a function of time.
 pub struct ForceProcess {
     model: Arc<Model>,
     state: State,
     input: Input,
-    seats: Vec<Seat>,
-    movers: Vec<ObstacleTrajectory>,
+    slots: Vec<DeviceSlot>,
+    obstacle_trajectories: Vec<ObstacleTrajectory>,
     steps: u64,
-    /// A device that has told nothing for so long [s] is away.
-    patience_s: f64,
+    /// Silence of a device [s] after which it is inactive.
+    device_timeout_s: f64,
 }
 
 impl ForceProcess {
-    /// Of a scene at its start. Devices that tell nothing for longer than `patience_s` [s] are away until they do again.
-    ///
-    /// There is a mover for each obstacle, and a port with a mode for each device of the model.
+    /// Force process at the model's initial state, with a port and a mode for each device of the model and a trajectory for each
+    /// obstacle. A device that is silent for longer than `device_timeout_s` [s] is inactive until it sends again.
     pub fn new(
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        movers: Vec<ObstacleTrajectory>,
-        patience_s: f64,
+        obstacle_trajectories: Vec<ObstacleTrajectory>,
+        device_timeout_s: f64,
     ) -> Self {
         let state = State::new(&model);
-        Self::from_state(state, model, devices, movers, patience_s)
+        Self::from_state(state, model, devices, obstacle_trajectories, device_timeout_s)
     }
 
-    /// The same from a state of the model's.
+    /// Force process at a state of the model, otherwise as [`Self::new`].
     pub fn from_state(
         state: State,
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        movers: Vec<ObstacleTrajectory>,
-        patience_s: f64,
+        obstacle_trajectories: Vec<ObstacleTrajectory>,
+        device_timeout_s: f64,
     ) -> Self {
         let coupling = |at: usize| model.parameters().devices.get(at).and_then(|device| device.coupling);
-        let seats = devices.into_iter().enumerate().map(|(at, (port, mode))| Seat {
+        let slots = devices.into_iter().enumerate().map(|(at, (port, mode))| DeviceSlot {
             port,
             mode,
             path: None,
             motion: Motion::default(),
-            worked_j: 0.0,
+            proxy_work_j: 0.0,
             proxy: DVec3::ZERO,
             stiffness: coupling(at).map_or(0.0, |coupling| coupling.stiffness),
             sequence: 0,
         });
-        let seats: Vec<Seat> = seats.collect();
-        let obstacles = movers.iter().map(|mover| mover(0.0)).collect();
-        let input = Input { devices: vec![DeviceInput::inactive(); seats.len()], obstacles };
-        Self { model, state, input, seats, movers, steps: 0, patience_s }
+        let slots: Vec<DeviceSlot> = slots.collect();
+        let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
+        let input = Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles };
+        Self { model, state, input, slots, obstacle_trajectories, steps: 0, device_timeout_s }
     }
 
-    /// Let a device follow a path exactly: by simulated time, also where that is slower than the clock.
+    /// Lets a device follow a path in simulated time, also where that runs slower than the clock.
     ///
     /// # Panics
-    /// When there is no such device.
+    /// If the model has no such device.
     pub fn follow(&mut self, device: usize, path: MotionPath) {
-        self.seats[device].path = Some(path);
+        self.slots[device].path = Some(path);
     }
 
-    /// The scene as it is.
+    /// State of the scene.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// The same, when there are no more cycles.
+    /// State of the scene, taken out of the process.
     pub fn into_state(self) -> State {
         self.state
     }
 
-    /// What holds for the scene.
+    /// Model of the scene.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
     }
 
-    /// The input of the last step.
+    /// Input of the last step.
     pub fn input(&self) -> &Input {
         &self.input
     }
 
-    /// Steps since the start.
+    /// Number of steps since the start.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// Touch all memory that steps use, and bring the code in: a few steps on a copy.
+    /// Warms the caches with a few steps on a copy of the state: touches all memory and code that steps use.
     pub fn warm_up(&self) {
         let mut copy = self.state.clone();
-        for _ in 0..50 {
+        for _ in 0..WARM_UP_STEPS {
             step(&self.model, &mut copy, &self.input);
         }
     }
 
-    /// Take the newest motions, advance the scene by a step, answer with forces.
+    /// Cycle at a time [s]: takes the newest motions, advances the scene by one step, sends efforts.
     ///
     /// # Real time
-    /// No allocation, lock or system call; costs what [`palpate::step`] costs.
+    /// No allocation, lock or system call. Cost: one [`palpate::step`].
     pub fn cycle(&mut self, now_s: f64) -> &Output {
         self.steps += 1;
         let time_s = self.steps as f64 * self.model.parameters().step_s;
-        for (seat, input) in self.seats.iter_mut().zip(&mut self.input.devices) {
-            let mut motion = seat.port.newest();
-            if let Some(path) = &seat.path {
+
+        // Motions become the input of the step. Silent devices, and positions that are not finite, are inactive.
+        for (slot, input) in self.slots.iter_mut().zip(&mut self.input.devices) {
+            let mut motion = slot.port.newest();
+            if let Some(path) = &slot.path {
                 let position = path.at(time_s).position;
                 motion = Motion { sequence: self.steps, time_s: now_s, position, ..Motion::default() };
             }
-            let silent = motion.sequence == 0 || now_s - motion.time_s > self.patience_s;
+            let silent = motion.sequence == 0 || now_s - motion.time_s > self.device_timeout_s;
             if motion.position.is_finite() {
-                seat.motion = motion;
+                slot.motion = motion;
             }
             *input = if silent || !motion.position.is_finite() {
                 DeviceInput::inactive()
             } else {
-                DeviceInput { position: motion.position, mode: motion.mode.unwrap_or(seat.mode) }
+                DeviceInput { position: motion.position, mode: motion.mode.unwrap_or(slot.mode) }
             };
         }
-        for (mover, pose) in self.movers.iter().zip(&mut self.input.obstacles) {
-            *pose = mover(time_s);
+        for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
+            *pose = trajectory(time_s);
         }
+
         let output = step(&self.model, &mut self.state, &self.input);
-        for ((seat, input), device) in self.seats.iter_mut().zip(&self.input.devices).zip(&output.devices) {
+
+        // Absorbed energy: work of the proxy, −Σ F·Δproxy, and the energy of the coupling's spring, ½·k·|stretch|².
+        for ((slot, input), device) in self.slots.iter_mut().zip(&self.input.devices).zip(&output.devices) {
             let force = device.force_on_hand;
             if input.mode == DeviceMode::Inactive {
-                seat.proxy = seat.motion.position;
+                slot.proxy = slot.motion.position;
             } else {
-                seat.worked_j -= force.dot(device.proxy - seat.proxy);
-                seat.proxy = device.proxy;
+                slot.proxy_work_j -= force.dot(device.proxy - slot.proxy);
+                slot.proxy = device.proxy;
             }
-            let stretch = seat.motion.position - seat.proxy;
-            let stored = 0.5 * seat.stiffness * stretch.length_squared();
-            seat.sequence += 1;
-            seat.port.answer(Effort {
-                sequence: seat.sequence,
-                answers: seat.motion.sequence,
+            let stretch = slot.motion.position - slot.proxy;
+            let stored = 0.5 * slot.stiffness * stretch.length_squared();
+            slot.sequence += 1;
+            slot.port.send(Effort {
+                sequence: slot.sequence,
+                in_reply_to: slot.motion.sequence,
                 time_s: now_s,
                 force,
-                taken_j: seat.worked_j + stored,
+                absorbed_j: slot.proxy_work_j + stored,
             });
         }
         output

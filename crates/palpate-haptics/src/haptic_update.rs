@@ -1,221 +1,239 @@
-//! The haptic update (paper, section 3.2): the device side, at the device's own rate.
+//! Haptic update (paper, section 3.2): the device side, at the device's own rate.
 
-use crate::device::{Device, Mount, Traits};
+use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::Error;
 use crate::passivity::PassivityController;
 use crate::port::{DevicePort, Motion};
 use crate::safety::{Safety, SafetyCounts};
-use crate::timing::Spread;
+use crate::timing::DurationHistogram;
 use glam::{DQuat, DVec3};
 use std::time::Duration;
 
-/// Motions of which it is remembered when they were told.
-const TOLD: usize = 1024;
+/// Capacity of the history of send times [motions].
+const HISTORY: usize = 1024;
 
-/// A device that has told nothing for so long [s] is lost: force passes again at a press of its button only, if it has one.
+/// Time without a reading [s] after which a device counts as lost. Force then passes only after another press of its button, if it
+/// is armed by a button.
 const LOST_S: f64 = 0.1;
 
-/// What is told of an encoder's steps is smoothed over this share of the time that answers take: a coupling's damper would make a
-/// blow of every step.
-const SMOOTHED: f64 = 0.1;
+/// Time constant of the position filter, as a share of the motion-to-force latency. Positions in encoder steps are low-pass filtered:
+/// a coupling's damper would turn every step into a blow.
+const FILTER_SHARE: f64 = 0.1;
 
-/// One device's haptic update without its thread: what happens in a cycle.
+/// Haptic update of one device without its thread: a function of time.
 pub struct HapticUpdate {
     device: Box<dyn Device>,
     port: DevicePort,
     mount: Mount,
     safety: Safety,
     passivity: Option<PassivityController>,
-    /// Wait for a button before force passes.
-    by_button: bool,
-    /// The buttons of the last reading; all of them before the first, so that one that is held does not count as pressed.
+    /// Whether a button press arms the force.
+    arm_by_button: bool,
+    /// Buttons of the last reading; all before the first, so that a button that is held from the start does not count as pressed.
     buttons: u32,
     sequence: u64,
-    /// When motions were told [s], by their sequence; the newest that was answered, and how long answers took.
-    told: Box<[f64]>,
-    answered: u64,
-    answers: Spread,
+    /// Send times of motions [s], by sequence number modulo [`HISTORY`].
+    sent_at: Box<[f64]>,
+    /// Newest motion that was replied to.
+    replied: u64,
+    motion_to_force: DurationHistogram,
+    /// Time [s] and position [m, world] of the last reading.
     last: Option<(f64, DVec3)>,
-    /// The place that was told last [m].
-    placed: Option<DVec3>,
-    /// When the last update was [s].
-    updated: Option<f64>,
-    /// Why a reading or a push failed first.
+    /// Filtered position that was sent last [m, world].
+    filtered_position: Option<DVec3>,
+    /// Time of the last update [s].
+    updated_s: Option<f64>,
+    /// First failure of the device.
     failure: Option<Error>,
-    /// The force that the device holds [N, world].
+    /// Force that the device holds [N, world].
     held: DVec3,
     counts: UpdateCounts,
 }
 
-/// What happened to a device.
+/// Counters of a haptic update.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct UpdateCounts {
     /// Updates.
     pub updates: u64,
-    /// Readings and pushes that failed.
+    /// Failed calls of the device.
     pub failed: u64,
-    /// What the safety met.
+    /// Counters of the safety.
     pub safety: SafetyCounts,
     /// Updates in which the passivity controller changed the force.
-    pub passivity_acted: u64,
-    /// Most energy [J] that was missing at once.
-    pub passivity_worst_j: f64,
-    /// Largest force [N] that went to the device.
+    pub passivity_active_updates: u64,
+    /// Largest energy deficit that the passivity observer saw [J].
+    pub passivity_max_deficit_j: f64,
+    /// Largest force on the hand [N].
     pub force_max_n: f64,
-    /// Work [J, world] on the hand since the start.
-    pub given_j: f64,
+    /// Work of the device on the hand since the start [J].
+    pub work_on_hand_j: f64,
 }
 
 impl HapticUpdate {
-    /// For a device on a mount. Without a passivity controller the port's energy is not looked at. Force passes when the
-    /// safety is armed: at the first press of a button, or from the start.
+    /// Haptic update of a device on a mount; without a passivity controller, the port's energy is not observed. The safety is armed
+    /// from the start, or at the first press of a button if `arm_by_button` is set.
     pub fn new(
         device: Box<dyn Device>,
         port: DevicePort,
         mount: Mount,
         mut safety: Safety,
         passivity: Option<PassivityController>,
-        by_button: bool,
+        arm_by_button: bool,
     ) -> Self {
-        safety.arm(!by_button);
+        safety.arm(!arm_by_button);
         Self {
             device,
             port,
             mount,
             safety,
             passivity,
-            by_button,
+            arm_by_button,
             buttons: u32::MAX,
             sequence: 0,
-            told: vec![0.0; TOLD].into_boxed_slice(),
-            answered: 0,
-            answers: Spread::default(),
+            sent_at: vec![0.0; HISTORY].into_boxed_slice(),
+            replied: 0,
+            motion_to_force: DurationHistogram::default(),
             last: None,
-            placed: None,
-            updated: None,
+            filtered_position: None,
+            updated_s: None,
             failure: None,
             held: DVec3::ZERO,
             counts: UpdateCounts::default(),
         }
     }
 
-    /// What its device is.
-    pub fn traits(&self) -> Traits {
-        self.device.traits()
+    /// Specification of the device.
+    pub fn spec(&self) -> DeviceSpec {
+        self.device.spec()
     }
 
-    /// How long it took from a motion to an effort that answers it or a later one, as the update saw it.
-    pub fn answers(&self) -> &Spread {
-        &self.answers
+    /// Histogram of the motion-to-force latency: from sending a motion to an effort that replies to it or to a later one.
+    pub fn motion_to_force(&self) -> &DurationHistogram {
+        &self.motion_to_force
     }
 
-    /// What has happened.
+    /// Counters since the start.
     pub fn counts(&self) -> UpdateCounts {
         let mut counts = UpdateCounts { safety: self.safety.counts(), ..self.counts };
         if let Some(passivity) = &self.passivity {
-            counts.passivity_acted = passivity.acted();
-            counts.passivity_worst_j = passivity.worst_j();
+            counts.passivity_active_updates = passivity.active_updates();
+            counts.passivity_max_deficit_j = passivity.max_deficit_j();
         }
         counts
     }
 
-    /// Why a reading or a push failed, the first time.
+    /// Force that the device holds [N, world].
+    pub fn held_force(&self) -> DVec3 {
+        self.held
+    }
+
+    /// First failure of the device.
     pub fn failure(&self) -> Option<&Error> {
         self.failure.as_ref()
     }
 
-    /// Read the device, tell the force process, push the hand with the newest force as far as it is passive and safe.
+    /// Cycle at a time [s]: reads the device, sends the motion, commands the newest force as far as it is passive and safe.
     ///
     /// # Real time
-    /// No allocation, lock or system call but those of the driver.
+    /// No allocation, lock or system call except the driver's.
     pub fn cycle(&mut self, now_s: f64) {
         self.counts.updates += 1;
         let effort = self.port.newest();
-        if effort.answers > self.answered && effort.answers + TOLD as u64 > self.sequence {
-            self.answered = effort.answers;
-            let told = self.told[(effort.answers % TOLD as u64) as usize];
-            self.answers.record(Duration::from_secs_f64((now_s - told).max(0.0)));
+        if effort.in_reply_to > self.replied && effort.in_reply_to + HISTORY as u64 > self.sequence {
+            self.replied = effort.in_reply_to;
+            let sent = self.sent_at[(effort.in_reply_to % HISTORY as u64) as usize];
+            self.motion_to_force.record(Duration::from_secs_f64((now_s - sent).max(0.0)));
         }
         let age_s = if effort.sequence == 0 { f64::INFINITY } else { now_s - effort.time_s };
-        let since_update = self.updated.replace(now_s).map_or(0.0, |time| now_s - time);
+        let since_update = self.updated_s.replace(now_s).map_or(0.0, |time| now_s - time);
+
+        // Read. A device that fails gets no force, and is disarmed when it is lost.
         let reading = match self.device.read(now_s) {
             Ok(reading) => reading,
             Err(error) => {
-                // Whatever it does with that, it is not pushed.
-                self.failed(error);
-                if self.by_button && self.last.is_none_or(|(time, _)| now_s - time > LOST_S) {
+                self.note_failure(error);
+                if self.arm_by_button && self.last.is_none_or(|(time, _)| now_s - time > LOST_S) {
                     self.safety.arm(false);
                     self.buttons = u32::MAX;
                 }
                 let force = self.safety.limit(effort.force, f64::INFINITY, 0.0, since_update);
-                self.push(force, now_s);
+                self.set_force(force, now_s);
                 return;
             }
         };
+
+        // Send the motion.
         let position = self.mount.world_from_device(reading.position);
         if position.is_finite() {
             self.sequence += 1;
-            self.told[(self.sequence % TOLD as u64) as usize] = now_s;
+            self.sent_at[(self.sequence % HISTORY as u64) as usize] = now_s;
             let orientation = reading.orientation.unwrap_or(DQuat::IDENTITY);
-            let placed = self.smoothed(position, now_s, since_update);
-            self.port.tell(Motion {
+            let filtered = self.filter(position, now_s, since_update);
+            self.port.send(Motion {
                 sequence: self.sequence,
                 time_s: now_s,
-                position: placed,
+                position: filtered,
                 orientation: self.mount.world_orientation(orientation),
                 buttons: reading.buttons,
                 mode: None,
             });
         }
-        if self.by_button && reading.buttons & !self.buttons != 0 {
+        if self.arm_by_button && reading.buttons & !self.buttons != 0 {
             self.safety.arm(true);
         }
         self.buttons = reading.buttons;
+
+        // Work on the hand, and its speed.
         let before = self.last.replace((now_s, position));
         let (dt, moved) = before.map_or((0.0, DVec3::ZERO), |(time, last)| (now_s - time, position - last));
         if moved.is_finite() {
-            self.counts.given_j += self.held.dot(moved);
+            self.counts.work_on_hand_j += self.held.dot(moved);
         }
         let speed = if dt > 0.0 { moved.length() / dt / self.mount.scale } else { 0.0 };
+
+        // Command the force, made passive and safe.
         let wanted = match &mut self.passivity {
             Some(passivity) => passivity.control(self.sequence, position, &effort, dt),
             None => effort.force,
         };
         let force = self.safety.limit(wanted, age_s, speed, since_update);
-        self.push(force, now_s);
+        self.set_force(force, now_s);
     }
 
-    /// A place that was read [m, world], smoothed if it comes in steps.
-    fn smoothed(&mut self, position: DVec3, now_s: f64, dt_s: f64) -> DVec3 {
-        let told_s = self.told[(self.answered % TOLD as u64) as usize];
-        let over_s = if self.answered > 0 && self.device.traits().resolution_m > 0.0 {
-            SMOOTHED * (now_s - told_s).clamp(0.0, LOST_S)
+    /// Position [m, world], low-pass filtered if the device has an encoder.
+    fn filter(&mut self, position: DVec3, now_s: f64, dt_s: f64) -> DVec3 {
+        let sent_s = self.sent_at[(self.replied % HISTORY as u64) as usize];
+        let time_constant_s = if self.replied > 0 && self.device.spec().resolution_m > 0.0 {
+            FILTER_SHARE * (now_s - sent_s).clamp(0.0, LOST_S)
         } else {
             0.0
         };
-        let before = self.placed.unwrap_or(position);
-        let placed =
-            if dt_s > 0.0 { before + (position - before) * (dt_s / (dt_s + over_s)) } else { position };
-        *self.placed.insert(placed)
+        let before = self.filtered_position.unwrap_or(position);
+        let filtered = if dt_s > 0.0 {
+            before + (position - before) * (dt_s / (dt_s + time_constant_s))
+        } else {
+            position
+        };
+        *self.filtered_position.insert(filtered)
     }
 
-    /// Push the hand no more.
-    pub fn let_go(&mut self, now_s: f64) {
-        self.push(DVec3::ZERO, now_s);
+    /// Commands zero force.
+    pub fn release(&mut self, now_s: f64) {
+        self.set_force(DVec3::ZERO, now_s);
     }
 
-    fn push(&mut self, force: DVec3, now_s: f64) {
+    fn set_force(&mut self, force: DVec3, now_s: f64) {
         if let Some(passivity) = &mut self.passivity {
             passivity.hold(force);
         }
         self.held = force;
         self.counts.force_max_n = self.counts.force_max_n.max(force.length());
-        if let Err(error) = self.device.push(self.mount.device_force(force), now_s) {
-            self.failed(error);
+        if let Err(error) = self.device.set_force(self.mount.device_force(force), now_s) {
+            self.note_failure(error);
         }
     }
 
-    fn failed(&mut self, error: Error) {
+    fn note_failure(&mut self, error: Error) {
         self.counts.failed += 1;
         self.failure.get_or_insert(error);
     }

@@ -1,23 +1,32 @@
-//! palpate in real time: the three processes of the paper (section 3.2) as threads, devices, and a log.
+//! palpate in real time: the three processes of the paper (section 3.2) as threads, haptic devices, links and logs.
 //!
 //! ```text
-//! device ⇄ haptic update ⇄ port ⇄ FORCE PROCESS → deformation process → picture
+//! device ⇄ haptic update ⇄ port ⇄ FORCE PROCESS → deformation process → display
 //!          (safety, passivity)          ↘ log
 //! ```
 //!
-//! - The **force process** takes the newest device positions, advances the scene by one step and gives forces, at absolute
-//!   deadlines. Its cycle allocates nothing, takes no lock and makes no system call but the clock's wait.
-//! - The **deformation process** makes whole surfaces for the eye, at its own pace, from the newest state.
-//! - The **haptic update** drives one device at the device's own rate. What goes to the hand passes the passivity controller
-//!   and the safety limits there, whatever the force process says.
+//! - The **force process** takes the newest device positions, advances the scene by one step and sends forces, at absolute
+//!   deadlines. Its cycle makes no allocation, takes no lock, and makes no system call except the clock's wait.
+//! - The **deformation process** computes deformed surfaces for display from the newest [`Snapshot`], at its own rate.
+//! - The **haptic update** serves one device at the device's own rate. Every force passes the passivity controller and the safety
+//!   limits there, whatever the force process sends.
 //!
-//! They hand over through triple buffers: nobody waits for anybody. Times are in seconds since a common start, and the
-//! cycles are plain functions of them, so that a loop can also be closed in simulated time.
+//! The processes exchange values through triple buffers: no process waits for another. Times are in seconds since a common start, and
+//! a cycle is a function of time, so that a loop can also be closed in simulated time, without threads.
+//!
+//! | you want to | start with |
+//! |---|---|
+//! | run a scene with devices in real time | [`Session`] |
+//! | close a loop in simulated time | [`ForceProcess`], [`HapticUpdate`], [`port()`] |
+//! | write or use a driver | [`device`] |
+//! | connect a device over a network | [`link`] |
+//! | write, read or replay a log | [`log`] |
+//! | choose a stable virtual coupling | [`stability`] |
 
 mod clock;
 mod deformation_process;
 pub mod device;
-mod error;
+pub mod error;
 mod force_process;
 mod haptic_update;
 pub mod link;
@@ -31,19 +40,25 @@ mod scheduling;
 mod session;
 mod snapshot;
 pub mod stability;
-mod timing;
+pub mod timing;
 
 pub use clock::Clock;
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
+#[doc(no_inline)]
 pub use error::Error;
 pub use force_process::{ForceProcess, ObstacleTrajectory};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
-pub use motion_path::{Columns, MotionPath, orientation};
+pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;
 pub use playback::Playback;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};
 pub use safety::{Safety, SafetyCounts, SafetyLimits};
 pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
-pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_update};
+pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
 pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer};
-pub use timing::{Cycle, CycleReceiver, CycleSender, Percentiles, Spread, Timing, cycles};
+#[doc(no_inline)]
+pub use timing::{Cycle, CycleReceiver, CycleSender, DurationHistogram, Percentiles, Timing, cycle_channel};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

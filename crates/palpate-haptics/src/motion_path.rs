@@ -1,26 +1,26 @@
-//! The path of a device or an obstacle: poses over time, linear between rows, constant before and after.
+//! Path of a device or an obstacle: poses over time, linear between rows, constant before the first and after the last.
 
 use glam::{DQuat, DVec3};
 use palpate::Pose;
+use thiserror::Error as ThisError;
 
-/// Times [s] and lengths [m] beyond this are no path's.
+/// Bound on times [s], lengths [m] and quaternion components: beyond it the unit is wrong.
 const LARGEST: f64 = 1e6;
 
-/// What a path file may hold.
+/// Columns that a path file may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Columns {
-    /// t, x, y, z.
+    /// t [s], x, y, z [m].
     Position,
-    /// t, x, y, z, and perhaps the orientation qw, qx, qy, qz.
+    /// t [s], x, y, z [m], optionally with the orientation qw, qx, qy, qz.
     Pose,
 }
 
-/// Rows (t [s], place in the world), t ascending.
+/// Path: rows of time [s] and pose [m, world], time ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPath {
     rows: Vec<(f64, Pose)>,
-    turns: bool,
-    /// Whether it begins again at its end.
+    has_orientations: bool,
     repeats: bool,
 }
 
@@ -28,13 +28,13 @@ const POSITION: [&str; 4] = ["t", "x", "y", "z"];
 const POSE: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
 
 impl MotionPath {
-    /// From CSV text with such columns; a header line and lines that start with # are passed over.
+    /// Path from CSV text with the given columns. A header line and lines that start with # are skipped.
     ///
     /// # Errors
-    /// What is wrong, by the line.
-    pub fn parse(text: &str, columns: Columns) -> Result<Self, String> {
+    /// If a line has other columns, numbers that are not finite or below 10⁶, or a time that does not ascend.
+    pub fn parse(text: &str, columns: Columns) -> Result<Self, PathError> {
         let mut rows: Vec<(f64, Pose)> = Vec::new();
-        // How many columns all rows have: those of the first.
+        // Number of columns of all rows: that of the first.
         let mut width = None;
         let mut may_be_header = true;
         for (at, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
@@ -42,7 +42,7 @@ impl MotionPath {
             if line.is_empty() || line.starts_with('#') {
                 continue;
             }
-            let place = format!("line {}", at + 1);
+            let number = at + 1;
             let cells: Vec<&str> = line.split(',').map(str::trim).collect();
             let numbers: Result<Vec<f64>, _> = cells.iter().map(|cell| cell.parse::<f64>()).collect();
             let header = std::mem::replace(&mut may_be_header, false);
@@ -50,63 +50,55 @@ impl MotionPath {
                 Ok(numbers) => numbers,
                 Err(_) if header && cells.iter().all(|cell| cell.parse::<f64>().is_err()) => {
                     if cells != POSITION && (columns == Columns::Position || cells != POSE) {
-                        return Err(format!(
-                            "{place}: the columns are {}, expected {}",
-                            cells.join(","),
-                            columns.names()
-                        ));
+                        let (found, expected) = (cells.join(","), columns.names());
+                        return Err(PathError::Header { line: number, found, expected });
                     }
                     width = Some(cells.len());
                     continue;
                 }
                 Err(_) => {
-                    return Err(format!(
-                        "{place}: {:?} is not {}",
-                        short(line),
-                        columns.numbers(width, " numbers")
-                    ));
+                    let (text, expected) = (short(line), columns.numbers(width, " numbers"));
+                    return Err(PathError::NotNumbers { line: number, text, expected });
                 }
             };
             let whole = numbers.len() == 4 || (columns == Columns::Pose && numbers.len() == 8);
             if !whole || width.is_some_and(|width| width != numbers.len()) {
-                return Err(format!(
-                    "{place}: {} numbers, expected the {}",
-                    numbers.len(),
-                    columns.numbers(width, "")
-                ));
+                let (found, expected) = (numbers.len(), columns.numbers(width, ""));
+                return Err(PathError::NumberCount { line: number, found, expected });
             }
             width = Some(numbers.len());
             if !numbers.iter().all(|number| number.abs() < LARGEST) {
-                return Err(format!("{place}: {:?} must be finite and below {LARGEST:e}", short(line)));
+                return Err(PathError::OutOfRange { line: number, text: short(line) });
             }
             let t = numbers[0];
             if let Some((last, _)) = rows.last().filter(|(last, _)| *last >= t) {
-                return Err(format!("{place}: time {t} s does not come after {last} s"));
+                return Err(PathError::NotAscending { line: number, t, last: *last });
             }
             let orientation = match numbers[4..] {
-                [w, x, y, z] => orientation(w, x, y, z).map_err(|what| format!("{place}: {what}"))?,
+                [w, x, y, z] => unit_quaternion(w, x, y, z)
+                    .map_err(|source| PathError::Orientation { line: number, source })?,
                 _ => DQuat::IDENTITY,
             };
             rows.push((t, Pose { position: DVec3::new(numbers[1], numbers[2], numbers[3]), orientation }));
         }
         if rows.is_empty() {
-            return Err(format!("no rows, expected lines {} in s and m", columns.names()));
+            return Err(PathError::Empty { expected: columns.names() });
         }
-        Ok(Self { rows, turns: width == Some(POSE.len()), repeats: false })
+        Ok(Self { rows, has_orientations: width == Some(POSE.len()), repeats: false })
     }
 
-    /// Whether it has orientations.
-    pub fn turns(&self) -> bool {
-        self.turns
+    /// Whether the rows have orientations.
+    pub fn has_orientations(&self) -> bool {
+        self.has_orientations
     }
 
-    /// The same path, which begins again with its first row at the time of its last.
+    /// Periodic path, which starts again with its first row at the time of its last.
     #[must_use]
     pub fn repeating(self) -> Self {
         Self { repeats: true, ..self }
     }
 
-    /// Pose [m, world] at a time [s]; without orientations it is not turned.
+    /// Pose [m, world] at a time [s]; the orientation is the identity if the rows have none.
     pub fn at(&self, t: f64) -> Pose {
         let (first, end) = (self.rows.first().map_or(0.0, |(time, _)| *time), self.end());
         let again = self.repeats && t > end && end > first;
@@ -116,8 +108,8 @@ impl MotionPath {
             (Some((t0, from)), Some((t1, to))) => {
                 let share = (t - t0) / (t1 - t0);
                 let position = from.position + (to.position - from.position) * share;
-                let orientation = if self.turns {
-                    // The short way round.
+                let orientation = if self.has_orientations {
+                    // Spherical interpolation along the shorter arc.
                     from.orientation.slerp(to.orientation, share)
                 } else {
                     DQuat::IDENTITY
@@ -129,9 +121,10 @@ impl MotionPath {
         }
     }
 
-    /// The same path so much later [s].
-    pub fn later(mut self, by_s: f64) -> Self {
-        self.rows.iter_mut().for_each(|(time, _)| *time += by_s);
+    /// Path with all times later by a delay [s].
+    #[must_use]
+    pub fn delayed_by(mut self, delay_s: f64) -> Self {
+        self.rows.iter_mut().for_each(|(time, _)| *time += delay_s);
         self
     }
 
@@ -149,7 +142,7 @@ impl Columns {
         }
     }
 
-    /// What a row of so many columns is; of any allowed number when it is not known yet.
+    /// Description of a row with a known number of columns, or of all allowed rows.
     fn numbers(self, width: Option<usize>, numbers: &str) -> String {
         let (four, eight) = (format!("four{numbers} t,x,y,z"), format!("eight{numbers} t,x,y,z,qw,qx,qy,qz"));
         match (self, width) {
@@ -160,20 +153,96 @@ impl Columns {
     }
 }
 
-/// An orientation as a file gives it.
+/// Why a path file was refused. Lines count from 1.
+#[derive(Debug, Clone, PartialEq, ThisError)]
+#[non_exhaustive]
+pub enum PathError {
+    /// No rows.
+    #[error("no rows, expected lines {expected} in s and m")]
+    Empty {
+        /// Allowed columns.
+        expected: &'static str,
+    },
+    /// Header with other columns.
+    #[error("line {line}: the columns are {found}, expected {expected}")]
+    Header {
+        /// Line.
+        line: usize,
+        /// Columns of the header.
+        found: String,
+        /// Allowed columns.
+        expected: &'static str,
+    },
+    /// Cells that are no numbers.
+    #[error("line {line}: {text:?} is not {expected}")]
+    NotNumbers {
+        /// Line.
+        line: usize,
+        /// Text of the line, shortened.
+        text: String,
+        /// Description of a row.
+        expected: String,
+    },
+    /// Row with another number of columns.
+    #[error("line {line}: {found} numbers, expected the {expected}")]
+    NumberCount {
+        /// Line.
+        line: usize,
+        /// Numbers of the row.
+        found: usize,
+        /// Description of a row.
+        expected: String,
+    },
+    /// Number that is not finite, or at least 10⁶ in magnitude.
+    #[error("line {line}: {text:?} must be finite and below {LARGEST:e}")]
+    OutOfRange {
+        /// Line.
+        line: usize,
+        /// Text of the line, shortened.
+        text: String,
+    },
+    /// Time that does not come after the one before.
+    #[error("line {line}: time {t} s does not come after {last} s")]
+    NotAscending {
+        /// Line.
+        line: usize,
+        /// Time [s].
+        t: f64,
+        /// Time of the row before [s].
+        last: f64,
+    },
+    /// Orientation that is no unit quaternion.
+    #[error("line {line}: {source}")]
+    Orientation {
+        /// Line.
+        line: usize,
+        /// Cause.
+        source: QuaternionError,
+    },
+}
+
+/// Quaternion whose length differs from 1 by more than 1 %.
+#[derive(Debug, Clone, Copy, PartialEq, ThisError)]
+#[error("orientation has length {length}, expected a unit quaternion w, x, y, z")]
+pub struct QuaternionError {
+    /// Length of the quaternion.
+    pub length: f64,
+}
+
+/// Unit quaternion w + x·i + y·j + z·k, normalised.
 ///
 /// # Errors
-/// When it has not length 1, or nearly.
-pub fn orientation(w: f64, x: f64, y: f64, z: f64) -> Result<DQuat, String> {
+/// If its length differs from 1 by more than 1 %.
+pub fn unit_quaternion(w: f64, x: f64, y: f64, z: f64) -> Result<DQuat, QuaternionError> {
     let orientation = DQuat::from_xyzw(x, y, z, w);
     let length = orientation.length();
     if !(0.99..=1.01).contains(&length) {
-        return Err(format!("orientation has length {length}, expected a unit quaternion w, x, y, z"));
+        return Err(QuaternionError { length });
     }
     Ok(orientation.normalize())
 }
 
-/// A line as it may stand in a message.
+/// Line for a message, shortened to 60 characters.
 fn short(line: &str) -> String {
     if line.chars().count() > 60 { line.chars().take(60).chain(['…']).collect() } else { line.to_string() }
 }
@@ -190,8 +259,8 @@ mod tests {
         assert_eq!(path.at(1.0).position, DVec3::new(1.0, 0.0, 2.0));
         assert_eq!(path.at(9.0).position, DVec3::new(2.0, 0.0, 4.0));
         assert_eq!(path.end(), 1.5);
-        assert_eq!(path.clone().later(2.0).at(3.0), path.at(1.0));
-        assert!(!path.turns());
+        assert_eq!(path.clone().delayed_by(2.0).at(3.0), path.at(1.0));
+        assert!(!path.has_orientations());
     }
 
     #[test]
@@ -205,12 +274,12 @@ mod tests {
     }
 
     #[test]
-    fn orientations_turn_evenly_and_the_short_way() {
+    fn orientations_are_interpolated_along_the_shorter_arc() {
         // From 0 to 90° about z, the second given with the other sign.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let text = format!("0,0,0,0,1,0,0,0\n1,0,0,1,-{half},0,0,-{half}\n");
         let path = MotionPath::parse(&text, Columns::Pose).expect("a good path");
-        assert!(path.turns());
+        assert!(path.has_orientations());
         for share in [0.0, 0.25, 0.5, 1.0, 2.0] {
             let turned = path.at(share).orientation * DVec3::X;
             let angle = std::f64::consts::FRAC_PI_2 * share.min(1.0);
@@ -223,7 +292,8 @@ mod tests {
 
     #[test]
     fn bad_rows_are_named_by_line() {
-        let error = |text: &str| MotionPath::parse(text, Columns::Position).err().unwrap_or_default();
+        let error =
+            |text: &str| MotionPath::parse(text, Columns::Position).expect_err("a bad path").to_string();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z in s and m");
         assert_eq!(error("t,x,y\n"), "line 1: the columns are t,x,y, expected t,x,y,z");
         assert_eq!(error("0,0,0,0\n1,2,NaN,0\n"), "line 2: \"1,2,NaN,0\" must be finite and below 1e6");
@@ -231,7 +301,7 @@ mod tests {
         assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,x,y,z");
         assert_eq!(error("0,0,0,0,1,0,0,0\n"), "line 1: 8 numbers, expected the four t,x,y,z");
         assert_eq!(error("1,0,0,0\n1,0,0,0\n"), "line 2: time 1 s does not come after 1 s");
-        let error = |text: &str| MotionPath::parse(text, Columns::Pose).err().unwrap_or_default();
+        let error = |text: &str| MotionPath::parse(text, Columns::Pose).expect_err("a bad path").to_string();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z or t,x,y,z,qw,qx,qy,qz in s and m");
         assert_eq!(
             error("t,x,y,z,q\n"),

@@ -1,360 +1,386 @@
-//! The energy of a device's port: observed, and never negative.
+//! Passivity observer and controller of a device's port.
 //!
-//! A force is held while the hand goes on, and answers a position that is old: so a port makes energy, the more the
-//! stiffer, the slower and the later. Two things are done about it.
+//! A zero-order hold and a delayed reply make a port active: it generates energy, the more, the stiffer the coupling, the lower the
+//! rate and the longer the delay. Two controllers act against it.
 //!
-//! **A guard** never gives out what did not come in. What the hand has given, −Σ F·Δx with the force that was really held,
-//! less what the scene gave out by its own ledger ([`crate::Effort::taken_j`], where it is below 0: another hand's energy), is what is
-//! left. A force that gives it back is scaled so that it takes no more than a share Δt/T of it in an update, T being how
-//! late the hand's movement is known: what is left falls off, and does not go below 0, also in the first swing.
-//!
-//! ```text
-//! left = Σ −F·Δx − min(0, taken)        F ← F·min(1, left / (F·ẋ·T))
-//! ```
-//!
-//! **Damping** takes away what swings. From the same numbers it is learned how much negative damping the port has, n [N·s/m]: the scene
-//! takes in more than the force that was wanted has given. A coupling's damper is not counted as taken: it pays for what
-//! the port makes, and a coupling within its bound shows no n. The hand is damped by it. A device bears only so much
-//! damping of a movement that is known late; beyond that the force is given with a share s < 1 of its stiffness. Also where the
-//! guard has to act the share goes down, until it need not. n is kept while there is contact, so nothing hunts.
+//! **The energy tank** bounds the output. Its level E [J] is the work that the hand has done against the held force F [N] over its
+//! displacements Δx [m], less what the scene has given out by its own energy ledger (A = [`crate::Effort::absorbed_j`], where it is
+//! negative: energy of another hand). A force that drains the tank is scaled so that one update takes at most a share Δt/T, where
+//! T [s] is the delay with which the hand's velocity ẋ is known. So E decays and never becomes negative, not even in the first swing.
 //!
 //! ```text
-//! n = (Σ Δtaken − Σ −F_wanted·Δx − noise) / Σ ẋ²·Δt        F = s·F_wanted − s·n·ẋ/η        s = min(1, η·b/n)
+//! E = Σ −F·Δx − min(0, A)        F ← F·min(1, E / (F·ẋ·T))
 //! ```
 //!
-//! The noise is what a step of the encoder can hide: its length times the force. (After Hannaford & Ryu 2002, IEEE Trans. Robot.
-//! Autom. 18, 1, with the ledger in the place of their estimate, as in Ryu et al. 2005, IEEE Trans. Robot. 21, 750; the guard is the
-//! tank of Franken et al. 2011, IEEE Trans. Robot. 27, 741.)
+//! **Damping** removes oscillations. The observer identifies the negative damping n [N·s/m] of the port: the energy that the scene
+//! absorbed beyond the work of the wanted force. The coupling's damper does not count as absorbed: it pays for the port's activity, and
+//! a coupling within its stability bound shows no n. The controller damps the hand by n. A device tolerates only a limited damping b of
+//! a velocity that is known late; beyond it the force is scaled by s < 1. Where the tank acts, s falls too, until the tank need not act.
+//! n is kept during contact, which avoids limit cycles.
+//!
+//! ```text
+//! n = (Σ ΔA − Σ −F_wanted·Δx − noise) / Σ ẋ²·Δt        F = s·F_wanted − s·n·ẋ/η        s = min(1, η·b/n)
+//! ```
+//!
+//! The noise is the energy that one encoder step hides: its length times the force. η is the effectiveness of damping by a late
+//! velocity. (After Hannaford & Ryu 2002, IEEE Trans. Robot. Autom. 18, 1, with the ledger in place of their estimate, as in Ryu et
+//! al. 2005, IEEE Trans. Robot. 21, 750; the energy tank is that of Franken et al. 2011, IEEE Trans. Robot. 27, 741.)
 
 use crate::port::Effort;
 use glam::DVec3;
 
-/// Energy [J] that is kept for later, at most, beyond what is stored: what was lost long ago pays for nothing.
-const MOST_KEPT: f64 = 1e-3;
+/// Capacity of the tank beyond the energy that is stored in the scene [J]: energy that was dissipated long ago pays for nothing.
+const TANK_CAPACITY_J: f64 = 1e-3;
 
-/// Time [s] over which the hand's movement is smoothed where the encoder tells of slow movements in jumps of
-/// [`COARSE_M`]; less for finer ones.
-const SMOOTH_S: f64 = 4e-3;
+/// Time constant of the velocity filter for an encoder step of [`COARSE_M`] [s]; it scales with the root of the step.
+const FILTER_S: f64 = 4e-3;
+
+/// Encoder step from which on the velocity filter is slowest [m].
 const COARSE_M: f64 = 50e-6;
 
-/// Of the time in which the damper would stop the mass, the share that may be known late.
-const BORNE: f64 = 0.25;
+/// Largest delay of the velocity, as a share of the time in which the damper stops the mass.
+const DELAY_SHARE: f64 = 0.25;
 
-/// η: damping that makes up for what comes late is by so much less effective.
-const EFFECTIVE: f64 = 0.5;
+/// Effectiveness η of damping by a late velocity.
+const EFFECTIVENESS: f64 = 0.5;
 
-/// Time [s] over which the port's damping is looked at, and over which a surplus is forgotten.
+/// Time constant of the identification of n [s].
 const MEMORY_S: f64 = 0.05;
+
+/// Time constant with which an energy surplus of the balance is forgotten [s].
 const SURPLUS_S: f64 = 0.1;
 
-/// Time [s] in which what is missing is to be taken back.
-const TAKE_BACK_S: f64 = 0.02;
+/// Time within which an energy deficit is dissipated [s].
+const RECOVER_DEFICIT_S: f64 = 0.02;
 
-/// A share of the energy that goes to and fro which may be missing before all is done about it.
-const UNFELT: f64 = 0.01;
+/// Deficit at which half of the recovery damping acts, as a share of the energy flow.
+const DEFICIT_SHARE: f64 = 0.01;
 
-/// Times [s] over which the share of the force goes down, and up again.
+/// Time constant with which the force scale s falls [s].
 const SOFTER_S: f64 = 1e-3;
+
+/// Time constant with which the force scale s rises [s].
 const STIFFER_S: f64 = 1.0;
 
-/// Time [s] out of contact over which n is forgotten, and in which it grows by e where the guard holds all force back.
+/// Time constant with which n is forgotten out of contact [s].
 const FORGET_S: f64 = 1.0;
-const GUARDED_S: f64 = 0.1;
 
-/// Motions that are remembered: a second at 1 kHz. A motion that is answered later counts as the oldest of them.
-const REMEMBERED: usize = 1024;
+/// Time in which n grows by a factor e while the tank withholds all force [s].
+const WITHHELD_S: f64 = 0.1;
 
-/// What had happened with a motion, since the start.
+/// Capacity of the history [motions]: 1 s at 1 kHz. A motion that is replied to later counts as the oldest one.
+const HISTORY: usize = 1024;
+
+/// Sums over all updates up to a motion.
 #[derive(Debug, Clone, Copy, Default)]
-struct Told {
-    /// What the hand had given [J], by the force that was held and by the one that was wanted.
-    given: f64,
-    wanted: f64,
+struct Sums {
+    /// Work of the hand against the held force [J].
+    work: f64,
+    /// Work of the hand against the wanted force [J].
+    wanted_work: f64,
     /// Σ ẋ²·Δt [m²/s].
-    moved: f64,
-    /// The share of the force that was given.
-    share: f64,
+    motion: f64,
+    /// Scale of the force at that motion.
+    scale: f64,
 }
 
-/// What the port did in the last moments.
+/// Sums over the last [`MEMORY_S`], with exponential forgetting.
 #[derive(Debug, Clone, Copy, Default)]
-struct Lately {
-    /// Energy made, and gone to and fro [J].
-    made: f64,
+struct Window {
+    /// Generated energy [J].
+    generated: f64,
+    /// Energy flow, regardless of its direction [J].
     flow: f64,
     /// Σ ẋ²·Δt [m²/s].
-    moved: f64,
+    motion: f64,
     /// Largest force [N].
     force: f64,
 }
 
-/// Observer and controller of one device's port.
+/// Passivity observer and controller of one device's port.
 #[derive(Debug, Clone)]
 pub struct PassivityController {
-    /// Most damping [N·s/m] that the device bears with what is known late of its movement.
-    most_damping: f64,
-    /// Step of the encoder [m], and how late movements are known [s]: smoothed, and all of it.
+    /// Largest damping b that the device tolerates [N·s/m].
+    max_damping: f64,
+    /// Encoder step [m].
     resolution: f64,
-    smooth_s: f64,
-    late_s: f64,
-    /// Velocity [m/s], smoothed evenly, and less where it is fast.
+    /// Time constant of the velocity filter [s].
+    filter_s: f64,
+    /// Delay T with which the velocity is known [s]: filter and two updates.
+    delay_s: f64,
+    /// Velocity [m/s], filtered with a constant time constant.
     velocity: DVec3,
-    fast: DVec3,
-    /// What had happened with each motion, by its sequence; and now.
-    told: Box<[Told]>,
-    now: Told,
-    /// The motion that was answered last, and what was taken then [J].
-    answered: Option<(u64, f64)>,
-    lately: Lately,
-    /// n [N·s/m].
-    negative: f64,
+    /// Velocity [m/s], filtered less while it is fast.
+    fast_velocity: DVec3,
+    /// Sums at each motion, by sequence number modulo [`HISTORY`].
+    history: Box<[Sums]>,
+    /// Sums now.
+    now: Sums,
+    /// Motion that was replied to last, and the absorbed energy of that reply [J].
+    replied: Option<(u64, f64)>,
+    window: Window,
+    /// Negative damping n of the port [N·s/m].
+    negative_damping: f64,
+    /// Energy balance [J]: work of the hand less absorbed energy.
     balance: f64,
-    /// What the guard may give [J]; what was given and counts no more.
-    left: f64,
+    /// Level E of the tank [J].
+    tank: f64,
+    /// Work that no longer counts: beyond the tank's capacity, or below zero [J].
     written_off: f64,
-    last: Option<DVec3>,
+    last_position: Option<DVec3>,
     wanted: DVec3,
     held: DVec3,
-    /// What the controller added [N].
+    /// Force that the controller added [N].
     added: DVec3,
-    share: f64,
-    /// What was taken at the start, and when there was no force last [J].
-    start: f64,
-    unloaded: f64,
-    /// How long there has been contact, with breaks; and the break [s].
+    /// Scale s of the force.
+    scale: f64,
+    /// Absorbed energy in the first reply [J].
+    absorbed_at_start: f64,
+    /// Absorbed energy when there was no force last [J].
+    absorbed_unloaded: f64,
+    /// Duration of the contact, short interruptions included [s].
     contact_s: f64,
-    break_s: f64,
-    /// Updates in which it acted, and the most that was ever missing [J].
-    acted: u64,
-    worst: f64,
+    /// Duration of the interruption [s].
+    interruption_s: f64,
+    active_updates: u64,
+    max_deficit: f64,
 }
 
 impl PassivityController {
-    /// Of a device with an effective mass [kg] and a resolution [m], updated every `dt_s` [s].
+    /// Controller for a device with an effective mass [kg] and an encoder step [m], updated every `dt_s` [s].
     pub fn new(mass_kg: f64, resolution_m: f64, dt_s: f64) -> Self {
-        let smooth_s = SMOOTH_S * (resolution_m / COARSE_M).clamp(0.0, 1.0).sqrt();
-        let late_s = smooth_s + 2.0 * dt_s;
+        let filter_s = FILTER_S * (resolution_m / COARSE_M).clamp(0.0, 1.0).sqrt();
+        let delay_s = filter_s + 2.0 * dt_s;
         Self {
-            most_damping: BORNE * mass_kg / late_s,
+            max_damping: DELAY_SHARE * mass_kg / delay_s,
             resolution: resolution_m,
-            smooth_s,
-            late_s,
+            filter_s,
+            delay_s,
             velocity: DVec3::ZERO,
-            fast: DVec3::ZERO,
-            told: vec![Told::default(); REMEMBERED].into_boxed_slice(),
-            now: Told { share: 1.0, ..Told::default() },
-            answered: None,
-            lately: Lately::default(),
-            negative: 0.0,
+            fast_velocity: DVec3::ZERO,
+            history: vec![Sums::default(); HISTORY].into_boxed_slice(),
+            now: Sums { scale: 1.0, ..Sums::default() },
+            replied: None,
+            window: Window::default(),
+            negative_damping: 0.0,
             balance: 0.0,
-            left: 0.0,
+            tank: 0.0,
             written_off: 0.0,
-            last: None,
+            last_position: None,
             wanted: DVec3::ZERO,
             held: DVec3::ZERO,
             added: DVec3::ZERO,
-            share: 1.0,
-            start: 0.0,
-            unloaded: 0.0,
+            scale: 1.0,
+            absorbed_at_start: 0.0,
+            absorbed_unloaded: 0.0,
             contact_s: 0.0,
-            break_s: 0.0,
-            acted: 0,
-            worst: 0.0,
+            interruption_s: 0.0,
+            active_updates: 0,
+            max_deficit: 0.0,
         }
     }
 
-    /// Updates in which it changed the force.
-    pub fn acted(&self) -> u64 {
-        self.acted
+    /// Number of updates in which the controller changed the force.
+    pub fn active_updates(&self) -> u64 {
+        self.active_updates
     }
 
-    /// The most energy [J] that was missing at once.
-    pub fn worst_j(&self) -> f64 {
-        self.worst
+    /// Largest energy deficit of the balance [J].
+    pub fn max_deficit_j(&self) -> f64 {
+        self.max_deficit
     }
 
-    /// Energy [J] that the hand has given lately and the scene has not taken, as far as answers tell.
+    /// Energy balance [J]: recent work of the hand less absorbed energy, up to the last reply.
     pub fn balance_j(&self) -> f64 {
         self.balance
     }
 
-    /// The share of the force that is given: below 1 where damping alone is not enough.
-    pub fn share(&self) -> f64 {
-        self.share
+    /// Scale s of the force: below 1 where damping alone is not enough.
+    pub fn force_scale(&self) -> f64 {
+        self.scale
     }
 
-    /// Observe: the hand is at a place [m] with its motion number `sequence`, and this is the newest effort. Gives the force [N]
-    /// in the place of the one that is wanted; `dt_s` [s] have passed since the last time.
+    /// Passive force [N] for the newest effort, at the hand's position [m] with its motion number `sequence`, `dt_s` [s] after the
+    /// last update.
     ///
     /// # Real time
+    /// No allocation, lock or system call.
     pub fn control(&mut self, sequence: u64, position: DVec3, effort: &Effort, dt_s: f64) -> DVec3 {
         let wanted = effort.force;
-        let moved = self.last.map_or(DVec3::ZERO, |last| position - last);
+        let moved = self.last_position.map_or(DVec3::ZERO, |last| position - last);
         if !moved.is_finite() {
             return wanted;
         }
-        self.last = Some(position);
-        self.now.given -= self.held.dot(moved);
-        self.now.wanted -= self.wanted.dot(moved);
+        self.last_position = Some(position);
+        self.now.work -= self.held.dot(moved);
+        self.now.wanted_work -= self.wanted.dot(moved);
         if dt_s > 0.0 {
-            self.follow(moved, dt_s);
+            self.filter_velocity(moved, dt_s);
         }
-        self.told[place(sequence)] = self.now;
-        self.lately.force = self.lately.force.max(self.wanted.length());
+        self.history[index(sequence)] = self.now;
+        self.window.force = self.window.force.max(self.wanted.length());
         self.observe(sequence, effort, dt_s);
         self.wanted = if wanted.is_finite() { wanted } else { DVec3::ZERO };
         self.added = DVec3::ZERO;
         if dt_s <= 0.0 || !wanted.is_finite() {
             return wanted;
         }
-        self.learn(sequence, effort, dt_s);
+        self.identify(sequence, effort, dt_s);
 
-        // What it makes beyond what damping can take is not given.
-        let bearable = EFFECTIVE * self.most_damping;
-        let share = if self.negative > bearable { bearable / self.negative } else { 1.0 };
-        let over = if share < self.share { SOFTER_S } else { STIFFER_S };
-        self.share += (share - self.share) * (dt_s / (over + dt_s));
-        if 1.0 - self.share < 1e-6 {
-            self.share = 1.0;
+        // s → min(1, η·b/n): the activity that damping can't remove is avoided by a softer force.
+        let removable = EFFECTIVENESS * self.max_damping;
+        let scale = if self.negative_damping > removable { removable / self.negative_damping } else { 1.0 };
+        let time_constant = if scale < self.scale { SOFTER_S } else { STIFFER_S };
+        self.scale += (scale - self.scale) * (dt_s / (time_constant + dt_s));
+        if 1.0 - self.scale < 1e-6 {
+            self.scale = 1.0;
         }
         if wanted == DVec3::ZERO {
-            self.acted += u64::from(self.share < 1.0);
+            self.active_updates += u64::from(self.scale < 1.0);
             return DVec3::ZERO;
         }
-        let damping = self.share * self.negative / EFFECTIVE + self.taking_back();
-        self.added = -self.velocity * damping.min(self.most_damping);
-        let force = wanted * self.share + self.added;
-        let guard = self.guard(force);
-        if guard < 1.0 {
-            let grown = 1.0 + (1.0 - guard) * dt_s / GUARDED_S;
-            self.negative = self.negative.max(bearable) * grown;
+
+        // F = s·F_wanted − (s·n/η + recovery)·ẋ, then the tank.
+        let damping = self.scale * self.negative_damping / EFFECTIVENESS + self.recovery_damping();
+        self.added = -self.velocity * damping.min(self.max_damping);
+        let force = wanted * self.scale + self.added;
+        let tank_scale = self.tank_scale(force);
+        if tank_scale < 1.0 {
+            let growth = 1.0 + (1.0 - tank_scale) * dt_s / WITHHELD_S;
+            self.negative_damping = self.negative_damping.max(removable) * growth;
         }
-        self.acted += u64::from(self.added != DVec3::ZERO || self.share < 1.0 || guard < 1.0);
-        force * guard
+        let active = self.added != DVec3::ZERO || self.scale < 1.0 || tank_scale < 1.0;
+        self.active_updates += u64::from(active);
+        force * tank_scale
     }
 
-    /// How the hand moves, smoothed: the slower it is, the longer a step of the encoder takes.
-    fn follow(&mut self, moved: DVec3, dt_s: f64) {
-        let speed = self.fast.length();
-        let smooth_s = if speed > 0.0 { self.smooth_s.min(self.resolution / speed) } else { self.smooth_s };
-        self.fast += (moved / dt_s - self.fast) * (dt_s / (smooth_s + dt_s));
-        self.velocity += (moved / dt_s - self.velocity) * (dt_s / (self.smooth_s + dt_s));
-        self.now.moved += self.velocity.length_squared() * dt_s;
+    /// Filters the velocity. The fast filter follows one encoder step: the slower the hand, the longer a step lasts.
+    fn filter_velocity(&mut self, moved: DVec3, dt_s: f64) {
+        let speed = self.fast_velocity.length();
+        let filter_s = if speed > 0.0 { self.filter_s.min(self.resolution / speed) } else { self.filter_s };
+        self.fast_velocity += (moved / dt_s - self.fast_velocity) * (dt_s / (filter_s + dt_s));
+        self.velocity += (moved / dt_s - self.velocity) * (dt_s / (self.filter_s + dt_s));
+        self.now.motion += self.velocity.length_squared() * dt_s;
     }
 
-    /// The negative damping of the port, from what is missing beyond what the encoder hides.
-    fn learn(&mut self, sequence: u64, effort: &Effort, dt_s: f64) {
+    /// Identifies the negative damping n of the port, from the deficit beyond what the encoder hides.
+    fn identify(&mut self, sequence: u64, effort: &Effort, dt_s: f64) {
         if effort.force == DVec3::ZERO {
-            // Nothing is stored, and nothing known of the next contact.
-            self.unloaded = effort.taken_j;
-            self.negative *= 1.0 - (dt_s / FORGET_S).min(1.0);
-            self.break_s += dt_s;
-            if self.break_s > MEMORY_S {
+            // Out of contact: nothing is stored, and n is forgotten.
+            self.absorbed_unloaded = effort.absorbed_j;
+            self.negative_damping *= 1.0 - (dt_s / FORGET_S).min(1.0);
+            self.interruption_s += dt_s;
+            if self.interruption_s > MEMORY_S {
                 self.contact_s = 0.0;
             }
         } else {
-            self.break_s = 0.0;
+            self.interruption_s = 0.0;
         }
         if self.contact_s > 0.0 || effort.force != DVec3::ZERO {
             self.contact_s += dt_s;
         }
-        // The first force of a contact answers a motion that was not pushed: the damper has not paid yet.
-        if self.contact_s < (sequence.saturating_sub(effort.answers) + 1) as f64 * dt_s {
-            self.lately = Lately { force: self.lately.force, ..Lately::default() };
+        // The first force of a contact replies to a motion without force: the damper has not paid yet.
+        if self.contact_s < (sequence.saturating_sub(effort.in_reply_to) + 1) as f64 * dt_s {
+            self.window = Window { force: self.window.force, ..Window::default() };
             self.balance = 0.0;
         }
-        let Lately { made, moved, force, .. } = self.lately;
+        let Window { generated, motion, force, .. } = self.window;
         let noise = self.resolution * force.max(effort.force.length());
-        if effort.force != DVec3::ZERO && -self.balance > noise && moved > 0.0 {
-            self.negative = self.negative.max((made - noise) / moved);
+        if effort.force != DVec3::ZERO && -self.balance > noise && motion > 0.0 {
+            self.negative_damping = self.negative_damping.max((generated - noise) / motion);
         }
     }
 
-    /// Damping [N·s/m] that takes back what is missing.
-    fn taking_back(&self) -> f64 {
-        let missing = (-self.balance).max(0.0);
-        let mean_square = self.lately.moved / MEMORY_S;
-        if missing == 0.0 || mean_square == 0.0 {
+    /// Damping that dissipates the energy deficit [N·s/m].
+    fn recovery_damping(&self) -> f64 {
+        let deficit = (-self.balance).max(0.0);
+        let mean_square = self.window.motion / MEMORY_S;
+        if deficit == 0.0 || mean_square == 0.0 {
             return 0.0;
         }
-        let urgent = missing / (missing + UNFELT * self.lately.flow);
-        urgent * missing / (TAKE_BACK_S * mean_square)
+        let urgency = deficit / (deficit + DEFICIT_SHARE * self.window.flow);
+        urgency * deficit / (RECOVER_DEFICIT_S * mean_square)
     }
 
-    /// The share of a force [N] that gives no more than what is left, as late as the hand's movement is known.
-    fn guard(&self, force: DVec3) -> f64 {
-        let power = force.dot(self.velocity).max(force.dot(self.fast));
-        if power > 0.0 { (self.left / (power * self.late_s)).clamp(0.0, 1.0) } else { 1.0 }
+    /// Scale of a force [N] that drains at most the tank within the delay of the velocity: min(1, E/(F·ẋ·T)).
+    fn tank_scale(&self, force: DVec3) -> f64 {
+        let power = force.dot(self.velocity).max(force.dot(self.fast_velocity));
+        if power > 0.0 { (self.tank / (power * self.delay_s)).clamp(0.0, 1.0) } else { 1.0 }
     }
 
-    /// What has been answered since: what is left, the balance, and what the port made.
+    /// Updates balance, window and tank with the newest effort.
     fn observe(&mut self, sequence: u64, effort: &Effort, dt_s: f64) {
-        let oldest = (sequence + 1).saturating_sub(REMEMBERED as u64).max(1);
-        let of_use = effort.answers > 0 && effort.answers <= sequence && effort.taken_j.is_finite();
-        if of_use && self.answered.is_none() {
-            (self.start, self.answered) = (effort.taken_j, Some((effort.answers, effort.taken_j)));
+        let oldest = (sequence + 1).saturating_sub(HISTORY as u64).max(1);
+        let valid = effort.in_reply_to > 0 && effort.in_reply_to <= sequence && effort.absorbed_j.is_finite();
+        if valid && self.replied.is_none() {
+            (self.absorbed_at_start, self.replied) =
+                (effort.absorbed_j, Some((effort.in_reply_to, effort.absorbed_j)));
         }
-        let Some((before, taken)) = self.answered else { return };
+        let Some((before, absorbed)) = self.replied else { return };
         let before = before.max(oldest);
-        if of_use && effort.answers > before {
-            self.answered = Some((effort.answers, effort.taken_j));
-            self.account(self.told[place(before)], effort, (effort.answers - before) as f64 * dt_s, taken);
+        if valid && effort.in_reply_to > before {
+            self.replied = Some((effort.in_reply_to, effort.absorbed_j));
+            let span_s = (effort.in_reply_to - before) as f64 * dt_s;
+            self.account(self.history[index(before)], effort, span_s, absorbed);
         }
-        // Another hand's energy may go through.
-        let through = self.answered.map_or(0.0, |(_, taken)| (taken - self.start).min(0.0));
-        self.left = self.now.given - through - self.written_off;
-        if self.left < 0.0 {
-            // More than a step of the encoder can hide this is not, and the share goes down for it.
-            (self.written_off, self.left) = (self.written_off + self.left, 0.0);
+        // Energy of another hand may pass through.
+        let passed = self.replied.map_or(0.0, |(_, absorbed)| (absorbed - self.absorbed_at_start).min(0.0));
+        self.tank = self.now.work - passed - self.written_off;
+        if self.tank < 0.0 {
+            // At most what an encoder step hides; the force scale falls for it.
+            (self.written_off, self.tank) = (self.written_off + self.tank, 0.0);
         }
     }
 
-    /// Balance, and what the port made, over the motions that were answered now: `span_s` [s] of them since `old`.
-    fn account(&mut self, old: Told, effort: &Effort, span_s: f64, taken: f64) {
-        let new = self.told[place(effort.answers)];
-        let change = effort.taken_j - taken;
-        let balance = self.balance + (new.given - old.given) - old.share * change;
+    /// Updates the balance and the window with the motions of the last `span_s` [s], since the sums `old` and the absorbed energy
+    /// `absorbed` [J].
+    fn account(&mut self, old: Sums, effort: &Effort, span_s: f64, absorbed: f64) {
+        let new = self.history[index(effort.in_reply_to)];
+        let change = effort.absorbed_j - absorbed;
+        let balance = self.balance + (new.work - old.work) - old.scale * change;
         self.balance = if balance > 0.0 { balance * (1.0 - (span_s / SURPLUS_S).min(1.0)) } else { balance };
-        self.worst = self.worst.max(-self.balance);
-        let through = (effort.taken_j - self.start).min(0.0);
-        let stored = (effort.taken_j - self.unloaded).max(0.0);
-        let kept = new.given - through - self.written_off;
-        self.written_off += (kept - stored - MOST_KEPT).max(0.0);
-        let wanted = new.wanted - old.wanted;
+        self.max_deficit = self.max_deficit.max(-self.balance);
+        let passed = (effort.absorbed_j - self.absorbed_at_start).min(0.0);
+        let stored = (effort.absorbed_j - self.absorbed_unloaded).max(0.0);
+        let level = new.work - passed - self.written_off;
+        self.written_off += (level - stored - TANK_CAPACITY_J).max(0.0);
+        let wanted = new.wanted_work - old.wanted_work;
         if change == 0.0 && wanted == 0.0 {
-            // Out of contact nothing is learned, and nothing forgotten.
+            // Out of contact the window neither learns nor forgets.
             return;
         }
         let forget = 1.0 - (span_s / MEMORY_S).min(1.0);
-        let Lately { made, flow, moved, force } = self.lately;
-        self.lately = Lately {
-            made: made * forget + (change - wanted),
+        let Window { generated, flow, motion, force } = self.window;
+        self.window = Window {
+            generated: generated * forget + (change - wanted),
             flow: flow * forget + change.abs() + wanted.abs(),
-            moved: moved * forget + (new.moved - old.moved),
+            motion: motion * forget + (new.motion - old.motion),
             force: force * forget,
         };
     }
 
-    /// What was really held from now on [N], after all limits.
+    /// Notes the force that is held from now on [N], after all limits.
     ///
     /// # Real time
+    /// No allocation, lock or system call.
     pub fn hold(&mut self, force: DVec3) {
         self.held = force;
         let square = self.wanted.length_squared();
-        let share = (force - self.added).dot(self.wanted) / square;
-        self.now.share = if square > 0.0 { share.clamp(0.0, 1.0) } else { self.share };
+        let scale = (force - self.added).dot(self.wanted) / square;
+        self.now.scale = if square > 0.0 { scale.clamp(0.0, 1.0) } else { self.scale };
     }
 }
 
-fn place(sequence: u64) -> usize {
-    (sequence % REMEMBERED as u64) as usize
+/// Index of a motion in the history.
+fn index(sequence: u64) -> usize {
+    (sequence % HISTORY as u64) as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A mass that bounces on a stiff spring behind a port with a delay of some updates: energy [J] that it has gained.
+    /// Energy gained by a mass that bounces on a stiff spring behind a port with a delay [J].
     fn gain(controlled: bool, delay: usize) -> f64 {
         let (mass, stiffness, dt) = (0.1, 4000.0, 1e-3);
         let mut controller = PassivityController::new(mass, 0.0, dt);
@@ -370,9 +396,14 @@ mod tests {
             let (wanted, taken) = line[delay.min(k as usize)];
             let position = DVec3::X * x;
             let force = if controlled {
-                let answers = (k + 1).saturating_sub(delay as u64);
-                let effort =
-                    Effort { sequence: k, answers, time_s: 0.0, force: DVec3::X * wanted, taken_j: taken };
+                let in_reply_to = (k + 1).saturating_sub(delay as u64);
+                let effort = Effort {
+                    sequence: k,
+                    in_reply_to,
+                    time_s: 0.0,
+                    force: DVec3::X * wanted,
+                    absorbed_j: taken,
+                };
                 let force = controller.control(k + 1, position, &effort, dt);
                 controller.hold(force);
                 force.x
@@ -399,7 +430,7 @@ mod tests {
 
     #[test]
     fn a_passive_port_is_left_alone() {
-        // A damper that answers at once: the hand gives more than is taken.
+        // A damper that replies at once: the hand does more work than is absorbed.
         let mut controller = PassivityController::new(0.1, 0.0, 1e-3);
         let mut taken = 0.0;
         let mut force = DVec3::ZERO;
@@ -408,17 +439,18 @@ mod tests {
             let next = DVec3::X * 0.01 * (f64::from(k + 1) * 0.02).sin();
             let wanted = (position - next) * 5.0;
             let sequence = u64::from(k) + 1;
-            let effort = Effort { sequence, answers: sequence, time_s: 0.0, force: wanted, taken_j: taken };
+            let effort =
+                Effort { sequence, in_reply_to: sequence, time_s: 0.0, force: wanted, absorbed_j: taken };
             force = controller.control(sequence, position, &effort, 1e-3);
             assert_eq!(force, wanted);
             controller.hold(force);
             taken += 0.9 * -force.dot(next - position);
         }
-        assert!(controller.acted() == 0 && controller.balance_j() > 0.0, "{force}");
+        assert!(controller.active_updates() == 0 && controller.balance_j() > 0.0, "{force}");
     }
 
     #[test]
-    fn the_guard_gives_no_more_than_came_in_whatever_is_wanted() {
+    fn the_tank_gives_no_more_than_came_in_whatever_is_wanted() {
         // A hand that is moved to and fro, and a force that always wants to push it on: nothing has come in.
         let (mut controller, mut out, mut force) =
             (PassivityController::new(0.1, 0.0, 1e-3), 0.0_f64, DVec3::ZERO);
@@ -427,18 +459,18 @@ mod tests {
             let position = DVec3::X * 0.01 * (k as f64 * 0.02).sin();
             out += force.dot(position - last);
             assert!(out < 1e-9, "{k}: {out} J");
-            // How it moves is known from the second reading on.
+            // The velocity is known from the second reading on.
             let wanted = if k > 1 { (position - last).normalize_or_zero() * 3.0 } else { DVec3::ZERO };
             last = position;
-            let effort = Effort { sequence: k, answers: k, time_s: 0.0, force: wanted, taken_j: 0.0 };
+            let effort = Effort { sequence: k, in_reply_to: k, time_s: 0.0, force: wanted, absorbed_j: 0.0 };
             force = controller.control(k, position, &effort, 1e-3);
             controller.hold(force);
         }
         assert!(
-            controller.acted() > 900 && controller.share() < 0.5,
+            controller.active_updates() > 900 && controller.force_scale() < 0.5,
             "{} {}",
-            controller.acted(),
-            controller.share()
+            controller.active_updates(),
+            controller.force_scale()
         );
     }
 }

@@ -1,60 +1,65 @@
-//! How a run goes on while it is looked at: paused, slowly, step by step.
+//! Playback of a live run: pause, slow motion, single steps.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// What somebody who watches asks of a force process; shared with it.
+/// Playback settings that a viewer shares with the force process.
 #[derive(Debug)]
 pub struct Playback {
     paused: AtomicBool,
-    /// Ticks of the clock to a step.
-    slowness: AtomicU32,
-    /// Steps that a paused run shall still make.
-    single: AtomicU32,
+    /// Ticks of the clock per step.
+    slowdown: AtomicU32,
+    /// Single steps that are still to be made while paused.
+    requested_steps: AtomicU32,
 }
 
 impl Default for Playback {
-    /// By the clock.
+    /// Running, at the speed of the clock.
     fn default() -> Self {
-        Self { paused: AtomicBool::new(false), slowness: AtomicU32::new(1), single: AtomicU32::new(0) }
+        Self {
+            paused: AtomicBool::new(false),
+            slowdown: AtomicU32::new(1),
+            requested_steps: AtomicU32::new(0),
+        }
     }
 }
 
 impl Playback {
-    /// Pause, or go on.
-    pub fn pause(&self, paused: bool) {
-        self.single.store(0, Ordering::Relaxed);
+    /// Pauses or resumes the run. Requested single steps are dropped.
+    pub fn set_paused(&self, paused: bool) {
+        self.requested_steps.store(0, Ordering::Relaxed);
         self.paused.store(paused, Ordering::Relaxed);
     }
 
-    /// Whether it is paused.
+    /// Whether the run is paused.
     pub fn is_paused(&self) -> bool {
         self.paused.load(Ordering::Relaxed)
     }
 
-    /// Make a step while paused.
-    pub fn step(&self) {
-        self.single.fetch_add(1, Ordering::Relaxed);
+    /// Requests a single step of a paused run.
+    pub fn request_step(&self) {
+        self.requested_steps.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// So many times as slow as the clock, at least 1.
-    pub fn slow(&self, slowness: u32) {
-        self.slowness.store(slowness.max(1), Ordering::Relaxed);
+    /// Sets the slowdown: wall-clock time per simulated time, at least 1.
+    pub fn set_slowdown(&self, slowdown: u32) {
+        self.slowdown.store(slowdown.max(1), Ordering::Relaxed);
     }
 
-    /// How many times as slow as the clock it is.
-    pub fn slowness(&self) -> u32 {
-        self.slowness.load(Ordering::Relaxed)
+    /// Slowdown: wall-clock time per simulated time.
+    pub fn slowdown(&self) -> u32 {
+        self.slowdown.load(Ordering::Relaxed)
     }
 
-    /// Whether a step is to be made at a tick.
+    /// Whether a step is due at a tick. Consumes a requested step.
     ///
     /// # Real time
-    pub(crate) fn goes(&self, tick: u64) -> bool {
+    /// No allocation, lock or system call.
+    pub(crate) fn is_due(&self, tick: u64) -> bool {
         if self.is_paused() {
-            let less = |left: u32| left.checked_sub(1);
-            return self.single.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less).is_ok();
+            let one_less = |left: u32| left.checked_sub(1);
+            return self.requested_steps.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_less).is_ok();
         }
-        tick.is_multiple_of(u64::from(self.slowness()))
+        tick.is_multiple_of(u64::from(self.slowdown()))
     }
 }
 
@@ -63,20 +68,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_paused_run_makes_the_steps_it_is_asked_for_and_a_slow_one_every_few_ticks() {
+    fn a_paused_run_makes_requested_steps_and_a_slow_one_every_few_ticks() {
         let playback = Playback::default();
-        assert!((0..10).all(|tick| playback.goes(tick)));
-        playback.slow(4);
-        assert_eq!((0..100).filter(|&tick| playback.goes(tick)).count(), 25);
-        playback.pause(true);
-        playback.step();
-        playback.step();
-        assert_eq!((0..100).filter(|&tick| playback.goes(tick)).count(), 2);
-        playback.step();
-        playback.pause(false);
-        playback.pause(true);
-        assert!(!playback.goes(0), "what was asked for before is forgotten");
-        playback.slow(0);
-        assert_eq!(playback.slowness(), 1);
+        assert!((0..10).all(|tick| playback.is_due(tick)));
+        playback.set_slowdown(4);
+        assert_eq!((0..100).filter(|&tick| playback.is_due(tick)).count(), 25);
+        playback.set_paused(true);
+        playback.request_step();
+        playback.request_step();
+        assert_eq!((0..100).filter(|&tick| playback.is_due(tick)).count(), 2);
+        playback.request_step();
+        playback.set_paused(false);
+        playback.set_paused(true);
+        assert!(!playback.is_due(0), "resuming drops requested steps");
+        playback.set_slowdown(0);
+        assert_eq!(playback.slowdown(), 1);
     }
 }

@@ -1,42 +1,42 @@
-//! Where a device and the force process meet: two values, the newest of which counts.
+//! Port between a haptic update and the force process: two values, motion and effort, of which only the newest counts.
 
 use crate::link::LinkSender;
 use glam::{DQuat, DVec3};
 use palpate::DeviceMode;
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// What a device tells of the hand.
+/// Motion of a device, sent by its haptic update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// From 1, one more each time; 0 before the first.
+    /// Sequence number, from 1; 0 before the first motion.
     pub sequence: u64,
-    /// When [s].
+    /// Time of the reading [s].
     pub time_s: f64,
     /// Interface point [m, world].
     pub position: DVec3,
-    /// How the handle is turned: world from device handle.
+    /// Orientation of the handle: world from handle.
     pub orientation: DQuat,
     /// Pressed buttons, one bit each.
     pub buttons: u32,
-    /// What the device does, where that is not what the scene says: a pointer comes and goes, touches or holds. It does not go
-    /// over links.
+    /// Mode of the device, where it differs from the scene's: a pointer becomes active or inactive, touches or holds. Links do not
+    /// transmit it.
     pub mode: Option<DeviceMode>,
 }
 
-/// What the force process answers.
+/// Effort for a device, sent by the force process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// From 1, one more each step; 0 before the first.
+    /// Sequence number, from 1, one per step; 0 before the first effort.
     pub sequence: u64,
-    /// The motion that it answers, by its sequence.
-    pub answers: u64,
-    /// When [s].
+    /// Sequence number of the motion that the effort replies to.
+    pub in_reply_to: u64,
+    /// Time of the step [s].
     pub time_s: f64,
     /// Force on the hand [N, world].
     pub force: DVec3,
-    /// Energy [J] that the scene has taken in through this device since the start, with what its virtual coupling stores:
-    /// the hand must have given that much.
-    pub taken_j: f64,
+    /// Energy that the scene has absorbed through this device since the start, stored energy of the virtual coupling included [J].
+    /// The hand must have done that much work.
+    pub absorbed_j: f64,
 }
 
 impl Default for Motion {
@@ -54,83 +54,86 @@ impl Default for Motion {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { sequence: 0, answers: 0, time_s: 0.0, force: DVec3::ZERO, taken_j: 0.0 }
+        Self { sequence: 0, in_reply_to: 0, time_s: 0.0, force: DVec3::ZERO, absorbed_j: 0.0 }
     }
 }
 
-/// The device's end of a port.
+/// Device side of a port.
 pub struct DevicePort {
-    pub(crate) motion: Telling,
+    pub(crate) motion: MotionSink,
     pub(crate) effort: Output<Effort>,
 }
 
-/// Where motions go.
-pub(crate) enum Telling {
-    /// To a force process beside.
-    Here(Input<Motion>),
-    /// To one elsewhere.
+/// Destination of motions.
+pub(crate) enum MotionSink {
+    /// Force process in this process.
+    Local(Input<Motion>),
+    /// Force process behind a link.
     Link(LinkSender),
 }
 
-/// The force process's end.
+/// Force process's side of a port.
 pub struct ForcePort {
     motion: Output<Motion>,
     effort: Input<Effort>,
 }
 
-/// A port: whoever is slower misses values, nobody waits.
+/// Both sides of a port. Neither side waits for the other: the slower one misses values.
 pub fn port() -> (DevicePort, ForcePort) {
     let (motion_in, motion_out) = triple_buffer(&Motion::default());
     let (effort_in, effort_out) = triple_buffer(&Effort::default());
     (
-        DevicePort { motion: Telling::Here(motion_in), effort: effort_out },
+        DevicePort { motion: MotionSink::Local(motion_in), effort: effort_out },
         ForcePort { motion: motion_out, effort: effort_in },
     )
 }
 
 impl DevicePort {
-    /// Over a link, with the efforts that come back.
+    /// Device side of a port whose other side is behind a link.
     pub(crate) fn linked(sender: LinkSender, effort: Output<Effort>) -> Self {
-        Self { motion: Telling::Link(sender), effort }
+        Self { motion: MotionSink::Link(sender), effort }
     }
 
-    /// Tell where the hand is.
+    /// Sends a motion.
     ///
     /// # Real time
-    /// Over a link it takes a lock and calls the system.
-    pub fn tell(&mut self, motion: Motion) {
-        self.motion.tell(motion);
+    /// No allocation, lock or system call; over a link a lock and a system call.
+    pub fn send(&mut self, motion: Motion) {
+        self.motion.send(motion);
     }
 
-    /// The newest effort.
+    /// Newest effort.
     ///
     /// # Real time
+    /// No allocation, lock or system call.
     pub fn newest(&mut self) -> Effort {
         *self.effort.read()
     }
 }
 
-impl Telling {
-    pub(crate) fn tell(&mut self, motion: Motion) {
+impl MotionSink {
+    pub(crate) fn send(&mut self, motion: Motion) {
         match self {
-            Self::Here(input) => input.write(motion),
-            Self::Link(sender) => sender.tell(&motion),
+            Self::Local(input) => input.write(motion),
+            Self::Link(sender) => sender.send(&motion),
         }
     }
 }
 
 impl ForcePort {
-    /// The newest motion.
+    /// Newest motion.
     ///
     /// # Real time
+    /// No allocation, lock or system call.
     pub fn newest(&mut self) -> Motion {
         *self.motion.read()
     }
 
-    /// Answer.
+    /// Sends an effort.
     ///
     /// # Real time
-    pub fn answer(&mut self, effort: Effort) {
+    /// No allocation, lock or system call.
+    pub fn send(&mut self, effort: Effort) {
         self.effort.write(effort);
     }
 }
@@ -140,14 +143,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_newest_counts_on_both_ends() {
+    fn both_sides_read_the_newest_value() {
         let (mut device, mut force) = port();
         assert_eq!(force.newest().sequence, 0);
         for sequence in 1..=5 {
-            device.tell(Motion { sequence, ..Motion::default() });
+            device.send(Motion { sequence, ..Motion::default() });
         }
         assert_eq!((force.newest().sequence, force.newest().sequence), (5, 5));
-        force.answer(Effort { sequence: 1, answers: 5, ..Effort::default() });
-        assert_eq!(device.newest().answers, 5);
+        force.send(Effort { sequence: 1, in_reply_to: 5, ..Effort::default() });
+        assert_eq!(device.newest().in_reply_to, 5);
     }
 }

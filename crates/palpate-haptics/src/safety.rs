@@ -1,24 +1,30 @@
-//! What stands between a computed force and a hand, always on.
+//! Safety limits between a computed force and a hand: arming, ramp, force limit, slew-rate limit, watchdog, speed limit.
+//!
+//! ```text
+//! target = s·clamp(F, F_max)        |given⁺ − given| ≤ slew·Δt        ds/dt = 1/ramp_up while all is well, −1/ramp_down after a fault
+//! ```
+//!
+//! Every update passes them, whatever the force process says.
 
 use glam::DVec3;
 
-/// Limits of what a device may do to a hand.
+/// Safety limits of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SafetyLimits {
-    /// Largest force [N] that the device is meant to give for long.
+    /// Largest force [N].
     pub force_n: f64,
-    /// Fastest change of force [N/s].
+    /// Slew-rate limit of the force [N/s].
     pub slew_n_s: f64,
-    /// Speed of the hand [m/s] beyond which something is wrong: the force is taken away.
+    /// Speed of the hand [m/s] beyond which the force is taken away.
     pub speed_m_s: f64,
-    /// Age of a force [s] beyond which it does not count any more.
-    pub stale_s: f64,
-    /// Time [s] over which the force comes in, at the start and after anything went wrong.
+    /// Watchdog: age of a force [s] beyond which it is taken away.
+    pub watchdog_s: f64,
+    /// Time over which the force ramps up, after arming and after a fault [s].
     pub ramp_up_s: f64,
-    /// Time [s] over which it is taken away when something goes wrong.
+    /// Time over which the force ramps down after a fault [s].
     pub ramp_down_s: f64,
-    /// Time [s] that all must be well for, before the force comes in again.
-    pub calm_s: f64,
+    /// Time without faults before the force ramps up again [s].
+    pub recovery_s: f64,
 }
 
 impl Default for SafetyLimits {
@@ -27,55 +33,56 @@ impl Default for SafetyLimits {
             force_n: 3.0,
             slew_n_s: 3000.0,
             speed_m_s: 3.0,
-            stale_s: 0.02,
+            watchdog_s: 0.02,
             ramp_up_s: 0.5,
             ramp_down_s: 0.02,
-            calm_s: 0.1,
+            recovery_s: 0.1,
         }
     }
 }
 
-/// How often each limit was met, in updates; the ramps in times.
+/// Counters of the safety limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SafetyCounts {
-    /// Forces above the limit.
+    /// Updates with a force above the limit.
     pub clamped: u64,
-    /// Changes that were too fast.
-    pub slewed: u64,
-    /// Updates without a fresh force.
+    /// Updates in which the slew-rate limit acted.
+    pub slew_limited: u64,
+    /// Updates in which the watchdog found the force too old.
     pub stale: u64,
-    /// Updates with a hand that was too fast.
-    pub too_fast: u64,
-    /// Forces or positions that were no numbers.
+    /// Updates in which the hand was too fast.
+    pub overspeed: u64,
+    /// Forces and positions that were not finite.
     pub not_finite: u64,
-    /// Times that the force was taken away.
+    /// Faults that took a force away.
     pub trips: u64,
 }
 
-/// The safety of one device.
+/// Safety of one device.
 #[derive(Debug, Clone)]
 pub struct Safety {
     limits: SafetyLimits,
     armed: bool,
-    /// Share of the force that passes.
-    share: f64,
-    /// How long all has been well [s].
-    calm_s: f64,
+    /// Ramp s: share of the force that passes.
+    ramp: f64,
+    /// Time without a fault [s].
+    fault_free_s: f64,
     tripped: bool,
-    /// The last force that was good, before the share and after it [N].
+    /// Last finite force, clamped [N].
     wanted: DVec3,
+    /// Force of the last update [N].
     given: DVec3,
     counts: SafetyCounts,
 }
 
 impl Safety {
-    /// Disarmed: no force passes until [`Self::arm`].
+    /// Disarmed safety: no force passes until [`Self::arm`].
     pub fn new(limits: SafetyLimits) -> Self {
         Self {
             limits,
             armed: false,
-            share: 0.0,
-            calm_s: limits.calm_s,
+            ramp: 0.0,
+            fault_free_s: limits.recovery_s,
             tripped: false,
             wanted: DVec3::ZERO,
             given: DVec3::ZERO,
@@ -83,68 +90,74 @@ impl Safety {
         }
     }
 
-    /// Let force through, by the ramp; or no more, by the other one.
+    /// Arms or disarms: force ramps up, or down.
     pub fn arm(&mut self, armed: bool) {
         self.armed = armed;
     }
 
-    /// Whether force may pass.
+    /// Whether the safety is armed.
     pub fn is_armed(&self) -> bool {
         self.armed
     }
 
-    /// What was met.
+    /// Counters since the start.
     pub fn counts(&self) -> SafetyCounts {
         self.counts
     }
 
-    /// The force [N] that may go to the hand for one that is wanted, of an age [s], while the hand goes at a speed [m/s] and
-    /// `dt_s` [s] have passed since the last one. What comes out is finite, at most the nominal force, and no farther from
-    /// the last one than the slew allows, whatever comes in.
+    /// Safe force [N] for a wanted force [N] of an age [s], at a speed of the hand [m/s], `dt_s` [s] after the last update.
+    /// The result is finite for any input, at most `force_n`, and within the slew-rate limit of the last one, unless it goes to zero.
     ///
     /// # Real time
+    /// No allocation, lock or system call.
     pub fn limit(&mut self, wanted: DVec3, age_s: f64, speed_m_s: f64, dt_s: f64) -> DVec3 {
-        let SafetyLimits { force_n, slew_n_s, speed_m_s: fastest, stale_s, ramp_up_s, ramp_down_s, calm_s } =
-            self.limits;
+        let SafetyLimits {
+            force_n,
+            slew_n_s,
+            speed_m_s: max_speed,
+            watchdog_s,
+            ramp_up_s,
+            ramp_down_s,
+            recovery_s,
+        } = self.limits;
         let dt = if dt_s.is_finite() { dt_s.clamp(0.0, 0.1) } else { 0.0 };
         let mut well = true;
         if wanted.is_finite() {
-            // A force that is old, or one of a hand that is too fast, is followed no longer.
             self.wanted = wanted.clamp_length_max(force_n);
             self.counts.clamped += u64::from(wanted.length() > force_n);
         } else {
             self.counts.not_finite += 1;
             well = false;
         }
-        if age_s.is_nan() || age_s > stale_s {
+        if age_s.is_nan() || age_s > watchdog_s {
             self.counts.stale += 1;
             well = false;
         }
         if !speed_m_s.is_finite() {
             self.counts.not_finite += 1;
             well = false;
-        } else if speed_m_s > fastest {
-            self.counts.too_fast += 1;
+        } else if speed_m_s > max_speed {
+            self.counts.overspeed += 1;
             well = false;
         }
-        self.calm_s = if well { self.calm_s + dt } else { 0.0 };
+        self.fault_free_s = if well { self.fault_free_s + dt } else { 0.0 };
         if !well && !self.tripped {
             self.tripped = true;
-            self.counts.trips += u64::from(self.armed && self.share > 0.0);
+            self.counts.trips += u64::from(self.armed && self.ramp > 0.0);
         }
-        self.tripped &= self.calm_s < calm_s;
+        self.tripped &= self.fault_free_s < recovery_s;
         let pass = self.armed && !self.tripped;
         let change = if pass { dt / ramp_up_s.max(1e-9) } else { -dt / ramp_down_s.max(1e-9) };
-        self.share = (self.share + change).clamp(0.0, 1.0);
+        self.ramp = (self.ramp + change).clamp(0.0, 1.0);
 
-        let next = self.wanted * self.share;
-        let most = slew_n_s * dt;
+        let next = self.wanted * self.ramp;
+        let max_change = slew_n_s * dt;
         let change = next - self.given;
-        // Taking force away must not take longer than it should: then the share leads.
-        let slewed = change.length() > most && self.share > 0.0;
-        if slewed {
-            self.counts.slewed += u64::from(pass);
-            self.given += change.clamp_length_max(most);
+        // A ramp down to zero overrides the slew-rate limit.
+        let slew_limited = change.length() > max_change && self.ramp > 0.0;
+        if slew_limited {
+            self.counts.slew_limited += u64::from(pass);
+            self.given += change.clamp_length_max(max_change);
         } else {
             self.given = next;
         }
@@ -179,9 +192,9 @@ mod tests {
 
     #[test]
     fn every_fault_takes_the_force_away_in_the_stated_time_and_is_counted() {
-        let counts = |stale, too_fast, not_finite| SafetyCounts {
+        let counts = |stale, overspeed, not_finite| SafetyCounts {
             stale,
-            too_fast,
+            overspeed,
             not_finite,
             trips: 1,
             ..SafetyCounts::default()
@@ -198,10 +211,10 @@ mod tests {
                 safety.limit(DVec3::X, 0.0, 0.0, DT);
             }
             let after: Vec<f64> = (0..100).map(|_| safety.limit(force, age, speed, DT).x).collect();
-            assert!(after[9] > 0.0 && after[9] < 0.6, "by a ramp: {}", after[9]);
+            assert!(after[9] > 0.0 && after[9] < 0.6, "ramping down: {}", after[9]);
             assert_eq!(after[20], 0.0, "in 20 ms");
             assert_eq!(safety.counts(), expected);
-            // It comes back by the ramp, after a while of calm.
+            // It ramps up again after the recovery time.
             let back: Vec<f64> = (0..700).map(|_| safety.limit(DVec3::X, 0.0, 0.0, DT).x).collect();
             assert_eq!(back[98], 0.0);
             assert!(back[120] > 0.0 && back[120] < 0.1 && back[699] == 1.0, "{} {}", back[120], back[699]);
@@ -233,6 +246,6 @@ mod tests {
             last = given;
         }
         let counts = safety.counts();
-        assert!(counts.clamped > 0 && counts.stale > 0 && counts.too_fast > 0 && counts.not_finite > 0);
+        assert!(counts.clamped > 0 && counts.stale > 0 && counts.overspeed > 0 && counts.not_finite > 0);
     }
 }

@@ -1,4 +1,4 @@
-//! What a thread asks of the system, and what it gets.
+//! Real-time scheduling of a thread: priority, core affinity, locked memory; steal time.
 
 use std::fmt;
 use thread_priority::{
@@ -6,33 +6,33 @@ use thread_priority::{
     set_thread_priority_and_policy, thread_native_id,
 };
 
-/// What a thread asks for.
+/// Requested scheduling of a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scheduling {
-    /// Real-time priority, 1 to 99 (SCHED_FIFO); none asks for nothing.
+    /// Real-time priority, 1 to 99 (SCHED_FIFO); `None` keeps the ordinary one.
     pub priority: Option<u8>,
-    /// The core that it stays on, counted from 0; none leaves it to the system.
+    /// Core that the thread is pinned to, from 0; `None` leaves the choice to the system.
     pub core: Option<usize>,
 }
 
-/// What it got; what was not granted says why.
+/// Granted scheduling of a thread. An `Err` holds the reason of a refusal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GrantedScheduling {
-    /// Its real-time priority.
+    /// Real-time priority.
     pub priority: Result<Option<u8>, String>,
-    /// Its core.
+    /// Core that the thread is pinned to.
     pub core: Result<Option<usize>, String>,
-    /// Whether all memory stays in memory.
+    /// Whether the memory of the process is locked (never swapped out).
     pub memory: Result<(), String>,
 }
 
 impl Scheduling {
-    /// Ask the system, for the thread that calls. Whatever it refuses, the thread goes on without.
-    pub fn claim(&self) -> GrantedScheduling {
-        GrantedScheduling { priority: self.claim_priority(), core: self.claim_core(), memory: lock_memory() }
+    /// Applies the request to the calling thread. The thread goes on without what the system refuses.
+    pub fn apply(&self) -> GrantedScheduling {
+        GrantedScheduling { priority: self.apply_priority(), core: self.apply_core(), memory: lock_memory() }
     }
 
-    fn claim_priority(&self) -> Result<Option<u8>, String> {
+    fn apply_priority(&self) -> Result<Option<u8>, String> {
         let Some(priority) = self.priority else { return Ok(None) };
         let value =
             ThreadPriorityValue::try_from(priority).map_err(|what| format!("priority {priority}: {what}"))?;
@@ -46,7 +46,7 @@ impl Scheduling {
         })
     }
 
-    fn claim_core(&self) -> Result<Option<usize>, String> {
+    fn apply_core(&self) -> Result<Option<usize>, String> {
         let Some(core) = self.core else { return Ok(None) };
         let cores = core_affinity::get_core_ids().unwrap_or_default();
         match cores.iter().find(|id| id.id == core) {
@@ -57,20 +57,20 @@ impl Scheduling {
     }
 }
 
-/// Time [s] since the start in which the machine below this one ran something else when it was a core's turn, or any
-/// core's (the steal time of a virtual machine); none where the system does not tell. It comes in hundredths of a second.
+/// Steal time [s] since boot: time in which the hypervisor ran something else while a core of this virtual machine was ready to
+/// run. Of one core, or the sum over all cores. `None` where `/proc/stat` does not tell. Resolution 0.01 s.
 pub fn steal_time_s(core: Option<usize>) -> Option<f64> {
-    parse_stolen(&std::fs::read_to_string("/proc/stat").ok()?, core)
+    parse_steal_time(&std::fs::read_to_string("/proc/stat").ok()?, core)
 }
 
-fn parse_stolen(text: &str, core: Option<usize>) -> Option<f64> {
+fn parse_steal_time(text: &str, core: Option<usize>) -> Option<f64> {
     let name = core.map_or_else(|| "cpu".to_string(), |core| format!("cpu{core}"));
     let mut numbers =
         text.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(&name))?;
     numbers.nth(8)?.parse::<f64>().ok().map(|hundredths| hundredths / 100.0)
 }
 
-/// Keep all memory of the process in memory, now and later.
+/// Locks all present and future memory of the process.
 fn lock_memory() -> Result<(), String> {
     use rustix::mm::{MlockAllFlags, mlockall};
     mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|_| {
@@ -102,10 +102,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stolen_time_is_that_of_the_core() {
+    fn steal_time_is_that_of_the_core() {
         let text =
             "cpu  4 5 4 1 2 0 5 5555 0 0\ncpu1 2 3 0 0 7 0 9 2866 0 0\ncpu10 1 1 1 1 1 1 1 1 0 0\ncpu2 1 2\n";
-        let of = |core| parse_stolen(text, core);
+        let of = |core| parse_steal_time(text, core);
         assert_eq!((of(None), of(Some(1)), of(Some(10))), (Some(55.55), Some(28.66), Some(0.01)));
         assert_eq!((of(Some(0)), of(Some(2))), (None, None));
     }
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn what_is_not_granted_says_why() {
         let asked = Scheduling { priority: None, core: Some(100_000) };
-        let granted = std::thread::spawn(move || asked.claim()).join().expect("the thread ends");
+        let granted = std::thread::spawn(move || asked.apply()).join().expect("the thread ends");
         assert_eq!(granted.priority, Ok(None));
         let why = granted.core.clone().expect_err("no machine has so many");
         assert!(why.starts_with("there is no core 100000"), "{why}");

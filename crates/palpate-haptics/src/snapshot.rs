@@ -1,39 +1,39 @@
-//! What goes from the force process to whoever draws: the newest state, which is enough for a whole picture.
+//! Snapshots: the newest state of a scene, handed from the force process to displays through a triple buffer.
 
 use palpate::{
     ContactOutput, DeformationSnapshot, DeviceOutput, EnergyLedger, Input, Model, Output, State, StepStatus,
 };
 use triple_buffer::triple_buffer;
 
-/// A scene at the end of a step, as far as pictures take it.
+/// State of a scene at the end of a step, as far as a display needs it.
 #[derive(Debug)]
 pub struct Snapshot {
-    /// Steps since the start.
+    /// Number of the step, from 1; 0 is the initial state.
     pub step: u64,
     /// Simulated time [s].
     pub time_s: f64,
-    /// What deforms the objects, and where they are.
+    /// Deformation and pose of every object, in the model's order.
     pub objects: Vec<DeformationSnapshot>,
-    /// What the step was given: devices and obstacles.
+    /// Input of the step: devices and obstacles.
     pub input: Input,
-    /// What came out.
+    /// Output of every device.
     pub devices: Vec<DeviceOutput>,
     /// Contacts that carry force.
     pub contacts: Vec<ContactOutput>,
-    /// Of the whole scene.
+    /// Energy ledger of the scene.
     pub energy: EnergyLedger,
-    /// How the step went.
+    /// Status of the step.
     pub status: StepStatus,
 }
 
-/// The force process's end: it leaves the newest state there.
+/// Writing end of a snapshot buffer, held by the force process.
 pub struct SnapshotWriter(triple_buffer::Input<Snapshot>);
 
-/// The other end.
+/// Reading end of a snapshot buffer, held by a display.
 pub struct SnapshotReader(triple_buffer::Output<Snapshot>);
 
 impl Clone for Snapshot {
-    /// With as much room: moments are filled without allocation.
+    /// Copy with the same capacity, so that it can be filled without allocation.
     fn clone(&self) -> Self {
         let mut contacts = Vec::with_capacity(self.contacts.capacity());
         contacts.extend_from_slice(&self.contacts);
@@ -48,29 +48,29 @@ impl Clone for Snapshot {
 }
 
 impl Snapshot {
-    /// A state, with room for what later ones hold.
+    /// Snapshot of an initial state, with the capacity of any later one.
     pub fn new(model: &Model, state: &State, input: &Input) -> Self {
         let Output { time_s, devices, contacts, energy, status, .. } = state.output();
-        let room = contacts.capacity();
-        let mut moment = Self {
+        let capacity = contacts.capacity();
+        let mut snapshot = Self {
             step: 0,
             time_s: *time_s,
             objects: (0..model.recordings().count()).map(|object| state.deformation(object)).collect(),
             input: input.clone(),
             devices: devices.clone(),
-            contacts: Vec::with_capacity(room),
+            contacts: Vec::with_capacity(capacity),
             energy: *energy,
             status: *status,
         };
-        moment.contacts.extend_from_slice(contacts);
-        moment
+        snapshot.contacts.extend_from_slice(contacts);
+        snapshot
     }
 
-    /// Take over the state after so many steps.
+    /// Overwrites this snapshot with the state after `step` steps.
     ///
     /// # Real time
-    /// No allocation. Costs modes and contacts.
-    pub fn take(&mut self, step: u64, input: &Input, state: &State) {
+    /// No allocation. Cost: modes and contacts.
+    pub fn capture(&mut self, step: u64, input: &Input, state: &State) {
         let Output { time_s, devices, contacts, energy, status, .. } = state.output();
         (self.step, self.time_s, self.energy, self.status) = (step, *time_s, *energy, *status);
         self.objects.iter_mut().for_each(|object| object.copy_from(state));
@@ -82,25 +82,25 @@ impl Snapshot {
     }
 }
 
-/// Two ends between which the newest moment goes: nobody waits for anybody.
+/// Triple buffer of snapshots: neither end waits for the other.
 pub fn snapshot_buffer(first: &Snapshot) -> (SnapshotWriter, SnapshotReader) {
     let (input, output) = triple_buffer(first);
     (SnapshotWriter(input), SnapshotReader(output))
 }
 
 impl SnapshotWriter {
-    /// Leave the state for whoever draws.
+    /// Publishes a snapshot of the state after `step` steps.
     ///
     /// # Real time
-    /// No allocation. Costs modes and contacts.
-    pub fn show(&mut self, step: u64, input: &Input, state: &State) {
-        self.0.input_buffer_mut().take(step, input, state);
+    /// No allocation. Cost: modes and contacts.
+    pub fn publish(&mut self, step: u64, input: &Input, state: &State) {
+        self.0.input_buffer_mut().capture(step, input, state);
         self.0.publish();
     }
 }
 
 impl SnapshotReader {
-    /// The newest moment; none when there is none newer than the last.
+    /// Newest snapshot; `None` if there is none newer than the last one read.
     pub fn newest(&mut self) -> Option<&Snapshot> {
         self.0.update().then(|| &*self.0.output_buffer_mut())
     }

@@ -1,4 +1,4 @@
-//! How a process keeps its time: histograms that record without allocating.
+//! Timing of periodic processes: duration histograms that record without allocating, lateness, compute time, overruns.
 
 use crate::scheduling::GrantedScheduling;
 use hdrhistogram::Histogram;
@@ -6,146 +6,165 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-/// The longest time [ns] that is told from longer ones: ten seconds.
+/// Longest duration that is resolved [ns]: 10 s. Longer ones count as this.
 const LONGEST_NS: u64 = 10_000_000_000;
 
-/// How many digits of a time are kept.
+/// Significant decimal digits of a recorded duration.
 const DIGITS: u8 = 3;
 
-/// Times as they come: recorded without allocating, told as percentiles.
+/// Histogram of durations, from 1 ns to 10 s with 3 significant digits.
 #[derive(Debug, Clone)]
-pub struct Spread(Histogram<u64>);
+pub struct DurationHistogram(Histogram<u64>);
 
 /// Lateness, compute time and overruns of a periodic process.
 #[derive(Debug, Clone, Default)]
 pub struct Timing {
-    lateness: Spread,
-    compute: Spread,
-    /// Cycles that ended after the next one was due.
+    lateness: DurationHistogram,
+    compute: DurationHistogram,
+    /// Cycles that ended after the next deadline.
     pub overruns: u64,
-    /// Those of them that computed longer than a period: not for waking up late.
+    /// Overruns whose compute time exceeded the period. The other overruns started late.
     pub own_overruns: u64,
-    /// Ticks that were passed over to be on the grid again.
+    /// Ticks that were skipped to return to the grid of deadlines.
     pub skipped: u64,
 }
 
-/// Percentiles of a time [µs].
+/// Percentiles of durations [µs].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Percentiles {
-    /// Half are below.
+    /// Median.
     pub p50: f64,
-    /// 99 % are below.
+    /// 99th percentile.
     pub p99: f64,
-    /// 99.9 % are below.
+    /// 99.9th percentile.
     pub p999: f64,
-    /// All are.
+    /// Maximum.
     pub max: f64,
 }
 
-/// One cycle of a process.
+/// Timing of one cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cycle {
-    /// How late it began.
-    pub late: Duration,
-    /// How long it took.
-    pub took: Duration,
-    /// If it ended after the next was due: whether by itself, and how many ticks are passed over for it.
-    pub overrun: Option<(bool, u64)>,
+    /// Delay of the start after the deadline.
+    pub lateness: Duration,
+    /// Compute time.
+    pub compute: Duration,
+    /// Overrun, if the cycle ended after the next deadline.
+    pub overrun: Option<Overrun>,
 }
 
-/// A process's end of a line over which it tells of its cycles while it runs.
-pub struct CycleSender(Producer<Cycle>, Arc<OnceLock<GrantedScheduling>>);
+/// Overrun of a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Overrun {
+    /// Whether the compute time alone exceeded the period.
+    pub by_compute: bool,
+    /// Ticks that were skipped.
+    pub skipped: u64,
+}
 
-/// The other end.
-pub struct CycleReceiver(Consumer<Cycle>, Arc<OnceLock<GrantedScheduling>>);
+/// Sending end of a channel of cycles, held by the process.
+pub struct CycleSender {
+    cycles: Producer<Cycle>,
+    granted: Arc<OnceLock<GrantedScheduling>>,
+}
 
-/// A line for so many cycles that nobody has listened to yet; more are not told.
-pub fn cycles(room: usize) -> (CycleSender, CycleReceiver) {
-    let (producer, consumer) = RingBuffer::new(room);
+/// Receiving end of a channel of cycles, held by a monitor.
+pub struct CycleReceiver {
+    cycles: Consumer<Cycle>,
+    granted: Arc<OnceLock<GrantedScheduling>>,
+}
+
+/// Channel of cycles with a capacity. Cycles that find it full are not sent.
+pub fn cycle_channel(capacity: usize) -> (CycleSender, CycleReceiver) {
+    let (producer, consumer) = RingBuffer::new(capacity);
     let granted = Arc::default();
-    (CycleSender(producer, Arc::clone(&granted)), CycleReceiver(consumer, granted))
+    let sender = CycleSender { cycles: producer, granted: Arc::clone(&granted) };
+    (sender, CycleReceiver { cycles: consumer, granted })
 }
 
 impl CycleSender {
-    /// Tell what the system has granted, before the first cycle.
-    pub(crate) fn begin(&mut self, granted: GrantedScheduling) {
-        let _ = self.1.set(granted);
+    /// Sends the granted scheduling, before the first cycle.
+    pub(crate) fn send_granted(&mut self, granted: GrantedScheduling) {
+        let _ = self.granted.set(granted);
     }
 
-    /// Tell of a cycle, if somebody listens.
+    /// Sends a cycle, if the channel has room.
     ///
     /// # Real time
-    pub(crate) fn tell(&mut self, cycle: Cycle) {
-        let _ = self.0.push(cycle);
+    /// No allocation, lock or system call.
+    pub(crate) fn send(&mut self, cycle: Cycle) {
+        let _ = self.cycles.push(cycle);
     }
 }
 
 impl CycleReceiver {
-    /// What the system granted the process; none before it has begun.
+    /// Granted scheduling of the process; `None` before its first cycle.
     pub fn granted(&self) -> Option<&GrantedScheduling> {
-        self.1.get()
+        self.granted.get()
     }
 
-    /// Take in all cycles that were told since the last time.
-    pub fn listen(&mut self, timing: &mut Timing) {
-        while let Ok(cycle) = self.0.pop() {
+    /// Moves all cycles that have arrived into `timing`.
+    pub fn drain_into(&mut self, timing: &mut Timing) {
+        while let Ok(cycle) = self.cycles.pop() {
             timing.record(cycle);
         }
     }
 }
 
-impl Default for Spread {
+impl Default for DurationHistogram {
     fn default() -> Self {
         let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
         Self(histogram.unwrap_or_else(|_| unreachable!("constant bounds are good")))
     }
 }
 
-impl Spread {
-    /// Take in a time.
+impl DurationHistogram {
+    /// Records a duration.
     ///
     /// # Real time
-    pub fn record(&mut self, time: Duration) {
-        self.0.saturating_record(time.as_nanos().min(u128::from(LONGEST_NS)) as u64);
+    /// No allocation, lock or system call.
+    pub fn record(&mut self, duration: Duration) {
+        self.0.saturating_record(duration.as_nanos().min(u128::from(LONGEST_NS)) as u64);
     }
 
-    /// How many there were.
+    /// Number of recorded durations.
     pub fn count(&self) -> u64 {
         self.0.len()
     }
 
-    /// Their percentiles [µs].
+    /// Percentiles [µs].
     pub fn percentiles_us(&self) -> Percentiles {
-        let at = |share: f64| self.0.value_at_quantile(share) as f64 * 1e-3;
+        let at = |quantile: f64| self.0.value_at_quantile(quantile) as f64 * 1e-3;
         Percentiles { p50: at(0.5), p99: at(0.99), p999: at(0.999), max: self.0.max() as f64 * 1e-3 }
     }
 }
 
 impl Timing {
-    /// Take in a cycle.
+    /// Records a cycle.
     ///
     /// # Real time
-    pub fn record(&mut self, Cycle { late, took, overrun }: Cycle) {
-        self.lateness.record(late);
-        self.compute.record(took);
-        if let Some((own, skipped)) = overrun {
+    /// No allocation, lock or system call.
+    pub fn record(&mut self, Cycle { lateness, compute, overrun }: Cycle) {
+        self.lateness.record(lateness);
+        self.compute.record(compute);
+        if let Some(Overrun { by_compute, skipped }) = overrun {
             self.overruns += 1;
-            self.own_overruns += u64::from(own);
+            self.own_overruns += u64::from(by_compute);
             self.skipped += skipped;
         }
     }
 
-    /// Cycles.
+    /// Number of recorded cycles.
     pub fn cycles(&self) -> u64 {
         self.compute.count()
     }
 
-    /// How late cycles began.
+    /// Percentiles of the lateness [µs].
     pub fn lateness_us(&self) -> Percentiles {
         self.lateness.percentiles_us()
     }
 
-    /// How long they took.
+    /// Percentiles of the compute time [µs].
     pub fn compute_us(&self) -> Percentiles {
         self.compute.percentiles_us()
     }
@@ -156,15 +175,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_those_of_what_was_told() {
+    fn percentiles_are_those_of_the_cycles_that_were_sent() {
+        /// Resolution of three significant digits, at its coarsest.
+        const RESOLUTION: f64 = 2e-3;
         let mut timing = Timing::default();
-        let (mut teller, mut listener) = cycles(700);
+        let (mut sender, mut receiver) = cycle_channel(700);
+        let overruns = [
+            (3, Overrun { by_compute: true, skipped: 2 }),
+            (1000, Overrun { by_compute: false, skipped: 0 }),
+        ];
         for k in 1..=1000_u64 {
-            let overrun = [(3, (true, 2)), (1000, (false, 0))].into_iter().find(|(at, _)| *at == k);
-            let (late, took) = (Duration::from_nanos(10 * k), Duration::from_micros(k));
-            teller.tell(Cycle { late, took, overrun: overrun.map(|(_, overrun)| overrun) });
+            let overrun = overruns.iter().find(|(at, _)| *at == k).map(|(_, overrun)| *overrun);
+            let (lateness, compute) = (Duration::from_nanos(10 * k), Duration::from_micros(k));
+            sender.send(Cycle { lateness, compute, overrun });
             if k.is_multiple_of(500) {
-                listener.listen(&mut timing);
+                receiver.drain_into(&mut timing);
             }
         }
         let (late, took) = (timing.lateness_us(), timing.compute_us());
@@ -172,7 +197,7 @@ mod tests {
         for (got, expected) in
             [(took.p50, 500.0), (took.p99, 990.0), (took.p999, 999.0), (took.max, 1000.0), (late.max, 10.0)]
         {
-            assert!((got / expected - 1.0).abs() < 2e-3, "{got} {expected}");
+            assert!((got / expected - 1.0).abs() < RESOLUTION, "{got} {expected}");
         }
         assert_eq!((timing.overruns, timing.own_overruns, timing.skipped), (2, 1, 2));
     }

@@ -35,21 +35,21 @@ pub fn render_log(
 ) -> Result<(), RenderError> {
     let frames = log.frames.clone();
     log.compute(stop, progress)?;
-    let (pictures, images) = channel();
+    let (sender, images) = channel();
     let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
-    let server = Server::bind(&settings).map_err(RenderError::Server)?;
-    let address = format!("http://{}/", server.address().map_err(RenderError::Server)?);
+    let server = Server::bind(&settings)?;
+    let address = format!("http://{}/", server.address()?);
     let done = AtomicBool::new(false);
     let (size, count) = ((request.width, request.height), request.frames.len() as u64);
     std::thread::scope(|scope| {
         let serving = scope.spawn(|| {
-            server.run(ServedContent::Render(frames, RenderJob { wish: request, pictures }), &done)
+            server.run(ServedContent::Render(frames, RenderJob { request, images: sender }), &done)
         });
         let drawn = Browser::open(browser, &address, size)
             .and_then(|mut browser| collect(&mut browser, (&images, count), stop, progress, sink));
         done.store(true, Ordering::Release);
-        let served = serving.join().map_err(|_| RenderError::Server("the server has ended by a bug".into()));
-        drawn.and_then(|()| served?.map_err(RenderError::Server))
+        let served = serving.join().map_err(|_| RenderError::ServerPanic);
+        drawn.and_then(|()| Ok(served??))
     })
 }
 
@@ -147,10 +147,7 @@ fn collect(
                     )));
                 }
                 if last.elapsed() > TIMEOUT {
-                    return Err(RenderError::Browser(format!(
-                        "the browser has drawn nothing for {} s: it may lack WebGL 2; try another with --browser",
-                        TIMEOUT.as_secs()
-                    )));
+                    return Err(RenderError::BrowserTimeout { seconds: TIMEOUT.as_secs() });
                 }
             }
         }

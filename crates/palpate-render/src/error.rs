@@ -2,6 +2,7 @@
 
 use palpate_export::ExportError;
 use palpate_scene::ReplayError;
+use palpate_viewer::ServerError;
 use std::io;
 use std::path::PathBuf;
 
@@ -17,7 +18,7 @@ pub enum RenderError {
     Export(#[from] ExportError),
     /// No browser was found.
     #[error(
-        "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one with --browser"
+        "pictures are drawn by a browser, and there is none: install chromium (apt install chromium), or name one"
     )]
     NoBrowser,
     /// A browser cannot be started.
@@ -28,12 +29,21 @@ pub enum RenderError {
         /// Error of the operating system, where there is one.
         reason: Option<io::Error>,
     },
+    /// The browser drew nothing for too long.
+    #[error("the browser has drawn nothing for {seconds} s: it may lack WebGL 2; try another")]
+    BrowserTimeout {
+        /// Time that was waited [s].
+        seconds: u64,
+    },
     /// The browser stopped working.
     #[error("{0}")]
     Browser(String),
     /// The viewer's server.
-    #[error("{0}")]
-    Server(String),
+    #[error(transparent)]
+    Server(#[from] ServerError),
+    /// The thread of the viewer's server panicked.
+    #[error("the server has ended by a bug")]
+    ServerPanic,
     /// There is no temporary folder for the browser.
     #[error("cannot make a folder for the browser: {0}")]
     TemporaryFolder(io::Error),

@@ -122,7 +122,7 @@ fn compute_frames(
     let (mut state, start) = (log.initial_state()?, log.initial_input()?);
     let mut snapshot = Snapshot::new(&log.scene.model, &state, &start);
     if steps.contains(0) {
-        builder.take(&snapshot);
+        builder.push(&snapshot);
     }
     progress.begin("steps", log.steps);
     let mut number = 0;
@@ -130,8 +130,8 @@ fn compute_frames(
         number += 1;
         progress.advance(1);
         if steps.contains(number) {
-            snapshot.take(number, input, state);
-            builder.take(&snapshot);
+            snapshot.capture(number, input, state);
+            builder.push(&snapshot);
         }
         if stop.load(Ordering::Relaxed) { Err(RenderError::ReplayInterrupted) } else { Ok(()) }
     })?;

@@ -3,9 +3,8 @@
 use crate::error::ReproduceError;
 use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
 use palpate_fem::mesh::box_mesh;
-use palpate_fem::progress::Progress;
-use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
-use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
+use palpate_fem::{Progress, RecordExtent, RecordParameters, RecordedBody};
 use palpate_scene::{RecordingRecipe, paper_cube};
 
 /// Parameters of the paper's cube.
@@ -15,7 +14,7 @@ fn parameters(cells: u32, modes: usize) -> RecordParameters {
 }
 
 /// The paper's cube with a number of cells along each side, without certificate.
-pub fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<Recorded, ReproduceError> {
+pub fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<RecordedBody, ReproduceError> {
     damped_cube(cells, modes, parameters(cells, modes).damping, progress)
 }
 
@@ -25,14 +24,15 @@ pub fn damped_cube(
     modes: usize,
     damping: Damping,
     progress: &mut dyn Progress,
-) -> Result<Recorded, ReproduceError> {
-    let parameters = RecordParameters { damping, extent: Extent::Uncertified, ..parameters(cells, modes) };
-    Ok(record(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
+) -> Result<RecordedBody, ReproduceError> {
+    let parameters =
+        RecordParameters { damping, extent: RecordExtent::NoCertificate, ..parameters(cells, modes) };
+    Ok(RecordedBody::new(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
 }
 
 /// A table in closed form of a free body, end of step, in memory; `change` maps every number of it.
 pub fn table_in_memory(
-    body: &Recorded,
+    body: &RecordedBody,
     step_s: f64,
     samples: usize,
     touchable_nodes: Vec<u32>,
@@ -42,13 +42,13 @@ pub fn table_in_memory(
         step_s,
         samples,
         sampling: Sampling::End,
-        method: Method::ClosedForm,
+        method: TableMethod::ClosedForm,
         touchable_nodes,
-        observed_nodes: body.system.discretisation.surface_nodes(),
+        observed_nodes: body.surface_nodes(),
     };
     let recorder = TableRecorder::new(body, &parameters)?;
     let touchable_dofs = recorder.touchable_dofs();
-    let columns = recorder.columns(0..touchable_dofs.len(), BLOCK, &|_| {});
+    let columns = recorder.columns(0..touchable_dofs.len(), COLUMN_BLOCK, &|_| {});
     let values: Vec<f64> = columns.into_iter().flatten().map(change).collect();
     Ok(ImpulseResponse {
         step_s,

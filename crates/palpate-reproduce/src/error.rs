@@ -1,8 +1,8 @@
 //! Reasons why the reproduction ended.
 
 use palpate_export::ExportError;
+use palpate_fem::RecordError;
 use palpate_fem::mesh::MeshError;
-use palpate_fem::record::RecordError;
 use palpate_fem::table::TableError;
 use palpate_render::RenderError;
 use palpate_scene::{ReplayError, SceneError};

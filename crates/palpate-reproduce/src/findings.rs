@@ -1,30 +1,30 @@
-//! What the paper reports beside what was measured: the table at the top of the page.
+//! Findings: statements of the paper beside measured values, the table at the top of the page.
 
 use crate::page::listing;
 
-/// One thing that the paper reports.
+/// A statement of the paper and the measured value.
 #[derive(Debug, Clone)]
 pub struct Finding {
-    /// What it is.
+    /// Quantity.
     pub what: String,
-    /// Where the paper tells of it.
+    /// Place in the paper.
     pub place: &'static str,
-    /// What the paper says; empty where it says nothing.
+    /// Value in the paper; empty where it gives none.
     pub paper: String,
-    /// What was measured.
+    /// Measured value.
     pub ours: String,
-    /// Anchor of the section that tells more.
+    /// Anchor of the section with details.
     pub section: &'static str,
 }
 
 impl Finding {
-    /// The command that measures it again.
+    /// Command that measures it again.
     fn command(&self) -> String {
         format!("palpate reproduce --only {}", self.section)
     }
 }
 
-/// All of them as a table.
+/// All findings as a table.
 pub fn findings_table(findings: &[Finding]) -> String {
     let rows: Vec<[String; 4]> = findings
         .iter()

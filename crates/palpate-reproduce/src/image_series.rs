@@ -57,7 +57,7 @@ impl ImageRenderer {
             }
             Err(why) => {
                 let log = series.log.file_name().unwrap_or_default().to_string_lossy();
-                progress.remark(&format!("no pictures of {log}: {why}"));
+                progress.warn(&format!("no pictures of {log}: {why}"));
                 paragraph(&format!(
                     "Here a series of {} pictures is missing: {why}. The log is there, and shows the same: palpate serve {log}",
                     series.instants.len()
@@ -85,7 +85,7 @@ fn draw(series: &ImageSeries, browser: &Path) -> Result<Vec<Vec<u8>>, ReproduceE
     let log = LogFramePlayer::read_at(series.log, steps)?;
     let mut pictures = Vec::new();
     // An interrupt ends the process.
-    let progress = &mut palpate_scene::Silent;
+    let progress = &mut palpate_scene::SilentProgress;
     render_log(log, wish, browser, &AtomicBool::new(false), progress, &mut |number, png| {
         write_atomically(&folder.join(format!("picture_{}.png", number + 1)), &png)?;
         pictures.push(png);

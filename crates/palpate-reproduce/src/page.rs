@@ -2,7 +2,6 @@
 //!
 //! Callers number the figures and tables. Texts are escaped here, except where a parameter says that it is html.
 
-use crate::chart::CHART_STYLE;
 use crate::surface_picture::PICTURE_STYLE;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -71,6 +70,23 @@ grid-template-columns:repeat(auto-fill,minmax(max(9.5rem,100%/var(--columns) - 1
 @media print{html{font-size:10pt}body{max-width:none;padding:0}nav{display:none}a{color:inherit}
 h2{break-after:avoid}figure,.table,tr,pre{break-inside:avoid}figure,.table,pre{overflow:visible}
 pre{white-space:pre-wrap}svg{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
+";
+
+/// Style sheet of the charts.
+const CHART_STYLE: &str = "\
+.chart{display:block;width:100%;max-width:44rem;height:auto;overflow:visible}
+.chart text{font-size:13px;fill:var(--soft)}
+.chart .title{font-size:15px;font-weight:600;fill:var(--ink)}
+.chart .label{fill:var(--ink)}
+.chart path{fill:none;stroke-linecap:round;stroke-linejoin:round}
+.chart .grid{stroke:var(--grid)}
+.chart .axis{stroke:var(--soft)}
+.chart .reference{stroke:var(--ink);stroke-width:1;stroke-opacity:.65}
+.chart .line{stroke:currentColor;stroke-width:2.2}
+.chart .thin{stroke:currentColor;stroke-width:1.5}
+.chart path.markers{fill:currentColor}
+.chart .s1{color:var(--series-1)}.chart .s2{color:var(--series-2)}.chart .s3{color:var(--series-3)}
+.chart .s4{color:var(--series-4)}.chart .s5{color:var(--series-5)}.chart .s6{color:var(--series-6)}
 ";
 
 impl Page {

@@ -1,6 +1,6 @@
 //! Progress of the measurements.
 
-use palpate_fem::progress::{Progress, Silent};
+use palpate_fem::{Progress, SilentProgress};
 
 /// Progress whose stages end, and whose units are counted from other threads.
 pub trait StageProgress: Progress {
@@ -10,7 +10,7 @@ pub trait StageProgress: Progress {
     fn counter(&self) -> Box<dyn Fn(usize) + Sync>;
 }
 
-impl StageProgress for Silent {
+impl StageProgress for SilentProgress {
     fn finish(&mut self) {}
 
     fn counter(&self) -> Box<dyn Fn(usize) + Sync> {

@@ -1,6 +1,6 @@
 //! Devices by name: drivers of real devices, traits of simulated ones, grips of a hand.
 
-use palpate_haptics::device::{Driver, Hand, Mount, Traits};
+use palpate_haptics::device::{DeviceSpec, Driver, Hand, Mount};
 
 /// Real device with its limits.
 #[derive(Debug, Clone)]
@@ -41,9 +41,9 @@ pub fn find_driver(name: &str) -> Result<Driver, String> {
 ///
 /// # Errors
 /// A message with the known names.
-pub fn find_device_traits(name: &str) -> Result<Traits, String> {
-    let known = || Traits::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
-    Traits::named(name).ok_or_else(|| format!("device is {name:?}, expected one of {}", known()))
+pub fn find_device_traits(name: &str) -> Result<DeviceSpec, String> {
+    let known = || DeviceSpec::KNOWN.map(|traits| format!("{:?}", traits.kind)).join(", ");
+    DeviceSpec::named(name).ok_or_else(|| format!("device is {name:?}, expected one of {}", known()))
 }
 
 /// Hand by the name of its grip.

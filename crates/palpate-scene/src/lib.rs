@@ -31,7 +31,7 @@ pub use library::{
     BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube,
 };
 pub use mesh_source::{read_mesh, read_surface, source_name};
-pub use progress::{Progress, ProgressFn, Silent, WithoutRemarks};
+pub use progress::{Progress, ProgressFn, SilentProgress, WithoutRemarks};
 pub use recipe::{RecordingRecipe, cache_folder};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
 pub use replay::{LogReplay, ReplayError};

@@ -1,7 +1,9 @@
 //! Mesh sources: primitives as text (`box:…`, `sphere:…`) and mesh files.
 
 use crate::error::{SceneError, SceneErrorKind};
-use palpate_fem::mesh::{Mesh, MeshError, SurfaceMesh, ball_mesh, box_mesh, gmsh, obj, stl, vtk};
+use palpate_fem::mesh::{
+    Mesh, MeshError, SurfaceMesh, ball_mesh, box_mesh, read_gmsh, read_obj, read_stl, read_vtk,
+};
 use std::path::Path;
 
 /// Makes a primitive, or reads a mesh file of tetrahedra.
@@ -29,8 +31,8 @@ pub fn read_mesh(source: &str) -> Result<Mesh, SceneError> {
     }
     let path = Path::new(source);
     match extension(path).as_str() {
-        "msh" => gmsh::read(path).map_err(refused),
-        "vtk" => vtk::read(path).map_err(refused),
+        "msh" => read_gmsh(path).map_err(refused),
+        "vtk" => read_vtk(path).map_err(refused),
         _ => Err(mesh_error(format!(
             "{source:?} is no mesh that palpate reads: give a Gmsh file (.msh), a VTK legacy file (.vtk), \
              box:LXxLYxLZ/NXxNYxNZ or sphere:RADIUS/N"
@@ -50,13 +52,13 @@ pub fn read_surface(path: &Path) -> Result<SurfaceMesh, SceneError> {
                 path.display()
             )));
         }
-        SurfaceMesh::around(mesh).map_err(|error| mesh_error(format!("{}: {error}", path.display())))
+        SurfaceMesh::from_boundary(mesh).map_err(|error| mesh_error(format!("{}: {error}", path.display())))
     };
     let mut surface = match extension(path).as_str() {
-        "obj" => obj::read(path).map_err(refused)?,
-        "stl" => stl::read(path).map_err(refused)?,
-        "msh" => return around(gmsh::read(path).map_err(refused)?),
-        "vtk" => return around(vtk::read(path).map_err(refused)?),
+        "obj" => read_obj(path).map_err(refused)?,
+        "stl" => read_stl(path).map_err(refused)?,
+        "msh" => return around(read_gmsh(path).map_err(refused)?),
+        "vtk" => return around(read_vtk(path).map_err(refused)?),
         _ => {
             return Err(mesh_error(format!(
                 "{} is no mesh that palpate reads: give a closed surface (.obj, .stl) or a body of tetrahedra (.msh, .vtk)",

@@ -1,6 +1,6 @@
 //! Progress of recording, for callers that show it.
 
-pub use palpate_fem::progress::{Progress, Silent};
+pub use palpate_fem::{Progress, SilentProgress};
 
 /// Progress without remarks: for recordings whose coarse elements are intended.
 pub struct WithoutRemarks<'a>(pub &'a mut dyn Progress);
@@ -12,7 +12,7 @@ impl Progress for WithoutRemarks<'_> {
     fn advance(&mut self, units: u64) {
         self.0.advance(units);
     }
-    fn remark(&mut self, _text: &str) {}
+    fn warn(&mut self, _text: &str) {}
 }
 
 /// Progress as calls of a function with the stage and its completed share, at most a hundred times a stage.
@@ -48,5 +48,5 @@ impl<F: FnMut(&str, Option<f64>)> Progress for ProgressFn<F> {
         }
     }
 
-    fn remark(&mut self, _text: &str) {}
+    fn warn(&mut self, _text: &str) {}
 }

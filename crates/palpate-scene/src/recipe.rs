@@ -6,10 +6,7 @@ use crate::progress::WithoutRemarks;
 use crate::recording_file::read_recording;
 use palpate::{Damping, Material, Recording, Support};
 use palpate_export::write_atomically;
-use palpate_fem::element::Order;
-use palpate_fem::progress::Progress;
-use palpate_fem::record::{Extent, RecordParameters, record};
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::{ElementOrder, Progress, RecordExtent, RecordParameters, ResidualChoice, record};
 use std::path::{Path, PathBuf};
 
 /// Mesh, material and parameters from which an object of one material is recorded.
@@ -22,7 +19,7 @@ pub struct RecordingRecipe {
     /// Material of all regions; its own region is ignored.
     pub material: Material,
     /// Order of the elements.
-    pub order: Order,
+    pub order: ElementOrder,
     /// Number of modes.
     pub modes: usize,
     /// Damping of the modes.
@@ -40,7 +37,7 @@ impl RecordingRecipe {
             source: source.clone(),
             scale: 1.0,
             material: Material { region: String::new(), ..material.clone() },
-            order: if metadata.mesh.order == 1 { Order::Linear } else { Order::Quadratic },
+            order: if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
             modes: recording.modes.len(),
             damping: metadata.damping,
         })
@@ -49,7 +46,7 @@ impl RecordingRecipe {
     /// File name in a cache, unique for the recipe and the version.
     fn file_name(&self) -> String {
         let Material { young_pa: young, poisson, density_kg_m3: density, .. } = self.material;
-        let order = if self.order == Order::Linear { 1 } else { 2 };
+        let order = if self.order == ElementOrder::Linear { 1 } else { 2 };
         let damping = match self.damping {
             Damping::Rayleigh { alpha, beta } => format!("a{alpha}-b{beta}"),
             Damping::Ratio(ratio) => format!("z{ratio}"),
@@ -70,7 +67,7 @@ impl RecordingRecipe {
             residual: ResidualChoice::Automatic,
             fixed_nodes: Vec::new(),
             source: source_name(&self.source),
-            extent: Extent::Whole,
+            extent: RecordExtent::Full,
         }
     }
 
@@ -84,9 +81,7 @@ impl RecordingRecipe {
         mesh.scale(self.scale).map_err(|error| refused(&error))?;
         let parameters = self.parameters(mesh.regions.len());
         let recorded = record(mesh, &parameters, &mut WithoutRemarks(progress));
-        recorded
-            .map(|recorded| recorded.recording)
-            .map_err(|error| refused(&format!("{}: {error}", source_name(&self.source))))
+        recorded.map_err(|error| refused(&format!("{}: {error}", source_name(&self.source))))
     }
 
     /// Recording from a cache folder, if it is there.

@@ -4,7 +4,7 @@ use crate::error::SceneError;
 use crate::file::{Relocated, RunMode, read_relocated_scene};
 use crate::scene::Scene;
 use palpate::{DeviceMode, Input, State, step};
-use palpate_haptics::log::{Names, Reader};
+use palpate_haptics::log::{LogReader, SceneNames};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ pub struct LogReplay {
     pub scene: Scene,
     /// Number of steps.
     pub steps: u64,
-    names: Names,
+    names: SceneNames,
     modes: Vec<DeviceMode>,
     // The unpacked files must outlive the scene: tables are mapped into memory.
     _folder: TempDir,
@@ -104,10 +104,10 @@ impl LogReplay {
             source,
         })?;
         let named = |error| ReplayError::Log { path: path.to_path_buf(), error };
-        let reader = Reader::new(&bytes).map_err(named)?;
-        let facts = reader.facts().map_err(named)?;
+        let reader = LogReader::new(&bytes).map_err(named)?;
+        let facts = reader.metadata().map_err(named)?;
         let files = reader.files().map_err(named)?;
-        let steps = reader.steps();
+        let steps = reader.step_count();
         let (mut scene, folder) = unpack(files, facts.get("scene").map(Path::new))?;
         scene.inputs.push(path.to_path_buf());
         let names = scene.names();
@@ -131,7 +131,7 @@ impl LogReplay {
     /// [`ReplayError::Log`].
     pub fn initial_input(&self) -> Result<Input, ReplayError> {
         let mut input = self.scene.input_at(0.0);
-        if let Some(logged) = self.reader()?.each_step().next() {
+        if let Some(logged) = self.reader()?.logged_steps().next() {
             let first = logged.and_then(|logged| logged.input(&self.names, &self.modes));
             let first = first.map_err(|error| self.named(error))?;
             for ((device, at_start), first) in
@@ -158,7 +158,7 @@ impl LogReplay {
     ) -> Result<u64, E> {
         let path = || self.path.clone();
         let mut done = 0;
-        for logged in self.reader()?.each_step().take(max_steps.try_into().unwrap_or(usize::MAX)) {
+        for logged in self.reader()?.logged_steps().take(max_steps.try_into().unwrap_or(usize::MAX)) {
             let logged = logged.map_err(|error| self.named(error))?;
             if logged.step != done + 1 {
                 let gap = ReplayError::MissedSteps { path: path(), step: logged.step, previous: done };
@@ -168,7 +168,7 @@ impl LogReplay {
             let before = Instant::now();
             step(&self.scene.model, state, &input);
             let took = before.elapsed();
-            if let Some((quantity, then, now)) = logged.difference(&self.names, state.output()) {
+            if let Some((quantity, then, now)) = logged.first_difference(&self.names, state.output()) {
                 let differs = ReplayError::Differs {
                     path: path(),
                     step: logged.step,
@@ -192,8 +192,8 @@ impl LogReplay {
         ReplayError::Log { path: self.path.clone(), error }
     }
 
-    fn reader(&self) -> Result<Reader<'_>, ReplayError> {
-        Reader::new(&self.bytes).map_err(|error| self.named(error))
+    fn reader(&self) -> Result<LogReader<'_>, ReplayError> {
+        LogReader::new(&self.bytes).map_err(|error| self.named(error))
     }
 }
 
@@ -207,10 +207,10 @@ fn unpack(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Result<(Scene,
         // Only the file name is used: nothing is written outside of the folder.
         let file = name.file_name().map_or_else(|| "file".into(), |name| name.to_os_string());
         let own = folder.path().join(at.to_string());
-        let place = own.join(file);
-        let written = std::fs::create_dir(&own).and_then(|()| std::fs::write(&place, data));
-        written.map_err(|source| ReplayError::Io { action: "unpack", path: place.clone(), source })?;
-        relocated.insert(name, place);
+        let stored = own.join(file);
+        let written = std::fs::create_dir(&own).and_then(|()| std::fs::write(&stored, data));
+        written.map_err(|source| ReplayError::Io { action: "unpack", path: stored.clone(), source })?;
+        relocated.insert(name, stored);
     }
     Ok((read_relocated_scene(scene, &relocated, RunMode::RealTime)?, folder))
 }

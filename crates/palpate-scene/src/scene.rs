@@ -5,8 +5,8 @@ use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, SceneLabels};
 use palpate_haptics::MotionPath;
-use palpate_haptics::device::{Hand, Traits};
-use palpate_haptics::log::Names;
+use palpate_haptics::device::{DeviceSpec, Hand};
+use palpate_haptics::log::SceneNames;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ pub struct SceneDevice {
     /// Path of its position, or of the simulated hand; none for real and linked devices and for pointers.
     pub path: Option<MotionPath>,
     /// Simulated device and hand, which follow the path as far as forces allow.
-    pub simulated: Option<(Traits, Hand)>,
+    pub simulated: Option<(DeviceSpec, Hand)>,
     /// Real device.
     pub real: Option<RealDevice>,
     /// Whether it is a pointer of the viewer's page.
@@ -69,7 +69,7 @@ impl SceneObstacle {
     pub fn pose_at(&self, time_s: f64) -> Pose {
         match &self.path {
             None => self.start,
-            Some(path) if path.turns() => path.at(time_s),
+            Some(path) if path.has_orientations() => path.at(time_s),
             Some(path) => Pose { position: path.at(time_s).position, ..self.start },
         }
     }
@@ -77,8 +77,8 @@ impl SceneObstacle {
 
 impl Scene {
     /// Names of all parts, as logs have them.
-    pub fn names(&self) -> Names {
-        Names {
+    pub fn names(&self) -> SceneNames {
+        SceneNames {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(|device| device.name.clone()).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),

@@ -3,7 +3,7 @@
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::Scene;
 use palpate::{Input, Model, State};
-use palpate_haptics::log::{LogSender, LogWriter, Names};
+use palpate_haptics::log::{LogSender, LogWriter, SceneNames};
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Content of a scene that its logs carry.
 pub struct SceneLog {
     model: Arc<Model>,
-    names: Names,
+    names: SceneNames,
     input: Input,
     /// Files that the scene was read from, the scene file first.
     inputs: Vec<PathBuf>,

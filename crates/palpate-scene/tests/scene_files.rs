@@ -113,6 +113,7 @@ fn a_scene_with_every_old_key_opens_as_one_with_the_keys_of_today() {
 
 #[test]
 fn old_and_new_spelling_of_a_key_exclude_each_other() {
+    // The line is that where the table begins.
     for (old, new, key) in [
         ("motion = \"exact\"", "integrator = \"exact\"", "integrator"),
         ("most_places = 48", "max_contact_samples = 48", "max_contact_samples"),
@@ -121,7 +122,7 @@ fn old_and_new_spelling_of_a_key_exclude_each_other() {
         let error = read(&format!("{old}\n{new}\n{OBJECT}")).err().expect("a refusal");
         assert_eq!(
             (error.kind, error.line, error.key.as_deref()),
-            (SceneErrorKind::Syntax, Some(2), Some(key))
+            (SceneErrorKind::Syntax, Some(1), Some(key))
         );
         assert!(error.message.contains(&format!("duplicate field `{key}`")), "{error}");
     }

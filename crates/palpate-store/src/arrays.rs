@@ -1,4 +1,4 @@
-//! The arrays of a store: how the table and what stands beside it are laid out in Zarr.
+//! Zarr arrays of a store: the table, and the arrays beside it.
 
 use crate::attributes::{Compression, Number, TableAttributes, TableContent};
 use crate::object_storage::ObjectStorage;
@@ -15,15 +15,16 @@ use zarrs::array::{
     Array, ArrayBuilder, CodecOptions, DataType, Element, ElementOwned, IntoArrayBytes, data_type,
 };
 
-/// The array of the table, in the store.
+/// Path of the table in the store.
 const TABLE: &str = "/impulse_response";
 
-/// Keys that a store may hold before its group is written: it was interrupted while being made.
-pub(crate) fn is_ours(key: &str) -> bool {
+/// Whether a key belongs to a store whose group is not yet written, because its creation was interrupted.
+pub(crate) fn is_store_key(key: &str) -> bool {
     let folder = key.split('/').next().unwrap_or_default();
     folder == "impulse_response" || SIDE_ARRAYS.contains(&folder)
 }
 
+/// Names of the arrays beside the table.
 const SIDE_ARRAYS: [&str; 7] = [
     "touchable_dofs",
     "observed_dofs",
@@ -34,14 +35,14 @@ const SIDE_ARRAYS: [&str; 7] = [
     "gravity_response",
 ];
 
-/// Whatever went wrong, for a text.
-pub(crate) type Anyhow = Box<dyn std::error::Error>;
+/// Error of any kind, for messages.
+pub(crate) type BoxError = Box<dyn std::error::Error>;
 
-/// The array of a new table.
+/// Array of a new table.
 pub(crate) fn table_array(
     content: &TableContent,
     storage: Arc<ObjectStorage>,
-) -> Result<Array<ObjectStorage>, Anyhow> {
+) -> Result<Array<ObjectStorage>, BoxError> {
     let attributes = &content.attributes;
     let (samples, observed) = (content.samples as u64, content.observed_dofs.len() as u64);
     let shape = vec![content.touchable_dofs.len() as u64, samples, observed];
@@ -78,17 +79,19 @@ pub(crate) fn table_array(
     Ok(builder.build(storage, TABLE)?)
 }
 
-/// The table's array as it stands in a store, set to write the columns of a shard in their order, so that the same
-/// table gives the same bytes.
-pub(crate) fn open_array(storage: &Arc<ObjectStorage>) -> Result<Array<ObjectStorage>, Anyhow> {
+/// Array of an existing table. It writes the columns of a shard in order, so that a table always gives the same bytes.
+pub(crate) fn open_array(storage: &Arc<ObjectStorage>) -> Result<Array<ObjectStorage>, BoxError> {
     let array = Array::open(storage.clone(), TABLE)?;
     let order = ShardingCodecOptions::default().with_subchunk_write_order(SubchunkWriteOrder::C);
     let options = CodecSpecificOptions::default().with_option(order);
     Ok(array.with_codec_specific_options(&options))
 }
 
-/// Write what stands beside the table.
-pub(crate) fn write_side_arrays(content: &TableContent, storage: &Arc<ObjectStorage>) -> Result<(), Anyhow> {
+/// Writes the arrays beside the table.
+pub(crate) fn write_side_arrays(
+    content: &TableContent,
+    storage: &Arc<ObjectStorage>,
+) -> Result<(), BoxError> {
     let surface = &content.surface;
     let positions: Vec<f64> = surface.positions.iter().flat_map(|p| p.to_array()).collect();
     let triangles: Vec<u32> = surface.triangles.iter().flatten().copied().collect();
@@ -116,7 +119,7 @@ pub(crate) fn write_side_arrays(content: &TableContent, storage: &Arc<ObjectStor
     Ok(())
 }
 
-/// One chunk with a checksum.
+/// Writes an array as one chunk with a checksum.
 fn write_array<T: Element + Clone>(
     storage: &Arc<ObjectStorage>,
     name: &str,
@@ -124,7 +127,7 @@ fn write_array<T: Element + Clone>(
     shape: Vec<u64>,
     values: &[T],
     meaning: &str,
-) -> Result<(), Anyhow>
+) -> Result<(), BoxError>
 where
     Vec<T>: IntoArrayBytes<'static>,
 {
@@ -141,6 +144,7 @@ where
     Ok(())
 }
 
+/// Reads an array; the error names it.
 fn read_array<T: ElementOwned>(storage: &Arc<ObjectStorage>, name: &str) -> Result<Vec<T>, String>
 where
     Vec<T>: zarrs::array::FromArrayBytes,
@@ -150,7 +154,7 @@ where
     array.retrieve_array_subset::<Vec<T>>(&array.subset_all()).map_err(|e| said(&e))
 }
 
-/// Everything but the numbers of the table.
+/// Reads the content of a store without the numbers of the table.
 pub(crate) fn read_content(
     attributes: TableAttributes,
     array: &Array<ObjectStorage>,

@@ -1,10 +1,11 @@
-//! What a store says about itself, and what it holds beside the table.
+//! Attributes of a store, and its content beside the table.
 
+use crate::error::TableDifference;
 use glam::DVec3;
 use palpate::{Metadata, Sampling, Surface};
 use serde::{Deserialize, Serialize};
 
-/// How numbers are stored.
+/// Number format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Number {
@@ -14,57 +15,57 @@ pub enum Number {
     F64,
 }
 
-/// How columns are packed.
+/// Compression of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Compression {
     /// Zstandard after byte shuffling (Blosc): the smaller store.
     Zstd,
-    /// None: the columns lie in the file as they are used, so that a run maps them without unpacking.
+    /// None: a run maps the columns from the file without decompression.
     None,
 }
 
-/// Version of the store's layout.
+/// Version of the layout of stores.
 pub const STORE_VERSION: u32 = 1;
 
-/// The attributes of the group.
+/// Attributes of the group: how the table was recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TableAttributes {
-    /// [`STORE_VERSION`].
+    /// Version of the layout, [`STORE_VERSION`].
     pub store_version: u32,
     /// Step [s].
     pub step_s: f64,
-    /// `end` or `mean`, see [`Sampling`].
+    /// Sampling, `end` or `mean`, see [`Sampling`].
     pub sampling: String,
-    /// How it was computed: `closed-form` or `transient`, and how finely.
+    /// Method of computation: `closed-form` or `transient`, with its resolution.
     pub method: String,
     /// Touchable degrees of freedom per shard.
     pub columns_per_shard: u64,
-    /// How columns are packed.
+    /// Compression of the columns.
     pub compression: Compression,
-    /// Hold convention, units, material, damping, mass, mesh and its hash, where it came from.
+    /// Hold convention, units, material, damping, mass, mesh and its hash, source.
     #[serde(flatten)]
     pub recording: Metadata,
 }
 
-/// All of a store but the numbers of the table.
+/// Content of a store without the numbers of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableContent {
-    /// Its attributes.
+    /// Attributes of the group.
     pub attributes: TableAttributes,
     /// Number format of the table.
     pub number: Number,
-    /// Samples T.
+    /// Number of samples T.
     pub samples: usize,
-    /// 3·node + axis, nodes as in the input mesh.
+    /// Touchable degrees of freedom, 3·node + axis, nodes numbered as in the input mesh.
     pub touchable_dofs: Vec<u32>,
-    /// Numbered alike.
+    /// Observed degrees of freedom, numbered alike.
     pub observed_dofs: Vec<u32>,
     /// Rest position [m, body frame] of every observed node, in the order of `observed_dofs`.
     pub observed_positions: Vec<DVec3>,
-    /// The body's surface.
+    /// Surface of the body.
     pub surface: Surface,
-    /// For a body with fixed nodes: (axis·T + sample)·observed + dof [s²].
+    /// Response to a unit acceleration of a body with fixed nodes [s²], (axis·T + sample)·observed + dof.
     pub gravity: Option<Vec<f64>>,
 }
 
@@ -77,7 +78,7 @@ impl Number {
         }
     }
 
-    /// Its name on the command line.
+    /// Name in options and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::F32 => "f32",
@@ -87,7 +88,7 @@ impl Number {
 }
 
 impl TableAttributes {
-    /// What a sample is.
+    /// Sampling; none if the attribute is unknown.
     pub fn sampling(&self) -> Option<Sampling> {
         match self.sampling.as_str() {
             "end" => Some(Sampling::End),
@@ -96,7 +97,7 @@ impl TableAttributes {
         }
     }
 
-    /// The attribute for a sampling.
+    /// Attribute text of a sampling.
     pub fn sampling_text(sampling: Sampling) -> String {
         match sampling {
             Sampling::End => "end".into(),
@@ -106,57 +107,59 @@ impl TableAttributes {
 }
 
 impl TableContent {
-    /// Bytes of the whole table before compression.
+    /// Size of the table before compression [bytes].
     pub fn raw_bytes(&self) -> u64 {
         (self.touchable_dofs.len() * self.column_length() * self.number.bytes()) as u64
     }
 
-    /// Numbers in one column.
+    /// Length of a column: samples × observed degrees of freedom.
     pub fn column_length(&self) -> usize {
         self.samples * self.observed_dofs.len()
     }
 
-    /// Where two tables that should be one differ, in words.
-    pub(crate) fn difference(&self, other: &Self) -> Option<String> {
-        let (a, b) = (&self.attributes, &other.attributes);
-        let said = |what: &str, here: &dyn std::fmt::Display, wanted: &dyn std::fmt::Display| {
-            Some(format!("{what} is {here} there, and {wanted} is asked for"))
+    /// First difference to a requested table.
+    pub(crate) fn difference(&self, requested: &Self) -> Option<TableDifference> {
+        let (a, b) = (&self.attributes, &requested.attributes);
+        let differs = |property, stored: &dyn std::fmt::Display, requested: &dyn std::fmt::Display| {
+            Some(TableDifference { property, stored: stored.to_string(), requested: requested.to_string() })
         };
         let materials = |m: &Metadata| serde_json::to_string(&(&m.materials, &m.damping)).unwrap_or_default();
+        let dofs = |dofs: &[u32]| format!("one of {}", dofs.len());
         match () {
             () if a.recording.provenance.mesh_hash != b.recording.provenance.mesh_hash => {
-                said("the mesh", &named_mesh(a), &named_mesh(b))
+                differs("the mesh", &named_mesh(a), &named_mesh(b))
             }
             () if materials(&a.recording) != materials(&b.recording) => {
-                said("the material", &materials(&a.recording), &materials(&b.recording))
+                differs("the material", &materials(&a.recording), &materials(&b.recording))
             }
             () if a.recording.mesh != b.recording.mesh => {
-                said("the order of the elements or the number of fixed nodes", &"another", &"this one")
+                differs("the order of the elements or the number of fixed nodes", &"another", &"this one")
             }
-            () if a.step_s != b.step_s => said("the step [s]", &a.step_s, &b.step_s),
-            () if self.samples != other.samples => {
-                said("the number of samples", &self.samples, &other.samples)
+            () if a.step_s != b.step_s => differs("the step [s]", &a.step_s, &b.step_s),
+            () if self.samples != requested.samples => {
+                differs("the number of samples", &self.samples, &requested.samples)
             }
-            () if a.sampling != b.sampling => said("the sampling", &a.sampling, &b.sampling),
-            () if a.method != b.method => said("the method", &a.method, &b.method),
-            () if self.number != other.number => {
-                said("the number format", &self.number.name(), &other.number.name())
+            () if a.sampling != b.sampling => differs("the sampling", &a.sampling, &b.sampling),
+            () if a.method != b.method => differs("the method", &a.method, &b.method),
+            () if self.number != requested.number => {
+                differs("the number format", &self.number.name(), &requested.number.name())
             }
-            () if self.touchable_dofs != other.touchable_dofs => said(
+            () if self.touchable_dofs != requested.touchable_dofs => differs(
                 "the choice of touchable degrees of freedom",
-                &format!("one of {}", self.touchable_dofs.len()),
-                &format!("one of {}", other.touchable_dofs.len()),
+                &dofs(&self.touchable_dofs),
+                &dofs(&requested.touchable_dofs),
             ),
-            () if self.observed_dofs != other.observed_dofs => said(
+            () if self.observed_dofs != requested.observed_dofs => differs(
                 "the choice of observed degrees of freedom",
-                &format!("one of {}", self.observed_dofs.len()),
-                &format!("one of {}", other.observed_dofs.len()),
+                &dofs(&self.observed_dofs),
+                &dofs(&requested.observed_dofs),
             ),
             () => None,
         }
     }
 }
 
+/// Name and hash of the mesh, for messages.
 fn named_mesh(attributes: &TableAttributes) -> String {
     let from = &attributes.recording.provenance;
     format!("{} ({}…)", from.source, from.mesh_hash.get(..8).unwrap_or(&from.mesh_hash))

@@ -1,6 +1,6 @@
-//! Where a store lies: a folder, or a prefix in a bucket of object storage.
+//! Location of a store: a folder, or a prefix in a bucket of object storage.
 
-use crate::error::StoreError;
+use crate::error::{StoreError, StoreOperation, root_cause};
 use crate::object_storage::ObjectStorage;
 use object_store::ObjectStore;
 use object_store::local::LocalFileSystem;
@@ -8,17 +8,17 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A folder, or `s3://bucket/prefix`.
+/// Location of a store: a folder, or `s3://bucket/prefix`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Location {
-    /// A folder of this machine, or one that is shared over the network.
+    /// Path of a folder, local or shared over the network.
     Folder(PathBuf),
-    /// An address with a scheme.
+    /// Address with a scheme.
     Address(String),
 }
 
 impl Location {
-    /// From what a user wrote.
+    /// Location from text: an address if it has a scheme other than `file`, else a path.
     pub fn parse(text: &str) -> Self {
         match text.split_once("://") {
             Some(("file", path)) => Self::Folder(PathBuf::from(path)),
@@ -27,7 +27,7 @@ impl Location {
         }
     }
 
-    /// The folder, if it is one.
+    /// Path of the folder; none for object storage.
     pub fn folder(&self) -> Option<&Path> {
         match self {
             Self::Folder(path) => Some(path),
@@ -35,25 +35,24 @@ impl Location {
         }
     }
 
-    /// Open it; with `create` a folder is made.
+    /// Opens the location; with `create` a missing folder is made.
     pub(crate) fn storage(&self, create: bool) -> Result<ObjectStorage, StoreError> {
         match self {
             Self::Folder(path) => {
-                let failed = |what: &str, e: &dyn fmt::Display| {
-                    StoreError::Place(format!("cannot {what} the store {}: {e}", path.display()))
+                let failed = |operation: StoreOperation, reason: String| StoreError::Access {
+                    operation,
+                    location: self.to_string(),
+                    reason,
                 };
                 if path.exists() && !path.is_dir() {
-                    return Err(StoreError::Place(format!(
-                        "{} is a file; a store of impulse responses is a folder",
-                        path.display()
-                    )));
+                    return Err(StoreError::NotAFolder { path: path.clone() });
                 }
                 if create {
-                    std::fs::create_dir_all(path).map_err(|e| failed("make", &e))?;
+                    std::fs::create_dir_all(path).map_err(|e| failed(StoreOperation::Make, e.to_string()))?;
                 }
-                let store =
-                    LocalFileSystem::new_with_prefix(path).map_err(|e| failed("open", &root_cause(&e)))?;
-                // What is said to be finished survives a loss of power.
+                let store = LocalFileSystem::new_with_prefix(path)
+                    .map_err(|e| failed(StoreOperation::Open, root_cause(&e)))?;
+                // A finished shard survives a loss of power.
                 let store: Arc<dyn ObjectStore> = Arc::new(store.with_fsync(true));
                 ObjectStorage::new(store, object_store::path::Path::default(), self.to_string())
             }
@@ -74,7 +73,7 @@ impl fmt::Display for Location {
 #[cfg(feature = "s3")]
 fn remote(address: &str) -> Result<ObjectStorage, StoreError> {
     use object_store::aws::AmazonS3Builder;
-    let failed = |e: &dyn fmt::Display| StoreError::Place(format!("cannot open the store {address}: {e}"));
+    let failed = |reason: &dyn fmt::Display| open_error(address, reason.to_string());
     let url = url::Url::parse(address).map_err(|e| failed(&e))?;
     if url.scheme() != "s3" {
         return Err(failed(&format!(
@@ -89,20 +88,11 @@ fn remote(address: &str) -> Result<ObjectStorage, StoreError> {
 
 #[cfg(not(feature = "s3"))]
 fn remote(address: &str) -> Result<ObjectStorage, StoreError> {
-    Err(StoreError::Place(format!(
-        "cannot open the store {address}: this palpate was built without object storage (feature s3)"
-    )))
+    Err(open_error(address, "this palpate was built without object storage (feature s3)".into()))
 }
 
-/// The innermost cause of an error: the one that says what happened.
-pub(crate) fn root_cause(error: &dyn std::error::Error) -> String {
-    let mut cause = error;
-    while let Some(inner) = cause.source() {
-        cause = inner;
-    }
-    // What a server answers may be a page of its own.
-    let text = cause.to_string();
-    text.split("<?xml").next().unwrap_or_default().trim_end_matches([':', ' ']).to_string()
+fn open_error(location: &str, reason: String) -> StoreError {
+    StoreError::Access { operation: StoreOperation::Open, location: location.into(), reason }
 }
 
 #[cfg(test)]
@@ -110,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_and_addresses_are_told_apart() {
+    fn folders_and_addresses_are_distinguished() {
         assert_eq!(Location::parse("a/b.zarr"), Location::Folder("a/b.zarr".into()));
         assert_eq!(Location::parse("file:///a/b.zarr"), Location::Folder("/a/b.zarr".into()));
         assert_eq!(Location::parse("s3://bucket/b.zarr/"), Location::Address("s3://bucket/b.zarr".into()));

@@ -1,7 +1,7 @@
-//! The columns of a store in a folder, mapped into memory.
+//! Memory-mapped columns of a store in a folder.
 //!
-//! Only what is used is read: the system brings in the pages of a column when they are touched. Columns that are
-//! stored as they are used are read where they lie; compressed ones are unpacked into memory when first used.
+//! The system loads the pages of a column on first access. Uncompressed columns are read from the mapped file;
+//! compressed ones are decompressed into memory on first use.
 
 use crate::attributes::{Compression, Number};
 use crate::error::StoreError;
@@ -14,7 +14,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use zarrs::array::{ArrayShardedReadableExt, ArrayShardedReadableExtCache, CodecOptions};
 
-/// Columns of a store.
+/// Memory-mapped columns of a store.
 pub(crate) struct MappedColumns {
     number: Number,
     length: usize,
@@ -26,20 +26,17 @@ pub(crate) struct MappedColumns {
 
 struct OneColumn {
     shard: usize,
-    /// Where its bytes lie in the shard, without the checksum, if they are not compressed.
+    /// Byte range in the shard without the checksum; none if the column is compressed.
     bytes: Option<Range<usize>>,
-    /// Its bytes, unpacked; empty if it is damaged.
-    unpacked: OnceLock<Box<[u8]>>,
+    /// Decompressed bytes, from first use on; zeros if the column is damaged.
+    decompressed: OnceLock<Box<[u8]>>,
 }
 
 impl MappedColumns {
-    /// Map the shards of a finished store; nothing but their indices is read.
+    /// Maps the shards of a finished store; only their indices are read.
     pub(crate) fn new(store: TableStore) -> Result<Self, StoreError> {
         let Some(folder) = store.location().folder().map(std::path::Path::to_path_buf) else {
-            return Err(StoreError::Place(format!(
-                "the store {} lies in object storage; copy it into a folder of this machine to run it",
-                store.location()
-            )));
+            return Err(StoreError::Remote { location: store.location().to_string() });
         };
         let number = store.content().number;
         let length = store.content().column_length();
@@ -49,8 +46,7 @@ impl MappedColumns {
         let cache = ArrayShardedReadableExtCache::new(store.array());
         for shard in 0..store.shards() {
             let path = folder.join(format!("impulse_response/c/{shard}/0/0"));
-            let failed =
-                |e: std::io::Error| StoreError::Place(format!("cannot read {}: {e}", path.display()));
+            let failed = |source| StoreError::ReadFile { path: path.clone(), source };
             let file = File::open(&path).map_err(failed)?;
             // SAFETY: a shard is never changed in place: it takes its name when it is whole, and a new one replaces the
             // file, not its content. Someone who cuts the file short while it is mapped stops the program.
@@ -65,20 +61,24 @@ impl MappedColumns {
                 };
                 let size = map.len() as u64;
                 let (start, end) = (range.start(size) as usize, range.end(size) as usize);
-                // What follows the numbers is the checksum.
+                // The checksum follows the numbers.
                 let bytes = start..start + length * number.bytes();
                 if end > map.len() || plain && bytes.end > end {
                     return Err(store.damaged(shard, &format!("column {touchable} is cut short")));
                 }
-                columns.push(OneColumn { shard, bytes: plain.then_some(bytes), unpacked: OnceLock::new() });
+                columns.push(OneColumn {
+                    shard,
+                    bytes: plain.then_some(bytes),
+                    decompressed: OnceLock::new(),
+                });
             }
             shards.push(map);
         }
         Ok(Self { number, length, columns, shards, store, cache })
     }
 
-    /// Unpack a column, or check it where it lies; empty if it is damaged.
-    fn unpack(&self, touchable: usize) -> Result<Box<[u8]>, StoreError> {
+    /// Decompresses a column and checks its checksum.
+    fn decode(&self, touchable: usize) -> Result<Box<[u8]>, StoreError> {
         let place = [touchable as u64, 0, 0];
         let options = CodecOptions::default();
         let array = self.store.array();
@@ -101,11 +101,11 @@ impl ImpulseColumns for MappedColumns {
 
     fn prepare(&self, touchable: usize) -> Result<(), String> {
         let column = &self.columns[touchable];
-        let bytes = self.unpack(touchable).map_err(|e| e.to_string())?;
+        let bytes = self.decode(touchable).map_err(|e| e.to_string())?;
         match &column.bytes {
-            // Checked; the pages are in memory now.
+            // The column is checked, and its pages are in memory.
             Some(_) => {}
-            None => drop(column.unpacked.set(bytes)),
+            None => drop(column.decompressed.set(bytes)),
         }
         Ok(())
     }
@@ -114,9 +114,9 @@ impl ImpulseColumns for MappedColumns {
         let column = &self.columns[touchable];
         let bytes = match &column.bytes {
             Some(range) => &self.shards[column.shard][range.clone()],
-            None => column.unpacked.get_or_init(|| {
+            None => column.decompressed.get_or_init(|| {
                 let zeros = || vec![0; self.length * self.number.bytes()].into_boxed_slice();
-                self.unpack(touchable).unwrap_or_else(|_| zeros())
+                self.decode(touchable).unwrap_or_else(|_| zeros())
             }),
         };
         match self.number {

@@ -1,7 +1,6 @@
-//! One interface to folders and buckets, as zarrs wants it: whole objects are put at once or not at all.
+//! Adapter from object_store to the storage traits of zarrs: whole objects are put at once or not at all.
 
-use crate::error::StoreError;
-use crate::location::root_cause;
+use crate::error::{StoreError, StoreOperation, root_cause};
 use futures::TryStreamExt;
 use object_store::path::Path;
 use object_store::{ObjectStore, ObjectStoreExt};
@@ -19,12 +18,12 @@ pub(crate) struct ObjectStorage {
     store: Arc<dyn ObjectStore>,
     prefix: Path,
     runtime: Runtime,
-    /// What to call it in errors.
+    /// Location of the store, for errors.
     name: String,
 }
 
-/// Length of an object that is there.
-pub(crate) struct Found {
+/// Key and size of an object.
+pub(crate) struct StoredObject {
     pub(crate) key: String,
     pub(crate) bytes: u64,
 }
@@ -35,7 +34,7 @@ impl ObjectStorage {
             .worker_threads(1)
             .enable_all()
             .build()
-            .map_err(|e| StoreError::Place(format!("cannot start input and output: {e}")))?;
+            .map_err(StoreError::Runtime)?;
         Ok(Self { store, prefix, runtime, name })
     }
 
@@ -45,14 +44,16 @@ impl ObjectStorage {
     }
 
     /// All objects below a folder of the store.
-    pub(crate) fn list(&self, folder: &str) -> Result<Vec<Found>, StoreError> {
+    pub(crate) fn list(&self, folder: &str) -> Result<Vec<StoredObject>, StoreError> {
         let below = self.path(folder);
         let objects: Result<Vec<_>, _> = self.runtime.block_on(self.store.list(Some(&below)).try_collect());
-        let objects = objects.map_err(|e| {
-            StoreError::Place(format!("cannot list the store {}: {}", self.name, root_cause(&e)))
+        let objects = objects.map_err(|e| StoreError::Access {
+            operation: StoreOperation::List,
+            location: self.name.clone(),
+            reason: root_cause(&e),
         })?;
         let prefix = self.prefix.as_ref();
-        let found = |meta: object_store::ObjectMeta| Found {
+        let found = |meta: object_store::ObjectMeta| StoredObject {
             key: meta
                 .location
                 .as_ref()

@@ -1,28 +1,26 @@
-//! A store that is written shard by shard, and read.
+//! Store of one table, written shard by shard.
 
-use crate::arrays::{is_ours, open_array, read_content, table_array, write_side_arrays};
+use crate::arrays::{is_store_key, open_array, read_content, table_array, write_side_arrays};
 use crate::attributes::{Number, STORE_VERSION, TableAttributes, TableContent};
-use crate::error::StoreError;
+use crate::error::{StoreError, StoreOperation};
 use crate::location::Location;
-use crate::mapped::MappedColumns;
 use crate::object_storage::ObjectStorage;
-use palpate::{GravityResponse, ImpulseResponse, ModalBasis, Recording, ResidualCompliance};
 use serde_json::Value;
 use std::ops::Range;
 use std::sync::Arc;
 use zarrs::array::{Array, CodecOptions};
 use zarrs::group::{Group, GroupBuilder};
 
-/// Which shards one of several machines writes: those with number K, K + N, K + 2N, …
+/// Share K of N of the work: the shards with number K, K + N, K + 2N, …
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
-    /// K, from 1 to N (0 stands for N).
+    /// Number K of the share, from 1 to N (0 stands for N).
     pub number: usize,
-    /// N, at least 1.
+    /// Number N of shares, at least 1.
     pub of: usize,
 }
 
-/// A store of one table.
+/// Store of one table.
 pub struct TableStore {
     location: Location,
     content: TableContent,
@@ -31,49 +29,49 @@ pub struct TableStore {
 }
 
 impl Part {
-    /// Everything.
+    /// All shards.
     pub const ALL: Self = Self { number: 1, of: 1 };
 
-    /// Whether a shard belongs to it.
+    /// Whether a shard belongs to the share.
     pub fn holds(self, shard: usize) -> bool {
         shard % self.of == self.number % self.of
     }
 }
 
 impl TableStore {
-    /// Make a store, or open the one that stands there if it is of the same table; its way of packing then counts.
-    /// `gravity` gives [`TableContent::gravity`] for a new one.
+    /// Makes a store, or opens the existing one of the same table, whose compression then counts. `gravity` computes
+    /// [`TableContent::gravity`] for a new store.
     ///
     /// # Errors
-    /// When the place can't be written, or what stands there is another table: the text says which difference.
+    /// [`StoreError`] when the location cannot be written, or holds another table or other files.
     pub fn create(
         location: &Location,
         mut content: TableContent,
         gravity: impl FnOnce() -> Option<Vec<f64>>,
     ) -> Result<Self, StoreError> {
-        if let Some(standing) = Self::open_if_there(location)? {
-            return match standing.content.difference(&content) {
-                None => Ok(standing),
-                Some(difference) => Err(StoreError::Content(format!(
-                    "the store {location} holds another table: {difference}. Give another name, or remove it"
-                ))),
+        if let Some(existing) = Self::open_existing(location)? {
+            return match existing.content.difference(&content) {
+                None => Ok(existing),
+                Some(difference) => {
+                    Err(StoreError::OtherTable { location: location.to_string(), difference })
+                }
             };
         }
         let storage = Arc::new(location.storage(true)?);
         let others = storage.list("")?;
-        if let Some(other) = others.first().filter(|other| !is_ours(&other.key)) {
-            return Err(StoreError::Place(format!(
-                "{location} is not empty and no store of impulse responses (it holds {}): give another name",
-                other.key
-            )));
+        if let Some(other) = others.first().filter(|other| !is_store_key(&other.key)) {
+            return Err(StoreError::NotEmpty { location: location.to_string(), found: other.key.clone() });
         }
-        let failed =
-            |e: &dyn std::fmt::Display| StoreError::Place(format!("cannot write the store {location}: {e}"));
+        let failed = |reason: &dyn std::fmt::Display| StoreError::Access {
+            operation: StoreOperation::Write,
+            location: location.to_string(),
+            reason: reason.to_string(),
+        };
         content.gravity = gravity();
         let array = table_array(&content, storage.clone()).map_err(|e| failed(&e))?;
         write_side_arrays(&content, &storage).map_err(|e| failed(&e))?;
         array.store_metadata().map_err(|e| failed(&e))?;
-        // The group comes last: a store without it was never finished being made.
+        // The group is written last and marks a completely created store.
         let attributes = serde_json::to_value(&content.attributes).map_err(|e| failed(&e))?;
         let group = GroupBuilder::new()
             .attributes(attributes.as_object().cloned().unwrap_or_default())
@@ -83,16 +81,15 @@ impl TableStore {
         Self::open(location)
     }
 
-    /// Open a store.
+    /// Opens a store.
     ///
     /// # Errors
-    /// When there is none, or it is damaged, or no table of palpate.
+    /// [`StoreError`] when there is no store, or its metadata or arrays cannot be read.
     pub fn open(location: &Location) -> Result<Self, StoreError> {
-        let nothing = || StoreError::Place(format!("{location}: there is no store of impulse responses"));
-        Self::open_if_there(location)?.ok_or_else(nothing)
+        Self::open_existing(location)?.ok_or_else(|| StoreError::NotFound { location: location.to_string() })
     }
 
-    fn open_if_there(location: &Location) -> Result<Option<Self>, StoreError> {
+    fn open_existing(location: &Location) -> Result<Option<Self>, StoreError> {
         if location.folder().is_some_and(|folder| !folder.exists()) {
             return Ok(None);
         }
@@ -100,33 +97,31 @@ impl TableStore {
         if !storage.list("")?.iter().any(|found| found.key == "zarr.json") {
             return Ok(None);
         }
-        let bad = |what: String| {
-            StoreError::Content(format!("{location} is no usable store of impulse responses: {what}"))
-        };
-        let group = Group::open(storage.clone(), "/").map_err(|e| bad(e.to_string()))?;
+        let invalid = |reason: String| StoreError::Invalid { location: location.to_string(), reason };
+        let group = Group::open(storage.clone(), "/").map_err(|e| invalid(e.to_string()))?;
         let attributes = Value::Object(group.attributes().clone());
         let version = attributes.get("store_version").and_then(Value::as_u64);
         if version != Some(u64::from(STORE_VERSION)) {
-            return Err(bad(match version {
-                Some(version) => format!(
-                    "its version is {version}, this palpate reads {STORE_VERSION}: record it again or use a newer palpate"
-                ),
-                None => "a Zarr group, but not one that palpate wrote".into(),
-            }));
+            return Err(match version {
+                Some(version) => {
+                    StoreError::Version { location: location.to_string(), version, supported: STORE_VERSION }
+                }
+                None => invalid("a Zarr group, but not one that palpate wrote".into()),
+            });
         }
         let attributes: TableAttributes =
-            serde_json::from_value(attributes).map_err(|e| bad(format!("its attributes: {e}")))?;
-        let array = open_array(&storage).map_err(|e| bad(e.to_string()))?;
-        let content = read_content(attributes, &array, &storage).map_err(bad)?;
+            serde_json::from_value(attributes).map_err(|e| invalid(format!("its attributes: {e}")))?;
+        let array = open_array(&storage).map_err(|e| invalid(e.to_string()))?;
+        let content = read_content(attributes, &array, &storage).map_err(invalid)?;
         Ok(Some(Self { location: location.clone(), content, storage, array }))
     }
 
-    /// Everything but the numbers.
+    /// Content without the numbers of the table.
     pub fn content(&self) -> &TableContent {
         &self.content
     }
 
-    /// Where it lies.
+    /// Location of the store.
     pub fn location(&self) -> &Location {
         &self.location
     }
@@ -146,10 +141,10 @@ impl TableStore {
         shard * width..((shard + 1) * width).min(self.content.touchable_dofs.len())
     }
 
-    /// Length [bytes] of each shard that is there.
+    /// Size of each shard [bytes]; none for a missing shard.
     ///
     /// # Errors
-    /// When the store can't be listed.
+    /// [`StoreError::Access`] when the store cannot be listed.
     pub fn present(&self) -> Result<Vec<Option<u64>>, StoreError> {
         let mut present = vec![None; self.shards()];
         for found in self.storage.list("impulse_response/c")? {
@@ -162,21 +157,21 @@ impl TableStore {
         Ok(present)
     }
 
-    /// Shards of a part that are still to be written.
+    /// Missing shards of a share.
     ///
     /// # Errors
-    /// When the store can't be listed.
+    /// [`StoreError::Access`] when the store cannot be listed.
     pub fn missing(&self, part: Part) -> Result<Vec<usize>, StoreError> {
         let present = self.present()?;
         Ok((0..self.shards()).filter(|&shard| part.holds(shard) && present[shard].is_none()).collect())
     }
 
-    /// Write one shard at once; its columns in order.
+    /// Writes one shard at once; its columns in order.
     ///
     /// # Errors
-    /// When it can't be written: the store stays as it was.
+    /// [`StoreError::WriteShard`]; the store is then as it was before.
     pub fn write_shard(&self, shard: usize, columns: Vec<Vec<f64>>) -> Result<(), StoreError> {
-        // The last shard is filled up with NaN, the fill value, which is not stored.
+        // The last shard is padded with NaN, the fill value, which is not stored.
         let length = self.columns_per_shard() * self.content.column_length();
         let place = [shard as u64, 0, 0];
         let options = CodecOptions::default();
@@ -198,29 +193,26 @@ impl TableStore {
             Ok(()) => Ok(()),
             // Another run wrote the same shard meanwhile.
             Err(_) if self.present().is_ok_and(|present| present[shard].is_some()) => Ok(()),
-            Err(e) => Err(StoreError::Place(format!(
-                "{e}. What is finished is kept: make room or repair the cause, then run the same command again"
-            ))),
+            Err(e) => Err(StoreError::WriteShard { shard, reason: e.to_string() }),
         }
     }
 
-    /// Remove what interrupted writers left beside the files of the store, once it is finished.
+    /// Removes temporary files of interrupted writers from a finished store.
     ///
     /// # Errors
-    /// When a folder of it can't be read.
+    /// [`StoreError::ReadFile`] when a folder cannot be read.
     pub fn tidy(&self) -> Result<(), StoreError> {
         let Some(folder) = self.location.folder() else { return Ok(()) };
         if !self.missing(Part::ALL)?.is_empty() {
             return Ok(());
         }
-        let mut waiting = vec![folder.to_path_buf()];
-        while let Some(place) = waiting.pop() {
-            let failed =
-                |e: std::io::Error| StoreError::Place(format!("cannot read {}: {e}", place.display()));
-            for entry in std::fs::read_dir(&place).map_err(failed)? {
+        let mut folders = vec![folder.to_path_buf()];
+        while let Some(folder) = folders.pop() {
+            let failed = |source| StoreError::ReadFile { path: folder.clone(), source };
+            for entry in std::fs::read_dir(&folder).map_err(failed)? {
                 let entry = entry.map_err(failed)?;
                 if entry.file_type().map_err(failed)?.is_dir() {
-                    waiting.push(entry.path());
+                    folders.push(entry.path());
                 } else if is_unfinished(&entry.file_name().to_string_lossy()) {
                     let _ = std::fs::remove_file(entry.path());
                 }
@@ -229,7 +221,7 @@ impl TableStore {
         Ok(())
     }
 
-    /// Read a whole shard and check its checksums, and that it holds numbers.
+    /// Reads a whole shard and checks its checksums and that all numbers are finite.
     ///
     /// # Errors
     /// [`StoreError::Damaged`].
@@ -253,67 +245,20 @@ impl TableStore {
         }
     }
 
-    pub(crate) fn damaged(&self, shard: usize, why: &str) -> StoreError {
+    /// Error of a damaged shard.
+    pub(crate) fn damaged(&self, shard: usize, reason: &str) -> StoreError {
         let key = format!("{}/impulse_response/c/{shard}/0/0", self.location);
-        StoreError::Damaged { shard, key, why: why.into() }
+        StoreError::Damaged { shard, key, reason: reason.into() }
     }
 
-    /// The body and its table, ready for a scene: shards are mapped into memory, columns read when they are used.
-    ///
-    /// # Errors
-    /// When shards are missing, the store is not a folder of this machine, or its body makes no sense.
-    pub fn load(self) -> Result<(Recording, ImpulseResponse), StoreError> {
-        let missing = self.missing(Part::ALL)?.len();
-        if missing > 0 {
-            return Err(StoreError::Content(format!(
-                "the store {} is not finished: {missing} of {} shards are missing. Record it to the end with the command \
-                 that began it",
-                self.location,
-                self.shards()
-            )));
-        }
-        let bad = |what: String| {
-            StoreError::Content(format!("{} is no usable store of impulse responses: {what}", self.location))
-        };
-        let sampling =
-            self.content.attributes.sampling().ok_or_else(|| bad("its sampling is unknown".into()))?;
-        let recording = body(&self.content);
-        recording.validate().map_err(|e| bad(e.to_string()))?;
-        let content = self.content.clone();
-        let columns = MappedColumns::new(self)?;
-        let table = ImpulseResponse {
-            step_s: content.attributes.step_s,
-            samples: content.samples,
-            sampling,
-            touchable_dofs: content.touchable_dofs,
-            observed_dofs: content.observed_dofs,
-            gravity: content.gravity,
-            columns: Box::new(columns),
-        };
-        Ok((recording, table))
-    }
-
+    /// Zarr array of the table.
     pub(crate) fn array(&self) -> &Array<ObjectStorage> {
         &self.array
     }
 }
 
-/// Whether a file was being written: the writer's files have names like `zarr.json#1` until they are whole.
+/// Whether a file is a temporary one of a writer, with a name like `zarr.json#1`.
 fn is_unfinished(name: &str) -> bool {
     name.rsplit_once('#')
         .is_some_and(|(_, count)| !count.is_empty() && count.bytes().all(|b| b.is_ascii_digit()))
-}
-
-/// The body as a recording without modes.
-fn body(content: &TableContent) -> Recording {
-    let fixed = content.attributes.recording.support == palpate::Support::Fixed;
-    let nodes = content.surface.positions.len();
-    Recording {
-        metadata: content.attributes.recording.clone(),
-        surface: content.surface.clone(),
-        modes: ModalBasis { angular_frequencies: vec![], damping_ratios: vec![], mode_shapes: vec![] },
-        residual: ResidualCompliance::None,
-        gravity: fixed
-            .then(|| GravityResponse { modal_forces: vec![], residual_displacements: vec![0.0; 9 * nodes] }),
-    }
 }

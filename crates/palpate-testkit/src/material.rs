@@ -3,10 +3,8 @@
 use crate::recording_cache::recorded_once;
 use glam::DVec3;
 use palpate::{Damping, Material, Recording};
-use palpate_fem::element::Order;
 use palpate_fem::mesh::Mesh;
-use palpate_fem::record::{Extent, RecordError, RecordParameters};
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::{ElementOrder, RecordError, RecordExtent, RecordParameters, ResidualChoice};
 use std::sync::Arc;
 
 /// An isotropic linear-elastic material with stiffness-proportional damping C = βK.
@@ -24,10 +22,10 @@ pub struct ElasticMaterial {
 
 impl ElasticMaterial {
     /// Parameters of a recording without certificate.
-    pub fn parameters(&self, order: Order, modes: usize) -> RecordParameters {
+    pub fn parameters(&self, order: ElementOrder, modes: usize) -> RecordParameters {
         RecordParameters {
             damping: Damping::Rayleigh { alpha: 0.0, beta: self.stiffness_damping_s },
-            extent: Extent::Uncertified,
+            extent: RecordExtent::NoCertificate,
             ..undamped(self.young_pa, self.poisson, self.density_kg_m3, order, modes)
         }
     }
@@ -35,19 +33,24 @@ impl ElasticMaterial {
     /// A body that moves freely.
     ///
     /// # Errors
-    /// As [`palpate_fem::record::record`].
-    pub fn free_body(&self, mesh: Mesh, order: Order, modes: usize) -> Result<Arc<Recording>, RecordError> {
+    /// As [`palpate_fem::record`].
+    pub fn free_body(
+        &self,
+        mesh: Mesh,
+        order: ElementOrder,
+        modes: usize,
+    ) -> Result<Arc<Recording>, RecordError> {
         recorded_once(mesh, &self.parameters(order, modes))
     }
 
     /// A body whose nodes are fixed where `fixed` holds for their position [m].
     ///
     /// # Errors
-    /// As [`palpate_fem::record::record`].
+    /// As [`palpate_fem::record`].
     pub fn fixed_body(
         &self,
         mesh: Mesh,
-        order: Order,
+        order: ElementOrder,
         modes: usize,
         fixed: impl Fn(DVec3) -> bool,
     ) -> Result<Arc<Recording>, RecordError> {
@@ -62,7 +65,7 @@ pub fn undamped(
     young_pa: f64,
     poisson: f64,
     density_kg_m3: f64,
-    order: Order,
+    order: ElementOrder,
     modes: usize,
 ) -> RecordParameters {
     RecordParameters {
@@ -73,6 +76,6 @@ pub fn undamped(
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: "verification".into(),
-        extent: Extent::Whole,
+        extent: RecordExtent::Full,
     }
 }

@@ -2,9 +2,8 @@
 
 use crate::material::{ElasticMaterial, undamped};
 use palpate::Damping;
-use palpate_fem::element::Order;
 use palpate_fem::mesh::{Mesh, MeshError, box_mesh};
-use palpate_fem::record::RecordParameters;
+use palpate_fem::{ElementOrder, RecordParameters};
 
 /// Side of the cube [m].
 pub const PAPER_CUBE_SIDE_M: f64 = 0.1;
@@ -27,6 +26,6 @@ pub fn paper_cube_parameters(cells: u32, modes: usize) -> RecordParameters {
     RecordParameters {
         damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
         source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"),
-        ..undamped(young_pa, poisson, density_kg_m3, Order::Linear, modes)
+        ..undamped(young_pa, poisson, density_kg_m3, ElementOrder::Linear, modes)
     }
 }

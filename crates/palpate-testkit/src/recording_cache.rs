@@ -2,8 +2,7 @@
 
 use palpate::Recording;
 use palpate_fem::mesh::Mesh;
-use palpate_fem::progress::Silent;
-use palpate_fem::record::{RecordError, RecordParameters, Recorded, record};
+use palpate_fem::{RecordError, RecordParameters, RecordedBody, SilentProgress};
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -17,15 +16,15 @@ static RECORDINGS: OnceLock<Mutex<HashMap<u64, Entry>>> = OnceLock::new();
 /// Record a mesh without progress messages, with all that is known of the body.
 ///
 /// # Errors
-/// As [`record`].
-pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> Result<Recorded, RecordError> {
-    record(mesh, parameters, &mut Silent)
+/// As [`RecordedBody::new`].
+pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> Result<RecordedBody, RecordError> {
+    RecordedBody::new(mesh, parameters, &mut SilentProgress)
 }
 
 /// The recording of a mesh; the same mesh with the same parameters is recorded once per process.
 ///
 /// # Errors
-/// As [`record`]. What has failed is tried again.
+/// As [`RecordedBody::new`]. What has failed is tried again.
 pub fn recorded_once(mesh: Mesh, parameters: &RecordParameters) -> Result<Arc<Recording>, RecordError> {
     let entry: Entry = {
         let all = RECORDINGS.get_or_init(Mutex::default);
@@ -56,7 +55,7 @@ fn fingerprint(mesh: &Mesh, parameters: &RecordParameters) -> u64 {
 #[cfg(test)]
 mod tests {
     use crate::PAPER_MATERIAL;
-    use palpate_fem::element::Order;
+    use palpate_fem::ElementOrder;
     use palpate_fem::mesh::box_mesh;
     use std::sync::Arc;
 
@@ -64,7 +63,7 @@ mod tests {
     fn a_body_is_recorded_once_and_another_one_is_another() {
         let body = |cells, modes| {
             let mesh = box_mesh([0.1; 3], [cells; 3]).expect("a good box");
-            PAPER_MATERIAL.free_body(mesh, Order::Linear, modes).expect("a good body")
+            PAPER_MATERIAL.free_body(mesh, ElementOrder::Linear, modes).expect("a good body")
         };
         assert!(Arc::ptr_eq(&body(2, 10), &body(2, 10)));
         assert!(!Arc::ptr_eq(&body(2, 10), &body(2, 11)));

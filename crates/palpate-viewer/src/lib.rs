@@ -1,29 +1,31 @@
-//! The viewer's server: a page in the browser sees a scene and touches it, or looks at a log.
+//! Viewer server: a page in the browser shows a running scene and touches it, or plays logs.
 //!
 //! ```text
-//! page ⇄ socket ⇄ live scene (stage's manager, pointers at 1 kHz) ⇄ session of palpate-haptics
-//!               ↖ pictures: modal coordinates, poses and dents, 60 times a second
+//! page ⇄ WebSocket session ⇄ live scene (manager thread, pointers at 1 kHz) ⇄ session of palpate-haptics
+//!      ← frames: modal coordinates, poses and residual displacements, 60 per second
 //! ```
 //!
-//! docs/viewer-protocol.md is the contract with the page, `viewer/`, which is embedded here. A [`SceneProvider`] makes the scenes: the
-//! server knows neither scene files nor recording. No page can make the force process wait: pictures are taken from
-//! its newest state, and a page that is slow misses some.
+//! `docs/viewer-protocol.md` defines the protocol with the page, `viewer/`, which is embedded here. A [`SceneProvider`]
+//! makes the scenes: the server knows neither scene files nor recording. No page can delay the force process: frames
+//! are encoded from its newest snapshot, and a slow page skips frames.
 
+mod error;
 mod live;
-mod log_show;
+mod log_frames;
 mod pointers;
+mod protocol;
+mod scene_provider;
 mod server;
-mod stage;
-mod wire;
 
-pub use log_show::{LogFrameBuilder, LogFrames};
-pub use server::{Live, RenderJob, ServedContent, Server, Settings};
-pub use stage::{
-    DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier, ProgressCallback, SceneProvider,
-    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
-};
-pub use wire::{
+pub use error::{SceneError, ServerError};
+pub use log_frames::{LogFrameBuilder, LogFrames};
+pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
     MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,
     SceneDescription, SceneSummary, ShapeDescription, View,
 };
+pub use scene_provider::{
+    DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier, ProgressCallback, SceneProvider,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+};
+pub use server::{Live, RenderJob, ServedContent, Server, Settings};

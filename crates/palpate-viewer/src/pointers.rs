@@ -1,120 +1,132 @@
 //! Pointers of pages as devices of a scene.
 //!
-//! A page tells where a pointer is 60 to 120 times a second. The force process wants a path without jumps in velocity: the
-//! hand of a pointer is drawn to where it was told by a critically damped spring, solved exactly,
+//! A page sends the target of a pointer 60 to 120 times a second. The force process needs a path with continuous
+//! velocity, so the interface point x follows the target by a critically damped spring, solved exactly:
 //!
 //! ```text
-//! ẍ = ω²·(told − x) − 2ω·ẋ
+//! ẍ = ω²·(target − x) − 2ω·ẋ
 //! ```
 //!
-//! which follows a steady motion 2/ω behind. It begins to go when the force process has seen where it was pressed: what begins
-//! inside an object touches nothing, and a step may be late, slow, or paused.
+//! A steady motion is followed with a delay of 2/ω. The interface point starts to move once the force process has
+//! processed the press: a tip that begins inside an object makes no contact, and a step may be late, slow or paused.
 
 use glam::DVec3;
 use palpate::DeviceMode;
 use palpate_haptics::{DevicePort, Motion};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// ω [1/s]: a steady motion is followed by 17 ms, about as much as the page's own frames are apart.
-const FOLLOW: f64 = 120.0;
+/// Angular frequency ω of the tracking filter [rad/s]: a delay of 17 ms, about the frame interval of a page.
+const TRACKING_FREQUENCY: f64 = 120.0;
 
-/// Who holds a pointer: a viewer, and its number for it.
-pub(crate) type Holder = (u64, u64);
+/// Owner of a pointer: viewer number and pointer number.
+pub(crate) type PointerId = (u64, u64);
 
-/// The devices that pointers can be.
+/// Pointers shared by the page sessions and the pointer thread.
+pub(crate) type SharedPointers = Arc<Mutex<Pointers>>;
+
+/// Locks the pointers; a panic of another holder leaves them valid.
+pub(crate) fn lock(pointers: &Mutex<Pointers>) -> MutexGuard<'_, Pointers> {
+    pointers.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Device slots for pointers.
 #[derive(Default)]
-pub(crate) struct Pointers(Vec<Pointer>);
+pub(crate) struct Pointers(Vec<DeviceSlot>);
 
-struct Pointer {
+struct DeviceSlot {
     device: usize,
     port: DevicePort,
-    holder: Option<Holder>,
+    owner: Option<PointerId>,
     mode: DeviceMode,
-    told: DVec3,
+    /// Target position [m, world].
+    target: DVec3,
+    /// Interface point [m, world].
     position: DVec3,
+    /// Velocity of the interface point [m/s, world].
     velocity: DVec3,
     sequence: u64,
-    /// The motion that tells of the press.
-    pressed: u64,
+    /// Sequence number of the motion that carries the press.
+    press_sequence: u64,
 }
 
 impl Pointers {
-    /// For these devices of a scene, by their places in it.
+    /// Free slots for devices, given by index.
     pub fn new(ports: Vec<(usize, DevicePort)>) -> Self {
-        let pointer = |(device, port)| Pointer {
+        let slot = |(device, port)| DeviceSlot {
             device,
             port,
-            holder: None,
+            owner: None,
             mode: DeviceMode::Inactive,
-            told: DVec3::ZERO,
+            target: DVec3::ZERO,
             position: DVec3::ZERO,
             velocity: DVec3::ZERO,
             sequence: 0,
-            pressed: 0,
+            press_sequence: 0,
         };
-        Self(ports.into_iter().map(pointer).collect())
+        Self(ports.into_iter().map(slot).collect())
     }
 
-    /// Begin at a place [m, world] with a device that nobody holds; gives which, if there is one.
-    pub fn press(&mut self, holder: Holder, mode: DeviceMode, position: DVec3) -> Option<usize> {
-        self.release(holder);
-        let free = self.0.iter_mut().find(|pointer| pointer.holder.is_none())?;
-        free.holder = Some(holder);
+    /// Claims a free slot at a position [m, world]; returns its device index.
+    pub fn press(&mut self, pointer: PointerId, mode: DeviceMode, position: DVec3) -> Option<usize> {
+        self.release(pointer);
+        let free = self.0.iter_mut().find(|slot| slot.owner.is_none())?;
+        free.owner = Some(pointer);
         free.mode = mode;
-        free.pressed = free.sequence + 1;
-        (free.told, free.position, free.velocity) = (position, position, DVec3::ZERO);
+        free.press_sequence = free.sequence + 1;
+        (free.target, free.position, free.velocity) = (position, position, DVec3::ZERO);
         Some(free.device)
     }
 
-    /// Go to a place [m, world].
-    pub fn go(&mut self, holder: Holder, position: DVec3) {
-        if let Some(held) = self.0.iter_mut().find(|pointer| pointer.holder == Some(holder)) {
-            held.told = position;
+    /// Sets the target of a pointer [m, world].
+    pub fn set_target(&mut self, pointer: PointerId, target: DVec3) {
+        if let Some(slot) = self.0.iter_mut().find(|slot| slot.owner == Some(pointer)) {
+            slot.target = target;
         }
     }
 
-    /// Let go.
-    pub fn release(&mut self, holder: Holder) {
-        self.release_where(|own| own == holder);
+    /// Releases a pointer.
+    pub fn release(&mut self, pointer: PointerId) {
+        self.release_where(|owner| owner == pointer);
     }
 
-    /// Let go of all that a viewer holds.
+    /// Releases all pointers of a viewer.
     pub fn release_viewer(&mut self, viewer: u64) {
-        self.release_where(|own| own.0 == viewer);
+        self.release_where(|owner| owner.0 == viewer);
     }
 
-    fn release_where(&mut self, which: impl Fn(Holder) -> bool) {
-        for pointer in self.0.iter_mut().filter(|pointer| pointer.holder.is_some_and(&which)) {
-            (pointer.holder, pointer.mode) = (None, DeviceMode::Inactive);
+    fn release_where(&mut self, matches: impl Fn(PointerId) -> bool) {
+        for slot in self.0.iter_mut().filter(|slot| slot.owner.is_some_and(&matches)) {
+            (slot.owner, slot.mode) = (None, DeviceMode::Inactive);
         }
     }
 
-    /// Advance all hands by a time [s], and tell the force process where they are now.
+    /// Advances all interface points by `dt` [s] and sends them to the force process.
     pub fn advance(&mut self, dt: f64, now_s: f64) {
-        for pointer in &mut self.0 {
-            if pointer.port.newest().answers >= pointer.pressed {
-                pointer.follow(dt);
+        for slot in &mut self.0 {
+            if slot.port.newest().in_reply_to >= slot.press_sequence {
+                slot.follow(dt);
             }
-            pointer.sequence += 1;
-            pointer.port.tell(Motion {
-                sequence: pointer.sequence,
+            slot.sequence += 1;
+            slot.port.send(Motion {
+                sequence: slot.sequence,
                 time_s: now_s,
-                position: pointer.position,
-                mode: Some(pointer.mode),
+                position: slot.position,
+                mode: Some(slot.mode),
                 ..Motion::default()
             });
         }
     }
 }
 
-impl Pointer {
-    /// x − told = (a + b·t)·e^(−ωt)
+impl DeviceSlot {
+    /// x − target = (a + b·t)·e^(−ωt)
     fn follow(&mut self, dt: f64) {
-        let a = self.position - self.told;
-        let b = self.velocity + a * FOLLOW;
-        let decay = (-FOLLOW * dt).exp();
-        let off = (a + b * dt) * decay;
-        self.position = self.told + off;
-        self.velocity = b * decay - off * FOLLOW;
+        let a = self.position - self.target;
+        let b = self.velocity + a * TRACKING_FREQUENCY;
+        let decay = (-TRACKING_FREQUENCY * dt).exp();
+        let offset = (a + b * dt) * decay;
+        self.position = self.target + offset;
+        self.velocity = b * decay - offset * TRACKING_FREQUENCY;
     }
 }
 
@@ -129,20 +141,20 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_follows_frames_of_a_page_without_jumps_and_stays_where_it_is_told() {
+    fn a_pointer_follows_the_frames_of_a_page_without_jumps_and_settles_at_its_target() {
         let (mut pointers, mut forces) = pointers(1);
         assert_eq!(pointers.press((1, 7), DeviceMode::Touch, DVec3::ZERO), Some(0));
-        // 0.1 m/s, told at 60 Hz for half a second.
+        // 0.1 m/s, sampled at 60 Hz for half a second.
         let (mut last, mut speed, mut jerk, mut behind) = (DVec3::ZERO, 0.0, 0.0_f64, 0.0);
         for tick in 1..=1000_u32 {
             let t = f64::from(tick) * 1e-3;
             let frame = (t.min(0.5) * 60.0).floor() / 60.0;
-            pointers.go((1, 7), DVec3::X * 0.1 * frame);
+            pointers.set_target((1, 7), DVec3::X * 0.1 * frame);
             pointers.advance(1e-3, t);
             let motion = forces[0].newest();
-            forces[0].answer(Effort {
+            forces[0].send(Effort {
                 sequence: motion.sequence,
-                answers: motion.sequence,
+                in_reply_to: motion.sequence,
                 ..Effort::default()
             });
             assert_eq!((motion.mode, motion.sequence), (Some(DeviceMode::Touch), u64::from(tick)));
@@ -159,28 +171,28 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_waits_where_it_was_pressed_until_that_was_seen() {
+    fn a_pointer_waits_at_its_press_until_the_force_process_has_processed_it() {
         let (mut pointers, mut forces) = pointers(1);
         pointers.press((1, 1), DeviceMode::Touch, DVec3::Y);
-        pointers.go((1, 1), DVec3::ZERO);
+        pointers.set_target((1, 1), DVec3::ZERO);
         (0..100).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
         let motion = forces[0].newest();
         assert_eq!(motion.position, DVec3::Y);
-        forces[0].answer(Effort { answers: motion.sequence, ..Effort::default() });
+        forces[0].send(Effort { in_reply_to: motion.sequence, ..Effort::default() });
         (100..300).for_each(|tick| pointers.advance(1e-3, f64::from(tick) * 1e-3));
         assert!(forces[0].newest().position.length() < 1e-6);
     }
 
     #[test]
-    fn devices_are_given_once_and_come_back_with_their_viewer() {
+    fn a_device_has_one_owner_and_is_freed_when_its_viewer_leaves() {
         let (mut pointers, mut forces) = pointers(2);
-        let press = |pointers: &mut Pointers, holder| pointers.press(holder, DeviceMode::Touch, DVec3::Y);
+        let press = |pointers: &mut Pointers, pointer| pointers.press(pointer, DeviceMode::Touch, DVec3::Y);
         assert_eq!(press(&mut pointers, (1, 1)), Some(0));
         assert_eq!(press(&mut pointers, (2, 1)), Some(1));
         assert_eq!(press(&mut pointers, (2, 2)), None);
-        // Pressed again it is the same one.
+        // A second press keeps the slot.
         assert_eq!(press(&mut pointers, (1, 1)), Some(0));
-        pointers.go((2, 1), DVec3::Z);
+        pointers.set_target((2, 1), DVec3::Z);
         pointers.release_viewer(1);
         pointers.advance(1e-3, 0.0);
         assert_eq!(forces[0].newest().mode, Some(DeviceMode::Inactive));

@@ -1,51 +1,53 @@
-// The WebSocket to the server: it comes back by itself, and what cannot be read is dropped.
+// WebSocket connection to the server: reconnects automatically and drops what cannot be decoded.
 
-import { sessionAddress } from "./address";
-import { readMessage, type FromServer, type ToServer } from "./messages";
-import { readPicture, type Picture } from "./picture";
+import { sessionUrl } from "./urls";
+import { parseMessage, type ServerMessage, type ClientMessage } from "./messages";
+import { decodeFrame, type Frame } from "./frame";
 
 export type ConnectionState =
   | { name: "connecting" }
   | { name: "open" }
-  /** `retryAt`: when the next attempt is made [ms, performance.now]; `refused`: the server closed it with a reason. */
+  /** `retryAt`: time of the next attempt [ms, performance.now]; `reason`: close reason of the server, may be empty. */
   | { name: "lost"; retryAt: number; reason: string };
 
-export interface Listener {
-  message(message: FromServer): void;
-  picture(picture: Picture): void;
+/** Callbacks of a connection. */
+export interface ConnectionListener {
+  message(message: ServerMessage): void;
+  frame(frame: Frame): void;
   state(state: ConnectionState): void;
-  unreadable(what: string): void;
+  decodeFailed(what: string): void;
 }
 
-const FIRST_WAIT_MS = 400;
-const LONGEST_WAIT_MS = 8000;
-const LIVELY_MS = 5000;
+const FIRST_RETRY_MS = 400;
+const MAX_RETRY_MS = 8000;
+const SILENCE_TIMEOUT_MS = 5000;
 const SEND_BUFFER_BYTES = 1 << 20;
 
-/** The wait before attempt n = 0, 1, … [ms]: doubled each time, up to a bound. */
-export function waitBefore(attempt: number): number {
-  return Math.min(LONGEST_WAIT_MS, FIRST_WAIT_MS * 2 ** Math.min(attempt, 10));
+/** Delay before reconnection attempt n = 0, 1, … [ms]: exponential backoff with an upper bound. */
+export function retryDelay(attempt: number): number {
+  return Math.min(MAX_RETRY_MS, FIRST_RETRY_MS * 2 ** Math.min(attempt, 10));
 }
 
+/** Session with the server. */
 export class Connection {
   private socket: WebSocket | null = null;
   private attempt = 0;
   private timer = 0;
-  private heardAt = 0;
+  private receivedAt = 0;
   private expectsStatus = false;
-  private watch = 0;
+  private watchdog = 0;
 
-  constructor(private readonly listener: Listener) {}
+  constructor(private readonly listener: ConnectionListener) {}
 
-  begin(): void {
-    this.watch = window.setInterval(() => this.checkAlive(), 1000);
+  start(): void {
+    this.watchdog = window.setInterval(() => this.checkAlive(), 1000);
     this.connect();
   }
 
-  send(message: ToServer): void {
+  send(message: ClientMessage): void {
     const socket = this.socket;
     if (socket?.readyState !== WebSocket.OPEN) return;
-    // A server that does not read gets no more motions; they would be old anyway.
+    // Backpressure: motions that cannot be sent now are outdated later.
     if (message.type === "move" && socket.bufferedAmount > SEND_BUFFER_BYTES) return;
     socket.send(JSON.stringify(message));
   }
@@ -54,8 +56,8 @@ export class Connection {
     if (this.socket === null) this.connect();
   }
 
-  end(): void {
-    window.clearInterval(this.watch);
+  close(): void {
+    window.clearInterval(this.watchdog);
     window.clearTimeout(this.timer);
     const socket = this.socket;
     this.socket = null;
@@ -65,37 +67,37 @@ export class Connection {
   private connect(): void {
     window.clearTimeout(this.timer);
     this.listener.state({ name: "connecting" });
-    const socket = new WebSocket(sessionAddress());
+    const socket = new WebSocket(sessionUrl());
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     this.expectsStatus = false;
-    this.heardAt = performance.now();
+    this.receivedAt = performance.now();
     socket.onopen = () => {
       if (this.socket === socket) this.listener.state({ name: "open" });
     };
     socket.onmessage = (event: MessageEvent<unknown>) => {
-      if (this.socket === socket) this.hear(event.data);
+      if (this.socket === socket) this.receive(event.data);
     };
     socket.onclose = (event) => {
-      if (this.socket === socket) this.lose(event.reason || (event.code === 1008 ? "it got too many messages" : ""));
+      if (this.socket === socket) this.handleLoss(event.reason || (event.code === 1008 ? "too many messages" : ""));
     };
   }
 
-  private hear(data: unknown): void {
-    this.heardAt = performance.now();
+  private receive(data: unknown): void {
+    this.receivedAt = performance.now();
     if (data instanceof ArrayBuffer) {
-      let picture: Picture;
+      let frame: Frame;
       try {
-        picture = readPicture(data);
+        frame = decodeFrame(data);
       } catch (error) {
-        this.listener.unreadable(error instanceof Error ? error.message : String(error));
+        this.listener.decodeFailed(error instanceof Error ? error.message : String(error));
         return;
       }
-      this.listener.picture(picture);
+      this.listener.frame(frame);
     } else if (typeof data === "string") {
-      const message = readMessage(data);
+      const message = parseMessage(data);
       if (message === null) {
-        this.listener.unreadable("a message of a kind that this page does not know");
+        this.listener.decodeFailed("a message of unknown type");
         return;
       }
       if (message.type === "hello") this.attempt = 0;
@@ -104,24 +106,24 @@ export class Connection {
     }
   }
 
-  private lose(reason: string): void {
+  private handleLoss(reason: string): void {
     this.socket = null;
-    const wait = waitBefore(this.attempt++);
+    const wait = retryDelay(this.attempt++);
     this.listener.state({ name: "lost", retryAt: performance.now() + wait, reason });
     this.timer = window.setTimeout(() => this.connect(), wait);
   }
 
-  /** A server that says how it is twice a second, and then nothing for long, hangs: the connection is begun anew. */
+  /** Reconnects when a server that sends status messages falls silent. */
   private checkAlive(): void {
     if (document.hidden) {
-      this.heardAt = performance.now();
+      this.receivedAt = performance.now();
       return;
     }
     const socket = this.socket;
-    const opens = socket?.readyState === WebSocket.CONNECTING;
-    if (socket === null || !(this.expectsStatus || opens)) return;
-    if (performance.now() - this.heardAt < (opens ? 2 * LIVELY_MS : LIVELY_MS)) return;
-    this.lose("it does not answer");
+    const connecting = socket?.readyState === WebSocket.CONNECTING;
+    if (socket === null || !(this.expectsStatus || connecting)) return;
+    if (performance.now() - this.receivedAt < (connecting ? 2 * SILENCE_TIMEOUT_MS : SILENCE_TIMEOUT_MS)) return;
+    this.handleLoss("the server does not respond");
     socket.close();
   }
 }

@@ -1,14 +1,14 @@
-// Messages as JSON, both ways (docs/viewer-protocol.md, "Messages").
+// JSON messages in both directions (docs/viewer-protocol.md).
 
-import type { EnergyName, Vector } from "./picture";
+import type { EnergyName, Vector } from "./frame";
 
-export interface SceneEntry {
+export interface SceneSummary {
   id: string;
   title: string;
   about: string;
 }
 
-export interface RenderOrder {
+export interface RenderRequest {
   frames: number[];
   width: number;
   height: number;
@@ -22,9 +22,9 @@ export interface Hello {
   protocol: number;
   version: string;
   kind: "live" | "logs" | "render";
-  scenes: SceneEntry[];
+  scenes: SceneSummary[];
   logs: { name: string }[];
-  render?: RenderOrder;
+  render?: RenderRequest;
 }
 
 export interface Material {
@@ -84,7 +84,7 @@ export interface SceneMessage {
   gravity: Vector;
   log?: number;
   frames?: number;
-  frame_s?: number;
+  frame_interval_s?: number;
   objects: SceneObject[];
   obstacles: SceneObstacle[];
   devices: SceneDevice[];
@@ -102,20 +102,20 @@ export interface Status {
   type: "status";
   generation: number;
   paused: boolean;
-  slowness: number;
+  slowdown: number;
   steps: number;
   viewers: number;
   force_process: {
     compute_us: Percentiles;
-    late_us: Percentiles;
+    lateness_us: Percentiles;
     overruns: number;
-    own_overruns: number;
-    priority: boolean;
+    compute_overruns: number;
+    realtime_priority: boolean;
   } | null;
 }
 
-export interface Granted {
-  type: "granted";
+export interface DeviceAssigned {
+  type: "assigned";
   pointer: number;
   device: number | null;
 }
@@ -123,26 +123,26 @@ export interface Granted {
 export interface Progress {
   type: "progress";
   job: string;
-  what: string;
-  share: number | null;
+  phase: string;
+  fraction: number | null;
   done?: boolean;
 }
 
-export interface Note {
-  type: "note";
+export interface InfoMessage {
+  type: "info";
   text: string;
 }
 
-export interface Complaint {
+export interface ErrorMessage {
   type: "error";
   text: string;
 }
 
-export type FromServer = Hello | SceneMessage | Status | Granted | Progress | Note | Complaint;
+export type ServerMessage = Hello | SceneMessage | Status | DeviceAssigned | Progress | InfoMessage | ErrorMessage;
 
 export type TouchMode = "touch" | "hold";
 
-export type ToServer =
+export type ClientMessage =
   | { type: "press"; pointer: number; mode: "touch"; position: Vector }
   | {
       type: "press";
@@ -156,18 +156,18 @@ export type ToServer =
   | { type: "move"; pointers: { pointer: number; position: Vector }[] }
   | { type: "release"; pointer: number }
   | { type: "pause"; paused: boolean }
-  | { type: "step" }
-  | { type: "slow"; slowness: number }
+  | { type: "single_step" }
+  | { type: "slow_motion"; slowdown: number }
   | { type: "reset" }
-  | { type: "open"; scene: string }
-  | { type: "set"; gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }
-  | ({ type: "material"; object: number } & Material)
-  | { type: "stream"; form: "modal" | "vertices"; every: number };
+  | { type: "open_scene"; scene: string }
+  | { type: "set_physics"; gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }
+  | ({ type: "set_material"; object: number } & Material)
+  | { type: "stream"; format: "modal" | "vertices"; stride: number };
 
-/** What `/log/K/series` answers. */
+/** Response of `/log/K/series`: times [s], forces on the hands [N, world], energies [J]. */
 export interface Series {
   t: number[];
-  devices: { name: string; force: number[] }[];
+  devices: { name: string; force: Vector[] }[];
   energy: Partial<Record<EnergyName, number[]>>;
 }
 
@@ -189,8 +189,8 @@ function isView(value: unknown): boolean {
   return isObject(value) && isNumbers(value.center, 3) && typeof value.radius === "number" && value.radius > 0;
 }
 
-// What the page relies on when it takes a message apart.
-const CHECKS: Record<FromServer["type"], Check> = {
+// Structural checks of the fields that the page relies on.
+const CHECKS: Record<ServerMessage["type"], Check> = {
   hello: (m) =>
     typeof m.protocol === "number" &&
     (m.kind === "live" || m.kind === "logs" || m.kind === "render") &&
@@ -206,15 +206,15 @@ const CHECKS: Record<FromServer["type"], Check> = {
     isList(m.devices) &&
     m.devices.every((d) => isObject(d) && typeof d.tip_radius === "number") &&
     isView(m.view),
-  status: (m) => typeof m.paused === "boolean" && typeof m.slowness === "number",
-  granted: (m) => typeof m.pointer === "number",
+  status: (m) => typeof m.paused === "boolean" && typeof m.slowdown === "number",
+  assigned: (m) => typeof m.pointer === "number",
   progress: (m) => typeof m.job === "string",
-  note: (m) => typeof m.text === "string",
+  info: (m) => typeof m.text === "string",
   error: (m) => typeof m.text === "string",
 };
 
-/** A message of the server; null if it is none that this page knows. */
-export function readMessage(text: string): FromServer | null {
+/** Parsed server message; null if it is malformed or of unknown type. */
+export function parseMessage(text: string): ServerMessage | null {
   let value: unknown;
   try {
     value = JSON.parse(text);
@@ -222,6 +222,6 @@ export function readMessage(text: string): FromServer | null {
     return null;
   }
   if (!isObject(value) || typeof value.type !== "string") return null;
-  const check = Object.hasOwn(CHECKS, value.type) ? CHECKS[value.type as FromServer["type"]] : undefined;
-  return check !== undefined && check(value) ? (value as unknown as FromServer) : null;
+  const check = Object.hasOwn(CHECKS, value.type) ? CHECKS[value.type as ServerMessage["type"]] : undefined;
+  return check !== undefined && check(value) ? (value as unknown as ServerMessage) : null;
 }

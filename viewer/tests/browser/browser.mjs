@@ -1,4 +1,4 @@
-// Chromium without a screen, and what the cases ask of a page.
+// Headless Chromium, and queries on a page.
 
 import { join } from "node:path";
 import { chromium } from "playwright-core";
@@ -16,14 +16,14 @@ const SWITCHES = [
 
 export class Browser {
   static async open() {
-    const made = new Browser();
-    made.chromium = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: SWITCHES });
-    made.contexts = [];
-    made.closers = [];
-    return made;
+    const browser = new Browser();
+    browser.chromium = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: SWITCHES });
+    browser.contexts = [];
+    browser.closers = [];
+    return browser;
   }
 
-  /** A page of its own; complaints of its console count as failures unless a case expects them. */
+  /** Page in its own context; console errors are collected in `consoleErrors`. */
   async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1 } = {}) {
     const context = await this.chromium.newContext({
       viewport: { width, height },
@@ -35,16 +35,16 @@ export class Browser {
     this.contexts.push(context);
     const page = await context.newPage();
     page.setDefaultTimeout(20_000);
-    page.complaints = [];
-    page.on("pageerror", (error) => page.complaints.push(error.stack));
+    page.consoleErrors = [];
+    page.on("pageerror", (error) => page.consoleErrors.push(error.stack));
     page.on("console", (message) => {
-      if (message.type() === "error") page.complaints.push(message.text());
+      if (message.type() === "error") page.consoleErrors.push(message.text());
     });
     await page.goto(url);
     return page;
   }
 
-  /** Closed after the case. */
+  /** Closes the server after the test case. */
   keep(server) {
     this.closers.push(() => server.close());
     return server;
@@ -64,65 +64,65 @@ export function assert(holds, text) {
   if (!holds) throw new Error(text);
 }
 
-export function quiet(page) {
-  assert(page.complaints.length === 0, `the page complains:\n${page.complaints.join("\n")}`);
+export function assertNoConsoleErrors(page) {
+  assert(page.consoleErrors.length === 0, `console errors:\n${page.consoleErrors.join("\n")}`);
 }
 
-export async function shot(page, name) {
+export async function screenshot(page, name) {
   if (process.env.SHOTS) await page.screenshot({ path: join(process.env.SHOTS, `${name}.png`) });
 }
 
-/** Waits until the newest picture is of a scene that is loaded. */
-export async function loaded(page) {
-  await page.waitForFunction(() => (window.palpate?.stage.worlds[0]?.picture ?? null) !== null, null, { timeout: 60_000 });
+/** Waits until the scene is loaded and a frame of it is shown. */
+export async function waitForScene(page) {
+  await page.waitForFunction(() => (window.palpate?.sceneView.graphs[0]?.frame ?? null) !== null, null, { timeout: 60_000 });
 }
 
-/** What the newest picture says. */
-export function newest(page) {
+/** Summary of the newest frame. */
+export function latestFrame(page) {
   return page.evaluate(() => {
-    const { picture } = window.palpate.stage.worlds[0];
+    const { frame } = window.palpate.sceneView.graphs[0];
     return {
-      step: picture.step,
-      time: picture.time,
-      generation: picture.generation,
-      devices: picture.devices.map(({ doing, force, position }) => ({ doing, position, force: Math.hypot(...force) })),
-      contacts: picture.contacts.length,
-      pose: [...picture.objects[0].pose],
+      step: frame.step,
+      time: frame.time,
+      generation: frame.generation,
+      devices: frame.devices.map(({ mode, force, position }) => ({ mode, position, force: Math.hypot(...force) })),
+      contacts: frame.contacts.length,
+      pose: [...frame.objects[0].pose],
     };
   });
 }
 
-/** Where on the page a point of the first object's body is that lies `up` and `right` of its middle, in its radii. */
-export function whereIs(page, right = 0, up = 0) {
+/** Page position [px] of a point `right` and `up` of the first object's centre, in object radii. */
+export function pixelOf(page, right = 0, up = 0) {
   return page.evaluate(
     ([r, u]) => {
-      const { stage } = window.palpate;
-      const object = stage.worlds[0].objects[0];
+      const { sceneView } = window.palpate;
+      const object = sceneView.graphs[0].objects[0];
       const at = object.group.position.clone();
-      const m = stage.orbit.camera.matrixWorld.elements;
+      const m = sceneView.orbit.camera.matrixWorld.elements;
       const radius = object.info.radius;
       for (const [k, axis] of ["x", "y", "z"].entries()) at[axis] += radius * (r * m[k] + u * m[4 + k]);
-      const pixel = stage.toStage(at);
-      const box = stage.canvas.getBoundingClientRect();
+      const pixel = sceneView.toPixels(at);
+      const box = sceneView.canvas.getBoundingClientRect();
       return { x: box.left + pixel.x, y: box.top + pixel.y };
     },
     [right, up],
   );
 }
 
-/** The object has come to lie: nothing moves any more. */
-export async function atRest(page, patience = 15_000) {
-  const end = Date.now() + patience;
-  let before = (await newest(page)).pose;
+/** Waits until the object is at rest, or until the time is over. */
+export async function waitForRest(page, timeout = 15_000) {
+  const end = Date.now() + timeout;
+  let before = (await latestFrame(page)).pose;
   while (Date.now() < end) {
     await page.waitForTimeout(300);
-    const { pose } = await newest(page);
+    const { pose } = await latestFrame(page);
     if (Math.hypot(...pose.map((x, k) => x - before[k])) < 2e-4) return;
     before = pose;
   }
 }
 
-/** Whether any two of these overlap, and whether any sticks out of the window. */
+/** Elements that overlap or leave the window. */
 export function overlaps(page, selectors) {
   return page.evaluate((names) => {
     const boxes = names
@@ -130,7 +130,7 @@ export function overlaps(page, selectors) {
       .filter(({ box }) => box.width > 0 && box.height > 0);
     const found = [];
     boxes.forEach(({ name, box, element }, i) => {
-      if (box.left < -1 || box.right > innerWidth + 1) found.push(`${name} sticks out`);
+      if (box.left < -1 || box.right > innerWidth + 1) found.push(`${name} leaves the window`);
       for (const other of boxes.slice(i + 1)) {
         if (element.contains(other.element) || other.element.contains(element)) continue;
         const apart = box.right <= other.box.left + 1 || other.box.right <= box.left + 1 || box.bottom <= other.box.top + 1 || other.box.bottom <= box.top + 1;

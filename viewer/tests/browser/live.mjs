@@ -1,25 +1,25 @@
-// A live page: loads, stays when the server goes, when others come, when nobody looks.
+// Live mode: loading, controls, reconnection, several viewers, hidden pages, window sizes, lost WebGL context.
 
-import { assert, loaded, newest, overlaps, quiet, shot } from "./browser.mjs";
+import { assert, waitForScene, latestFrame, overlaps, assertNoConsoleErrors, screenshot } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
-const PARTS = [".head > *", ".bar > *", ".upper > *", ".lower > *", ".stage", ".head", ".bar"];
+const PARTS = [".header > *", ".toolbar > *", ".overlay-top > *", ".overlay-bottom > *", ".scene-view", ".header", ".toolbar"];
 
-/** The last picture: those that are under way still come, then no more. */
-async function calm(page) {
+/** Newest frame once the stream has stopped. */
+async function waitForStop(page) {
   let before = -1;
   for (let i = 0; i < 8; i++) {
     await page.waitForTimeout(900);
-    const now = await newest(page);
+    const now = await latestFrame(page);
     if (now.step === before) return now;
     before = now.step;
   }
-  throw new Error("pictures go on coming");
+  throw new Error("frames keep arriving");
 }
 
 export const liveCases = [
   {
-    name: "loads, says what to do, and nothing overlaps, at three sizes, light and dark",
+    name: "loads and shows the hint without overlaps, at three window sizes, light and dark",
     async run(browser) {
       const server = browser.keep(await start());
       for (const [name, options] of [
@@ -31,119 +31,119 @@ export const liveCases = [
         ["large-dark", { width: 2560, height: 1440, dark: true }],
       ]) {
         const page = await browser.page(server.url, options);
-        await loaded(page);
-        assert(await page.isVisible(".hint"), "there is no hint");
-        const lying = await overlaps(page, PARTS.slice(0, 4));
-        assert(lying.length === 0, `${name}: ${lying.join("; ")}`);
+        await waitForScene(page);
+        assert(await page.isVisible(".hint"), "the hint is missing");
+        const overlapping = await overlaps(page, PARTS.slice(0, 4));
+        assert(overlapping.length === 0, `${name}: ${overlapping.join("; ")}`);
         const scrolls = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
         assert(!scrolls, `${name}: the page is wider than its window`);
         await page.waitForTimeout(600);
-        await shot(page, `live-${name}`);
-        quiet(page);
+        await screenshot(page, `live-${name}`);
+        assertNoConsoleErrors(page);
         await page.context().close();
       }
     },
   },
   {
-    name: "help, scenes, pause, step, slow motion and reset work by keys and buttons",
+    name: "help, scenes, pause, single step, slow motion and reset work by keys and buttons",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       await page.keyboard.press("?");
-      assert(await page.isVisible("dialog.help"), "no help");
-      await shot(page, "help");
+      assert(await page.isVisible("dialog.help-dialog"), "the help does not open");
+      await screenshot(page, "help");
       await page.keyboard.press("Escape");
-      assert(!(await page.isVisible("dialog.help")), "help stays");
+      assert(!(await page.isVisible("dialog.help-dialog")), "the help stays open");
 
       await page.keyboard.press("Space");
-      await page.waitForSelector('[aria-label="Go on (Space)"]');
-      const paused = await calm(page);
+      await page.waitForSelector('[aria-label="Resume (Space)"]');
+      const paused = await waitForStop(page);
       await page.keyboard.press(".");
-      await page.waitForFunction((step) => window.palpate.stage.worlds[0].picture.step > step, paused.step);
-      const once = await calm(page);
+      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step > step, paused.step);
+      const once = await waitForStop(page);
       await page.keyboard.press(".");
-      await page.waitForFunction((step) => window.palpate.stage.worlds[0].picture.step > step, once.step);
-      const { step } = await calm(page);
+      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step > step, once.step);
+      const { step } = await waitForStop(page);
       assert(step === once.step + 1, `one step went ${step - once.step}`);
       await page.keyboard.press("Space");
       await page.keyboard.press("[");
-      await page.waitForFunction((before) => window.palpate.stage.worlds[0].picture.step > before + 5, step);
-      assert((await page.inputValue(".bar select")) === "2", "not slower");
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before + 5, step);
+      assert((await page.inputValue(".toolbar select")) === "2", "not slower");
 
-      const { generation } = await newest(page);
+      const { generation } = await latestFrame(page);
       await page.keyboard.press("r");
-      await page.waitForFunction((g) => window.palpate.stage.worlds[0].picture?.generation > g, generation);
+      await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation);
       const scenes = page.locator(".scene");
       if ((await scenes.count()) > 1) {
         await scenes.nth(1).click();
-        await page.waitForFunction((g) => window.palpate.stage.worlds[0].picture?.generation > g, generation + 1);
+        await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation + 1);
         assert((await scenes.nth(1).getAttribute("aria-current")) === "true", "the scene is not marked");
       }
-      quiet(page);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "the server dies, the page says so, and goes on when it is back",
+    name: "a lost connection is shown, and restored when the server is back",
     async run(browser) {
       const server = await start();
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       await server.close();
       await page.waitForSelector(".banner:not([hidden])");
-      await shot(page, "lost");
+      await screenshot(page, "lost");
       const again = browser.keep(await start({ port: server.port }));
       await page.evaluate(() => {
-        window.palpate.stage.worlds[0].picture = null;
+        window.palpate.sceneView.graphs[0].frame = null;
       });
       await page.waitForSelector(".banner", { state: "hidden" });
-      await loaded(page);
-      const { step } = await newest(page);
-      await page.waitForFunction((before) => window.palpate.stage.worlds[0].picture.step > before, step);
+      await waitForScene(page);
+      const { step } = await latestFrame(page);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before, step);
       assert(again.url !== undefined, "no server");
     },
   },
   {
-    name: "two viewers see the same, and know of one another",
+    name: "two viewers see the same scene and the viewer count",
     async run(browser) {
       const server = browser.keep(await start());
       const [one, two] = [await browser.page(server.url), await browser.page(server.url)];
-      await loaded(one);
-      await loaded(two);
+      await waitForScene(one);
+      await waitForScene(two);
       await one.waitForSelector("text=2 viewers");
       await two.waitForSelector("text=2 viewers");
-      const a = await newest(one);
-      // What the other one sees is the same scene, a little later.
-      await two.waitForFunction((step) => window.palpate.stage.worlds[0].picture.step >= step, a.step);
-      assert((await newest(two)).generation === a.generation, "another generation");
-      quiet(one);
-      quiet(two);
+      const a = await latestFrame(one);
+      // The same scene, a little later.
+      await two.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step >= step, a.step);
+      assert((await latestFrame(two)).generation === a.generation, "another generation");
+      assertNoConsoleErrors(one);
+      assertNoConsoleErrors(two);
     },
   },
   {
-    name: "a page that nobody looks at gets no pictures, and gets them again",
+    name: "a hidden page gets no frames until it is shown again",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
-      const look = (hidden) =>
+      await waitForScene(page);
+      const setHidden = (hidden) =>
         page.evaluate((value) => {
           Object.defineProperty(document, "hidden", { configurable: true, get: () => value });
           document.dispatchEvent(new Event("visibilitychange"));
         }, hidden);
-      await look(true);
-      const { step } = await calm(page);
-      await look(false);
-      await page.waitForFunction((before) => window.palpate.stage.worlds[0].picture.step > before, step);
-      quiet(page);
+      await setHidden(true);
+      const { step } = await waitForStop(page);
+      await setHidden(false);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before, step);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "follows the size of its window",
+    name: "the layout follows the window size",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       for (const [width, height] of [
         [900, 500],
         [600, 900],
@@ -152,72 +152,72 @@ export const liveCases = [
         await page.setViewportSize({ width, height });
         await page.waitForFunction(
           ([w, h]) => {
-            const { canvas } = window.palpate.stage;
+            const { canvas } = window.palpate.sceneView;
             return innerWidth === w && innerHeight === h && canvas.width === canvas.clientWidth && canvas.height === canvas.clientHeight;
           },
           [width, height],
         );
         await page.waitForTimeout(400);
-        const lying = await overlaps(page, PARTS.slice(0, 4));
-        assert(lying.length === 0, `${width}×${height}: ${lying.join("; ")}`);
-        await shot(page, `window-${width}`);
+        const overlapping = await overlaps(page, PARTS.slice(0, 4));
+        assert(overlapping.length === 0, `${width}×${height}: ${overlapping.join("; ")}`);
+        await screenshot(page, `window-${width}`);
       }
-      quiet(page);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "what cannot be read is dropped, and said once",
+    name: "undecodable messages are dropped and reported once",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ garbage: true }));
       const page = await browser.page(server.url);
-      await loaded(page);
-      await page.waitForSelector(".note.error");
+      await waitForScene(page);
+      await page.waitForSelector(".notification.error");
       await page.waitForTimeout(2500);
-      assert((await page.locator(".note.error").count()) === 1, "said more than once");
-      const { step } = await newest(page);
-      await page.waitForFunction((before) => window.palpate.stage.worlds[0].picture.step > before + 50, step);
-      await shot(page, "garbage");
-      quiet(page);
+      assert((await page.locator(".notification.error").count()) === 1, "reported more than once");
+      const { step } = await latestFrame(page);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before + 50, step);
+      await screenshot(page, "garbage");
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "a graphics card that forgets everything is filled again",
+    name: "a lost WebGL context is restored",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       await page.evaluate(() => {
-        window.loser = window.palpate.stage.renderer.getContext().getExtension("WEBGL_lose_context");
-        window.loser.loseContext();
+        window.contextLoss = window.palpate.sceneView.renderer.getContext().getExtension("WEBGL_lose_context");
+        window.contextLoss.loseContext();
       });
       await page.waitForSelector(".banner:not([hidden])");
-      await page.evaluate(() => window.loser.restoreContext());
+      await page.evaluate(() => window.contextLoss.restoreContext());
       await page.waitForSelector(".banner", { state: "hidden" });
-      await loaded(page);
+      await waitForScene(page);
       await page.waitForTimeout(500);
       const colours = await page.evaluate(() => {
-        const { stage } = window.palpate;
-        stage.redraw();
-        stage.draw(performance.now() / 1000);
+        const { sceneView } = window.palpate;
+        sceneView.requestRender();
+        sceneView.draw(performance.now() / 1000);
         const small = document.createElement("canvas");
         small.width = small.height = 32;
-        const pen = small.getContext("2d");
-        pen.drawImage(stage.canvas, 0, 0, 32, 32);
-        const { data } = pen.getImageData(0, 0, 32, 32);
+        const context = small.getContext("2d");
+        context.drawImage(sceneView.canvas, 0, 0, 32, 32);
+        const { data } = context.getImageData(0, 0, 32, 32);
         return new Set(Array.from({ length: 1024 }, (_, i) => data.slice(4 * i, 4 * i + 3).join())).size;
       });
       assert(colours > 20, `only ${colours} colours are drawn`);
-      await shot(page, "restored");
+      await screenshot(page, "restored");
     },
   },
   {
-    name: "a mesh that is dropped is recorded, with questions before and progress after",
+    name: "a dropped mesh is recorded, with a dialog before and progress after",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       await page.evaluate(() => {
         const data = new DataTransfer();
         data.items.add(new File(["solid x"], "liver.msh"));
@@ -228,14 +228,14 @@ export const liveCases = [
         data.items.add(new File(["solid x"], "liver.msh"));
         window.dispatchEvent(new DragEvent("drop", { dataTransfer: data }));
       });
-      await page.waitForSelector("dialog.drop[open]");
-      await shot(page, "drop");
-      const { generation } = await newest(page);
-      await page.click("dialog.drop .primary");
+      await page.waitForSelector("dialog.upload-dialog[open]");
+      await screenshot(page, "drop");
+      const { generation } = await latestFrame(page);
+      await page.click("dialog.upload-dialog .primary");
       await page.waitForSelector(".job");
-      await shot(page, "recording");
-      await page.waitForFunction((g) => window.palpate.stage.worlds[0].picture?.generation > g, generation);
-      quiet(page);
+      await screenshot(page, "recording");
+      await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation);
+      assertNoConsoleErrors(page);
     },
   },
 ];

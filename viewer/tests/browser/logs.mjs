@@ -1,52 +1,54 @@
-// Logs, and pictures for `palpate render`.
+// Log mode, and images for `palpate render`.
 
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { assert, loaded, newest, quiet, shot } from "./browser.mjs";
+import { assert, waitForScene, latestFrame, assertNoConsoleErrors, screenshot } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
-const time = (page) => page.evaluate(() => window.palpate.stage.worlds[0].picture.time);
+const time = (page) => page.evaluate(() => window.palpate.sceneView.graphs[0].frame.time);
 
-async function renderOnce(browser, order) {
-  const server = await start({ kind: "render", render: order });
+async function renderOnce(browser, request) {
+  const server = await start({ kind: "render", render: request });
   const page = await browser.page(server.url);
   await page.waitForSelector("html[data-render]", { timeout: 120_000 });
   const state = await page.getAttribute("html", "data-render");
-  quiet(page);
-  const { pictures } = server;
+  assertNoConsoleErrors(page);
+  const { images } = server;
   await server.close();
   assert(state === "done", `rendering ${state}`);
-  return pictures;
+  return images;
 }
 
 export const logCases = [
   {
-    name: "a log plays, is scrubbed, and goes frame by frame",
+    name: "a log plays, seeks and steps frame by frame",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ kind: "logs", logs: 1 }));
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       const began = await time(page);
-      await page.waitForFunction((t) => window.palpate.stage.worlds[0].picture.time > t + 0.1, began);
+      await page.waitForFunction((t) => window.palpate.sceneView.graphs[0].frame.time > t + 0.1, began);
       await page.keyboard.press("Space");
       await page.locator(".scrubber").fill("2.4");
-      await page.waitForFunction(() => Math.abs(window.palpate.stage.worlds[0].picture.time - 2.4) < 0.02);
+      await page.waitForFunction(() => Math.abs(window.palpate.sceneView.graphs[0].frame.time - 2.4) < 0.02);
       await page.locator("canvas[tabindex]").focus();
-      const { step } = await newest(page);
+      const { step } = await latestFrame(page);
       await page.keyboard.press("ArrowRight");
-      await page.waitForFunction((s) => window.palpate.stage.worlds[0].picture.step === s + 16, step);
+      await page.waitForFunction((s) => window.palpate.sceneView.graphs[0].frame.step === s + 16, step);
       await page.keyboard.press("ArrowLeft");
       await page.keyboard.press("ArrowLeft");
-      await page.waitForFunction((s) => window.palpate.stage.worlds[0].picture.step === s - 16, step);
-      await page.click('[title="Measured"]');
+      await page.waitForFunction((s) => window.palpate.sceneView.graphs[0].frame.step === s - 16, step);
+      await page.click('[title="Measurements"]');
       await page.waitForTimeout(500);
-      await shot(page, "log");
-      quiet(page);
+      await screenshot(page, "log");
+      const [force] = await page.locator(".legend b").allTextContents();
+      assert(/^[\d.]+\s*[mµ]?N$/.test(force), `the force plot shows ${force}`);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "two logs stand side by side and share the time line",
+    name: "two logs play side by side and share the timeline",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ kind: "logs", logs: 2 }));
@@ -55,47 +57,47 @@ export const logCases = [
         ["phone", { width: 390, height: 844, touch: true, scale: 2, dark: true }],
       ]) {
         const page = await browser.page(server.url, options);
-        await page.waitForFunction(() => window.palpate?.stage.worlds.length === 2 && window.palpate.stage.worlds.every((w) => w.picture !== null));
+        await page.waitForFunction(() => window.palpate?.sceneView.graphs.length === 2 && window.palpate.sceneView.graphs.every((w) => w.frame !== null));
         await page.locator(".scrubber").fill("1.6");
-        await page.waitForFunction(() => window.palpate.stage.worlds.every((w) => Math.abs(w.picture.time - 1.6) < 0.3));
+        await page.waitForFunction(() => window.palpate.sceneView.graphs.every((w) => Math.abs(w.frame.time - 1.6) < 0.3));
         await page.waitForTimeout(500);
-        const times = await page.evaluate(() => window.palpate.stage.worlds.map((w) => w.picture.time));
+        const times = await page.evaluate(() => window.palpate.sceneView.graphs.map((w) => w.frame.time));
         assert(times[0] === times[1], `times ${times}`);
-        const lies = await page.evaluate(() => {
-          const { stage } = window.palpate;
-          const { x, y, height } = stage.legendOf(0);
+        const hidden = await page.evaluate(() => {
+          const { sceneView } = window.palpate;
+          const { x, y, height } = sceneView.legendAreaOf(0);
           const bar = { right: x + 190, top: y + height - 54, bottom: y + height };
-          const [object] = stage.worlds[0].objects;
-          const places = object.currentPlaces(stage.renderer);
-          for (let i = 0; i < places.length; i += 3) {
-            const at = stage.toStage(object.group.localToWorld(stage.orbit.camera.position.clone().fromArray(places, i)));
-            if (at.x < bar.right && at.y > bar.top && at.y < bar.bottom) return `the object lies under the colour bar at ${at.x}, ${at.y}`;
+          const [object] = sceneView.graphs[0].objects;
+          const positions = object.currentPositions(sceneView.renderer);
+          for (let i = 0; i < positions.length; i += 3) {
+            const at = sceneView.toPixels(object.group.localToWorld(sceneView.orbit.camera.position.clone().fromArray(positions, i)));
+            if (at.x < bar.right && at.y > bar.top && at.y < bar.bottom) return `the colour bar covers the object at ${at.x}, ${at.y}`;
           }
           return "";
         });
-        assert(lies === "", lies);
-        await shot(page, `logs-${name}`);
-        quiet(page);
+        assert(hidden === "", hidden);
+        await screenshot(page, `logs-${name}`);
+        assertNoConsoleErrors(page);
       }
     },
   },
   {
-    name: "pictures for render come in order, and have the same bytes every time",
+    name: "rendered images arrive in order and are reproducible to the byte",
     standinOnly: true,
     async run(browser) {
-      const order = { frames: [0, 80, 81, 82, 110], width: 960, height: 540, camera: null, colour: "displacement", dark: false };
-      const [one, two] = [await renderOnce(browser, order), await renderOnce(browser, order)];
-      assert(one.length === order.frames.length, `${one.length} pictures`);
-      one.forEach((picture, i) => {
-        assert(picture.subarray(1, 4).toString() === "PNG", `picture ${i} is no PNG`);
-        assert(picture.readUInt32BE(16) === order.width && picture.readUInt32BE(20) === order.height, `size of picture ${i}`);
-        assert(picture.equals(two[i]), `picture ${i} has other bytes the second time`);
+      const request = { frames: [0, 80, 81, 82, 110], width: 960, height: 540, camera: null, colour: "displacement", dark: false };
+      const [one, two] = [await renderOnce(browser, request), await renderOnce(browser, request)];
+      assert(one.length === request.frames.length, `${one.length} images`);
+      one.forEach((image, i) => {
+        assert(image.subarray(1, 4).toString() === "PNG", `image ${i} is no PNG`);
+        assert(image.readUInt32BE(16) === request.width && image.readUInt32BE(20) === request.height, `size of image ${i}`);
+        assert(image.equals(two[i]), `image ${i} has other bytes the second time`);
       });
-      assert(!one[0].equals(one[1]), "all pictures are the same");
+      assert(!one[0].equals(one[1]), "all images are the same");
       const camera = { from: [0.3, 0.3, 0.1], to: [0, 0.05, 0] };
-      const [dark] = await renderOnce(browser, { ...order, frames: [90], camera, colour: "strain", dark: true });
+      const [dark] = await renderOnce(browser, { ...request, frames: [90], camera, colour: "strain", dark: true });
       if (process.env.SHOTS) {
-        one.forEach((picture, i) => writeFileSync(join(process.env.SHOTS, `render-${i}.png`), picture));
+        one.forEach((image, i) => writeFileSync(join(process.env.SHOTS, `render-${i}.png`), image));
         writeFileSync(join(process.env.SHOTS, "render-dark.png"), dark);
       }
     },

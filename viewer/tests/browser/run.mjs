@@ -1,17 +1,17 @@
-// Tests of the page in a browser: against the stand-in, or against the real server if PALPATE is the path of the binary.
-//   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder keeps screenshots
+// Browser tests of the page: against the stand-in, or against the real server if PALPATE is the path of the binary.
+//   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
 
 import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
 import { touchCases } from "./touching.mjs";
-import { shapeCases } from "./shapes.mjs";
+import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const real = Boolean(process.env.PALPATE);
-const wanted = process.argv[2] ?? "";
-const cases = [...liveCases, ...touchCases, ...shapeCases, ...logCases].filter(({ name }) => name.includes(wanted));
+const filter = process.argv[2] ?? "";
+const cases = [...liveCases, ...touchCases, ...reconstructionCases, ...logCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;

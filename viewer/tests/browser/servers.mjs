@@ -1,9 +1,9 @@
-// The server that a case speaks with: the stand-in, or `palpate serve`.
+// Server of a test case: the stand-in, or `palpate serve`.
 
 import { spawn } from "node:child_process";
 import { createServer } from "node:net";
 import { serve } from "../standin/server.mjs";
-import { hasPage, stand } from "./front.mjs";
+import { hasPage, startProxy } from "./proxy.mjs";
 
 async function freePort() {
   return new Promise((done, failed) => {
@@ -16,36 +16,36 @@ async function freePort() {
   });
 }
 
-async function serveReally(port, log) {
+async function servePalpate(port, log) {
   const logged = log === undefined ? [] : ["--log", log];
   const child = spawn(process.env.PALPATE, ["serve", "--scene", "bounce", "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
     stdio: ["ignore", "pipe", "pipe"],
   });
-  let said = "";
-  for (const stream of [child.stdout, child.stderr]) stream.on("data", (part) => (said += part));
-  // It says its address, with a token if it wants one.
+  let output = "";
+  for (const stream of [child.stdout, child.stderr]) stream.on("data", (part) => (output += part));
+  // The server prints its URL, with a token if it needs one.
   const deadline = Date.now() + 120_000;
   for (;;) {
-    const url = said.match(/https?:\/\/[^\s"']+/)?.[0];
+    const url = output.match(/https?:\/\/[^\s"']+/)?.[0];
     if (url !== undefined) {
       const answers = await fetch(url).then((response) => response.ok).catch(() => false);
       const end = () => new Promise((done) => (child.once("exit", done), child.kill("SIGINT")));
       if (answers) return { url, end };
     }
-    if (child.exitCode !== null || Date.now() > deadline) throw new Error(`palpate serve did not begin:\n${said}`);
+    if (child.exitCode !== null || Date.now() > deadline) throw new Error(`palpate serve did not start:\n${output}`);
     await new Promise((wake) => setTimeout(wake, 100));
   }
 }
 
-/** `port`: the one from before, for a server that comes back. `log`: where the real one logs what happens. */
+/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server. */
 export async function start(options = {}) {
   const port = options.port ?? (await freePort());
   if (!process.env.PALPATE) return serve({ ...options, port });
-  const behind = await serveReally(port, options.log);
+  const behind = await servePalpate(port, options.log);
   if (await hasPage(behind.url)) return { url: behind.url, port, close: behind.end };
   await behind.end();
   const inner = await freePort();
-  const { url, end } = await serveReally(inner, options.log);
-  const front = await stand(url, port);
+  const { url, end } = await servePalpate(inner, options.log);
+  const front = await startProxy(url, port);
   return { url: front.url, port, close: async () => (await front.close(), await end()) };
 }

@@ -1,38 +1,38 @@
-// Touching: mouse, fingers, keyboard.
+// Touching with mouse, touch screen and keyboard.
 
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { assert, atRest, loaded, newest, quiet, shot, whereIs } from "./browser.mjs";
+import { assert, waitForRest, waitForScene, latestFrame, assertNoConsoleErrors, screenshot, pixelOf } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
-const touching = (page) => page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.some((d) => d.doing !== "away"));
+const touching = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.some((d) => d.mode !== "inactive"));
 const pressed = (page, least = 0.02) =>
-  page.waitForFunction((f) => window.palpate.stage.worlds[0].picture.devices.some((d) => Math.hypot(...d.force) > f), least);
-const away = (page) => page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.every((d) => d.doing === "away"));
+  page.waitForFunction((f) => window.palpate.sceneView.graphs[0].frame.devices.some((d) => Math.hypot(...d.force) > f), least);
+const released = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.every((d) => d.mode === "inactive"));
 
-function shapeNow(page) {
+function currentShape(page) {
   return page.evaluate(() => {
-    const { stage } = window.palpate;
-    return [...stage.worlds[0].objects[0].currentPlaces(stage.renderer)];
+    const { sceneView } = window.palpate;
+    return [...sceneView.graphs[0].objects[0].currentPositions(sceneView.renderer)];
   });
 }
 
-const mostMoved = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
+const maxDifference = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
 
 export const touchCases = [
   {
-    name: "a press on the object is felt, dents it, and lets go",
+    name: "a press on the object deforms it, shows the force, and releases",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
-      await atRest(page);
-      const before = await shapeNow(page);
-      // The top: pressed against the floor it cannot go away.
-      await page.evaluate(() => window.palpate.stage.orbit.turn(0, 0.7));
-      const { x, y } = await whereIs(page, 0, 0.35);
+      await waitForScene(page);
+      await waitForRest(page);
+      const before = await currentShape(page);
+      // On the top: pressed against the floor it cannot move away.
+      await page.evaluate(() => window.palpate.sceneView.orbit.rotate(0, 0.7));
+      const { x, y } = await pixelOf(page, 0, 0.35);
       await page.mouse.move(x, y);
       await page.mouse.down();
       await pressed(page, 0.05);
@@ -41,62 +41,62 @@ export const touchCases = [
         await page.waitForTimeout(80);
       }
       await page.waitForTimeout(300);
-      const during = await shapeNow(page);
-      const moved = mostMoved(before, during);
+      const during = await currentShape(page);
+      const moved = maxDifference(before, during);
       assert(moved > 5e-4, `the shape changes by ${moved} m only`);
-      assert(/\d/.test(await page.textContent(".reading .number")), "no number");
+      assert(/\d/.test(await page.textContent(".force-readout .number")), "no force is shown");
       assert(!(await page.isVisible(".hint")), "the hint stays");
-      await shot(page, "poke");
+      await screenshot(page, "touch");
       await page.keyboard.press("c");
       await page.waitForTimeout(500);
-      await shot(page, "poke-stretch");
+      await screenshot(page, "touch-strain");
       await page.keyboard.press("c");
       await page.waitForTimeout(400);
-      await shot(page, "poke-plain");
-      await page.click('[title="Measured"]').catch(() => undefined);
+      await screenshot(page, "touch-plain");
+      await page.click('[title="Measurements"]').catch(() => undefined);
       await page.mouse.up();
-      await away(page);
-      assert(!(await page.isVisible(".reading")), "the number stays");
-      quiet(page);
+      await released(page);
+      assert(!(await page.isVisible(".force-readout")), "the force readout stays");
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "a grab pulls the object along and throws it; a drag elsewhere turns the view",
+    name: "holding pulls the object along; a drag beside it rotates the view",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { dark: true });
-      await loaded(page);
-      await atRest(page);
+      await waitForScene(page);
+      await waitForRest(page);
       await page.keyboard.press("g");
-      await page.click('[title="Measured"]');
-      const { x, y } = await whereIs(page, 0, 0.2);
-      const { pose } = await newest(page);
+      await page.click('[title="Measurements"]');
+      const { x, y } = await pixelOf(page, 0, 0.2);
+      const { pose } = await latestFrame(page);
       await page.mouse.move(x, y);
       await page.mouse.down();
       await touching(page);
       await page.mouse.move(x + 40, y - 260, { steps: 12 });
-      await page.waitForFunction((height) => window.palpate.stage.worlds[0].picture.objects[0].pose[1] > height + 0.008, pose[1]);
-      const held = await newest(page);
-      assert(held.devices.some((d) => d.doing === "holds" && d.force > 0.05), `nothing is held: ${JSON.stringify(held.devices)}`);
+      await page.waitForFunction((height) => window.palpate.sceneView.graphs[0].frame.objects[0].pose[1] > height + 0.008, pose[1]);
+      const held = await latestFrame(page);
+      assert(held.devices.some((d) => d.mode === "held" && d.force > 0.05), `nothing is held: ${JSON.stringify(held.devices)}`);
       await page.waitForTimeout(500);
-      await shot(page, "grab");
+      await screenshot(page, "hold");
       await page.mouse.up();
-      await away(page);
+      await released(page);
 
-      const camera = () => page.evaluate(() => window.palpate.stage.orbit.camera.position.toArray());
+      const camera = () => page.evaluate(() => window.palpate.sceneView.orbit.camera.position.toArray());
       const from = await camera();
       await page.mouse.move(60, 130);
       await page.mouse.down();
       await page.mouse.move(160, 150, { steps: 4 });
       await page.mouse.up();
       const to = await camera();
-      assert(Math.hypot(...from.map((v, k) => v - to[k])) > 0.02, "the view does not turn");
-      assert((await newest(page)).devices.every((d) => d.doing === "away"), "turning the view touched something");
-      quiet(page);
+      assert(Math.hypot(...from.map((v, k) => v - to[k])) > 0.02, "the view does not rotate");
+      assert((await latestFrame(page)).devices.every((d) => d.mode === "inactive"), "rotating the view touched something");
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "what the mouse does is logged, and comes out again bit for bit",
+    name: "mouse input is logged and replays bit for bit",
     realOnly: true,
     async run(browser) {
       const folder = mkdtempSync(join(tmpdir(), "palpate-"));
@@ -105,17 +105,17 @@ export const touchCases = [
       let done = server.close;
       try {
         const page = await browser.page(server.url);
-        await loaded(page);
-        await atRest(page);
-        const { x, y } = await whereIs(page, 0, 0.2);
+        await waitForScene(page);
+        await waitForRest(page);
+        const { x, y } = await pixelOf(page, 0, 0.2);
         await page.mouse.move(x, y);
         await page.mouse.down();
         await pressed(page);
         await page.mouse.move(x + 60, y, { steps: 8 });
         await page.waitForTimeout(500);
         await page.mouse.up();
-        await away(page);
-        quiet(page);
+        await released(page);
+        assertNoConsoleErrors(page);
         done = async () => undefined;
         await server.close();
         const summary = JSON.parse(execFileSync(process.env.PALPATE, ["replay", log, "--csv", csv, "--json"]).toString());
@@ -125,8 +125,8 @@ export const touchCases = [
         const presses = rows.filter((row) => Math.hypot(...at(row, "f")) > 0.02);
         assert(presses.length > 100, `${presses.length} steps with force`);
         const [first, last] = [at(presses[0], ""), at(presses[presses.length - 1], "")];
-        const way = Math.hypot(...first.map((x, k) => x - last[k]));
-        assert(way > 0.005, `the finger goes ${way} m`);
+        const travel = Math.hypot(...first.map((x, k) => x - last[k]));
+        assert(travel > 0.005, `the pointer moves ${travel} m`);
       } finally {
         await done();
         rmSync(folder, { recursive: true });
@@ -138,14 +138,14 @@ export const touchCases = [
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { width: 390, height: 844, touch: true, scale: 2 });
-      await loaded(page);
-      await atRest(page);
+      await waitForScene(page);
+      await waitForRest(page);
       const screen = await page.context().newCDPSession(page);
       const touch = (type, points) => screen.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(({ x, y }, id) => ({ x, y, id })) });
-      const [a, b] = [await whereIs(page, -0.35, 0), await whereIs(page, 0.35, 0)];
+      const [a, b] = [await pixelOf(page, -0.35, 0), await pixelOf(page, 0.35, 0)];
       await touch("touchStart", [a]);
       await touch("touchStart", [a, b]);
-      await page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.filter((d) => d.doing !== "away").length === 2);
+      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.filter((d) => d.mode !== "inactive").length === 2);
       for (let i = 1; i <= 8; i++) {
         await touch("touchMove", [
           { x: a.x + 3 * i, y: a.y },
@@ -153,21 +153,21 @@ export const touchCases = [
         ]);
         await page.waitForTimeout(60);
       }
-      await page.waitForFunction(() => window.palpate.stage.worlds[0].picture.devices.filter((d) => Math.hypot(...d.force) > 0.02).length === 2);
-      assert((await page.locator(".reading .number").count()) === 2, "not two numbers");
-      await shot(page, "pinch");
+      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.filter((d) => Math.hypot(...d.force) > 0.02).length === 2);
+      assert((await page.locator(".force-readout .number").count()) === 2, "not two force readouts");
+      await screenshot(page, "pinch");
       await touch("touchEnd", []);
-      await away(page);
-      quiet(page);
+      await released(page);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "a keyboard's finger moves, presses and lets go",
+    name: "a keyboard pointer moves, presses and releases",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
-      await atRest(page);
+      await waitForScene(page);
+      await waitForRest(page);
       await page.keyboard.press("Tab");
       await page.focus("canvas[tabindex]");
       await page.keyboard.down("ArrowDown");
@@ -175,18 +175,18 @@ export const touchCases = [
       await page.keyboard.up("ArrowDown");
       await page.keyboard.press("Enter");
       await touching(page);
-      await shot(page, "keyboard");
+      await screenshot(page, "keyboard");
       await page.keyboard.press("Enter");
-      await away(page);
-      quiet(page);
+      await released(page);
+      assertNoConsoleErrors(page);
     },
   },
   {
-    name: "everything can be reached by Tab, and has a name",
+    name: "every control is reachable by Tab and has an accessible name",
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
-      await loaded(page);
+      await waitForScene(page);
       const nameless = await page.evaluate(() =>
         [...document.querySelectorAll("button, input, select, summary, canvas[tabindex]")]
           .filter((e) => e.getClientRects().length > 0)
@@ -199,8 +199,8 @@ export const touchCases = [
         await page.keyboard.press("Tab");
         seen.add(await page.evaluate(() => document.activeElement.getAttribute("aria-label") ?? document.activeElement.textContent.trim().slice(0, 30)));
       }
-      for (const name of ["Help and keys (?)", "Pause (Space)", "Begin anew (R)"]) assert(seen.has(name), `Tab does not reach ${name}: ${[...seen].join(" | ")}`);
-      quiet(page);
+      for (const name of ["Help and shortcuts (?)", "Pause (Space)", "Reset (R)"]) assert(seen.has(name), `Tab does not reach ${name}: ${[...seen].join(" | ")}`);
+      assertNoConsoleErrors(page);
     },
   },
 ];

@@ -1,5 +1,5 @@
-// A made-up elastic box: its surface, and smooth mode shapes from products of cosines. Not finite elements: it is there
-// so that the page can be worked on and tested without the engine.
+// Box of the stand-in: surface, and mode shapes from products of cosines. Not a finite element model: it serves to
+// develop and test the page without the engine.
 
 /** Surface of a box of `cells` cells per edge, counterclockwise seen from outside. */
 export function boxSurface(size, cells) {
@@ -15,7 +15,7 @@ export function boxSurface(size, cells) {
     }
     return number;
   };
-  const corners = [];
+  const indices = [];
   const n = cells;
   for (let a = 0; a < n; a++) {
     for (let b = 0; b < n; b++) {
@@ -27,13 +27,13 @@ export function boxSurface(size, cells) {
         [node(a, b, n), node(a + 1, b, n), node(a + 1, b + 1, n), node(a, b + 1, n)],
         [node(a, b, 0), node(a, b + 1, 0), node(a + 1, b + 1, 0), node(a + 1, b, 0)],
       ];
-      for (const [p, q, r, s] of quads) corners.push(...((a + b) % 2 === 0 ? [p, q, r, p, r, s] : [p, q, s, q, r, s]));
+      for (const [p, q, r, s] of quads) indices.push(...((a + b) % 2 === 0 ? [p, q, r, p, r, s] : [p, q, s, q, r, s]));
     }
   }
-  return { positions: Float32Array.from(positions), corners: Uint32Array.from(corners) };
+  return { positions: Float32Array.from(positions), indices: Uint32Array.from(indices) };
 }
 
-/** The first `count` waves: how often they go up and down along each axis, and which way they move. */
+/** First `count` cosine modes: wave numbers per axis and direction of displacement. */
 export function waves(count) {
   const all = [];
   for (let i = 0; i < 9; i++)
@@ -52,7 +52,7 @@ export function shapeAt(wave, x, y, z, size) {
 const scratch = new Float32Array(1);
 const scratchBits = new Uint32Array(scratch.buffer);
 
-/** Rounded to the nearest half float. */
+/** Nearest half float (binary16 bits). */
 export function toHalf(value) {
   scratch[0] = value;
   const bits = scratchBits[0];
@@ -67,9 +67,9 @@ export function toHalf(value) {
   return sign | Math.min(0x7c00, ((exponent << 10) | ((bits & 0x7fffff) >>> 13)) + ((bits >>> 12) & 1));
 }
 
-export function surfaceBytes({ positions, corners }) {
-  const head = Uint32Array.of(positions.length / 3, corners.length / 3);
-  return Buffer.concat([head, positions, corners].map((part) => Buffer.from(part.buffer, part.byteOffset, part.byteLength)));
+export function surfaceBytes({ positions, indices }) {
+  const head = Uint32Array.of(positions.length / 3, indices.length / 3);
+  return Buffer.concat([head, positions, indices].map((part) => Buffer.from(part.buffer, part.byteOffset, part.byteLength)));
 }
 
 export function shapesBytes({ positions }, list, size) {

@@ -1,5 +1,5 @@
-// Made-up motion of the box: a free body with damped waves, springs to fingers, a springy floor. Smooth and plausible,
-// and no more.
+// Simplified dynamics of the box: rigid motion with damped modes, springs to the devices, a penalty floor. Plausible,
+// not validated.
 
 import { boxSurface, shapeAt, waves } from "./box.mjs";
 
@@ -7,8 +7,8 @@ const SIZE = 0.1;
 const MASS = 0.11;
 const INERTIA = (MASS * SIZE * SIZE) / 6;
 const FIRST_HZ = 17;
-const DENT_STIFFNESS = 900;
-const DENT_RADIUS = 0.014;
+const RESIDUAL_STIFFNESS = 900;
+const RESIDUAL_RADIUS = 0.014;
 export const TIP = 0.006;
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
@@ -18,11 +18,11 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const length = (a) => Math.hypot(...a);
 
-function turn([x, y, z, w], v) {
+function rotate([x, y, z, w], v) {
   const t = scale(cross([x, y, z], v), 2);
   return add(add(v, scale(t, w)), cross([x, y, z], t));
 }
-const unturn = ([x, y, z, w], v) => turn([-x, -y, -z, w], v);
+const inverseRotate = ([x, y, z, w], v) => rotate([-x, -y, -z, w], v);
 
 export class Box {
   constructor({ cells = 12, modes = 60, height = 0.05, floor = true, devices = 2 } = {}) {
@@ -37,12 +37,12 @@ export class Box {
     this.height = height;
     this.deviceCount = devices;
     const grid = [-0.5, -0.25, 0, 0.25, 0.5];
-    this.feet = grid.flatMap((x) => grid.flatMap((y) => grid.map((z) => [x * SIZE, y * SIZE, z * SIZE]))).filter((p) => p.some((x) => Math.abs(x) > 0.49 * SIZE));
-    this.feet = this.feet.map((rest) => ({ rest, shape: this.shapesAt(rest) }));
-    this.begin();
+    this.floorPoints = grid.flatMap((x) => grid.flatMap((y) => grid.map((z) => [x * SIZE, y * SIZE, z * SIZE]))).filter((p) => p.some((x) => Math.abs(x) > 0.49 * SIZE));
+    this.floorPoints = this.floorPoints.map((rest) => ({ rest, shape: this.shapesAt(rest) }));
+    this.reset();
   }
 
-  begin() {
+  reset() {
     this.step = 0;
     this.time = 0;
     this.position = [0, SIZE / 2 + this.height, 0];
@@ -51,9 +51,9 @@ export class Box {
     this.spin = [0, 0, 0];
     this.q = new Float64Array(this.waves.length);
     this.speed = new Float64Array(this.waves.length);
-    this.devices = Array.from({ length: this.deviceCount }, () => ({ doing: 0, position: [0, 0, 0], target: [0, 0, 0], proxy: [0, 0, 0], force: [0, 0, 0], dent: 0 }));
+    this.devices = Array.from({ length: this.deviceCount }, () => ({ mode: 0, position: [0, 0, 0], target: [0, 0, 0], proxy: [0, 0, 0], force: [0, 0, 0], residual: 0 }));
     this.contacts = [];
-    this.lost = 0;
+    this.dissipated = 0;
     this.input = 0;
   }
 
@@ -61,28 +61,28 @@ export class Box {
     return Float64Array.from(this.waves, (wave) => shapeAt(wave, ...p, SIZE));
   }
 
-  moved(shape) {
+  modalDisplacement(shape) {
     const u = [0, 0, 0];
     for (let k = 0; k < this.waves.length; k++) u[this.waves[k].axis] += this.q[k] * shape[k];
     return u;
   }
 
-  drag(shape) {
+  modalVelocity(shape) {
     const u = [0, 0, 0];
     for (let k = 0; k < this.waves.length; k++) u[this.waves[k].axis] += this.speed[k] * shape[k];
     return u;
   }
 
-  /** Presses with a force in the world at a place in the body frame. */
-  press(force, arm, shape, h) {
+  /** Applies a force [N, world] at a point [m, body]. */
+  applyForce(force, arm, shape, h) {
     this.velocity = add(this.velocity, scale(force, h / MASS));
-    this.spin = add(this.spin, scale(cross(turn(this.orientation, arm), force), h / INERTIA));
-    const own = unturn(this.orientation, force);
+    this.spin = add(this.spin, scale(cross(rotate(this.orientation, arm), force), h / INERTIA));
+    const own = inverseRotate(this.orientation, force);
     for (let k = 0; k < this.waves.length; k++) this.speed[k] += (h * own[this.waves[k].axis] * shape[k]) / (0.25 * MASS);
   }
 
   velocityAt(arm, shape) {
-    return add(add(this.velocity, cross(this.spin, turn(this.orientation, arm))), turn(this.orientation, this.drag(shape)));
+    return add(add(this.velocity, cross(this.spin, rotate(this.orientation, arm))), rotate(this.orientation, this.modalVelocity(shape)));
   }
 
   advance(h = 0.001) {
@@ -90,8 +90,8 @@ export class Box {
     this.time += h;
     this.velocity = add(this.velocity, scale(this.gravity, h));
     this.contacts = [];
-    this.devices.forEach((device, i) => this.touch(device, i, h));
-    if (this.floor) for (const foot of this.feet) this.stand(foot, h);
+    this.devices.forEach((device, i) => this.deviceContact(device, i, h));
+    if (this.floor) for (const point of this.floorPoints) this.floorContact(point, h);
     for (let k = 0; k < this.waves.length; k++) {
       const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
       this.speed[k] = (this.speed[k] - h * omega * omega * this.q[k]) / (1 + h * (6 + 0.12 * omega));
@@ -106,37 +106,37 @@ export class Box {
     this.orientation = next.map((value) => value / norm);
   }
 
-  stand(foot, h) {
-    const arm = add(foot.rest, this.moved(foot.shape));
-    const at = add(this.position, turn(this.orientation, arm));
+  floorContact(point, h) {
+    const arm = add(point.rest, this.modalDisplacement(point.shape));
+    const at = add(this.position, rotate(this.orientation, arm));
     if (at[1] >= 0) return;
-    const v = this.velocityAt(arm, foot.shape);
+    const v = this.velocityAt(arm, point.shape);
     const up = Math.max(0, -60 * at[1] - 0.25 * v[1]);
     const side = Math.hypot(v[0], v[2]);
     const grip = side > 0 ? Math.min(this.friction * up, 3 * side) / side : 0;
     const force = [-grip * v[0], up, -grip * v[2]];
-    this.lost += Math.max(0, -dot(force, v)) * h * 0.5;
-    this.press(force, arm, foot.shape, h);
+    this.dissipated += Math.max(0, -dot(force, v)) * h * 0.5;
+    this.applyForce(force, arm, point.shape, h);
     this.contacts.push({ object: 0, kind: 1, number: 0, point: at, force, slip: side });
   }
 
-  touch(device, number, h) {
+  deviceContact(device, number, h) {
     device.force = [0, 0, 0];
-    if (device.doing === 0) {
-      device.dent = 0;
+    if (device.mode === 0) {
+      device.residual = 0;
       return;
     }
     device.position = add(device.position, scale(sub(device.target, device.position), Math.min(1, 30 * h)));
-    const local = unturn(this.orientation, sub(device.position, this.position));
+    const local = inverseRotate(this.orientation, sub(device.position, this.position));
     let rest = device.held;
     let normal = null;
-    if (device.doing === 1) {
-      // The nearest place of the box, as it is at rest.
+    if (device.mode === 1) {
+      // Nearest point of the box at rest.
       const half = SIZE / 2;
       const inside = local.every((x) => Math.abs(x) < half + TIP);
       if (!inside) {
         device.proxy = device.position;
-        device.dent *= 0.9;
+        device.residual *= 0.9;
         device.anchor = null;
         return;
       }
@@ -149,52 +149,52 @@ export class Box {
       normal = [0, 0, 0].map((_, k) => (k === axis ? side : 0));
     }
     const shape = this.shapesAt(rest);
-    const arm = add(rest, this.moved(shape));
+    const arm = add(rest, this.modalDisplacement(shape));
     if (normal === null) {
-      device.proxy = add(this.position, turn(this.orientation, arm));
+      device.proxy = add(this.position, rotate(this.orientation, arm));
       const pull = add(scale(sub(device.position, device.proxy), this.coupling.stiffness), scale(this.velocityAt(arm, shape), -this.coupling.damping));
-      this.apply(device, number, pull, arm, rest, shape, h, 0);
+      this.applyContact(device, number, pull, arm, rest, shape, h, 0);
       return;
     }
     const depth = TIP - dot(sub(local, arm), normal);
     if (depth <= 0) {
       device.proxy = device.position;
-      device.dent *= 0.9;
+      device.residual *= 0.9;
       return;
     }
-    const stiffness = 1 / (1 / this.coupling.stiffness + 1 / DENT_STIFFNESS);
+    const stiffness = 1 / (1 / this.coupling.stiffness + 1 / RESIDUAL_STIFFNESS);
     const v = this.velocityAt(arm, shape);
-    const out = turn(this.orientation, normal);
+    const out = rotate(this.orientation, normal);
     const push = Math.max(0, stiffness * depth + this.coupling.damping * dot(v, out));
     const side = sub(v, scale(out, dot(v, out)));
     const slip = length(side);
     const grip = slip > 0 ? Math.min(this.friction * push, 2 * slip) / slip : 0;
-    device.dent = push / DENT_STIFFNESS;
-    device.proxy = add(device.position, scale(out, depth - device.dent));
-    this.apply(device, number, add(scale(out, -push), scale(side, -grip)), arm, rest, shape, h, slip);
+    device.residual = push / RESIDUAL_STIFFNESS;
+    device.proxy = add(device.position, scale(out, depth - device.residual));
+    this.applyContact(device, number, add(scale(out, -push), scale(side, -grip)), arm, rest, shape, h, slip);
   }
 
-  apply(device, number, force, arm, rest, shape, h, slip) {
+  applyContact(device, number, force, arm, rest, shape, h, slip) {
     device.force = scale(force, -1);
     device.rest = rest;
     this.input += dot(force, this.velocityAt(arm, shape)) * h;
-    this.press(force, arm, shape, h);
-    const point = add(this.position, turn(this.orientation, arm));
+    this.applyForce(force, arm, shape, h);
+    const point = add(this.position, rotate(this.orientation, arm));
     this.contacts.push({ object: 0, kind: 0, number, point, force, slip });
   }
 
-  /** What fingers dent beyond the waves: body frame, per node. */
-  dents() {
+  /** Residual displacement of the nodes near devices [m, body]. */
+  residuals() {
     const found = [];
     const { positions } = this.surface;
     for (let n = 0; n < this.nodes; n++) {
       const u = [0, 0, 0];
       for (const device of this.devices) {
-        if (device.doing === 0 || device.rest === undefined) continue;
+        if (device.mode === 0 || device.rest === undefined) continue;
         const away = sub([positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]], device.rest);
-        const share = Math.exp(-dot(away, away) / (DENT_RADIUS * DENT_RADIUS));
+        const share = Math.exp(-dot(away, away) / (RESIDUAL_RADIUS * RESIDUAL_RADIUS));
         if (share < 0.01) continue;
-        const own = scale(unturn(this.orientation, device.force), -share / DENT_STIFFNESS);
+        const own = scale(inverseRotate(this.orientation, device.force), -share / RESIDUAL_STIFFNESS);
         for (let k = 0; k < 3; k++) u[k] += own[k];
       }
       if (length(u) > 1e-6) found.push({ node: n, u });
@@ -202,15 +202,15 @@ export class Box {
     return found;
   }
 
-  places() {
-    const { positions } = this.surface;
-    const places = positions.slice();
+  positions() {
+    const rest = this.surface.positions;
+    const positions = rest.slice();
     for (let n = 0; n < this.nodes; n++) {
-      const u = this.moved(this.shapesAt([positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]]));
-      for (let k = 0; k < 3; k++) places[3 * n + k] += u[k];
+      const u = this.modalDisplacement(this.shapesAt([rest[3 * n], rest[3 * n + 1], rest[3 * n + 2]]));
+      for (let k = 0; k < 3; k++) positions[3 * n + k] += u[k];
     }
-    for (const { node, u } of this.dents()) for (let k = 0; k < 3; k++) places[3 * node + k] += u[k];
-    return places;
+    for (const { node, u } of this.residuals()) for (let k = 0; k < 3; k++) positions[3 * node + k] += u[k];
+    return positions;
   }
 
   energies() {
@@ -221,8 +221,8 @@ export class Box {
       kinetic += 0.125 * MASS * this.speed[k] ** 2;
     }
     const potential = -MASS * dot(this.gravity, this.position);
-    const residual = this.devices.reduce((sum, d) => sum + (0.5 * dot(d.force, d.force)) / DENT_STIFFNESS, 0);
+    const residual = this.devices.reduce((sum, d) => sum + (0.5 * dot(d.force, d.force)) / RESIDUAL_STIFFNESS, 0);
     const coupling = this.devices.reduce((sum, d) => sum + (0.5 * dot(d.force, d.force)) / this.coupling.stiffness, 0);
-    return [kinetic, elastic, residual, potential, coupling, this.input, this.lost, 0.1 * this.lost, 0, 1e-9 * Math.sin(this.time)];
+    return [kinetic, elastic, residual, potential, coupling, this.input, this.dissipated, 0.1 * this.dissipated, 0, 1e-9 * Math.sin(this.time)];
   }
 }

@@ -1,4 +1,4 @@
-// The stand-in's scenes.
+// Scenes of the stand-in.
 
 import { Box, TIP } from "./physics.mjs";
 
@@ -45,7 +45,7 @@ export function makeScene(id, generation, options) {
       {
         name: "cube",
         nodes: box.nodes,
-        triangles: box.surface.corners.length / 3,
+        triangles: box.surface.indices.length / 3,
         modes: box.waves.length,
         radius: 0.087,
         mass: 0.11,

@@ -1,4 +1,4 @@
-// Speaks docs/viewer-protocol.md with a made-up box.
+// Stand-in server: speaks docs/viewer-protocol.md with a simplified model of a box.
 //   node tests/standin/server.mjs [--port 8123] [--kind live|logs|render] [--logs 2] [--cells 12] [--modes 60] [--garbage]
 
 import { createReadStream, existsSync, statSync } from "node:fs";
@@ -7,7 +7,7 @@ import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { WebSocketServer } from "ws";
 import { shapesBytes, surfaceBytes } from "./box.mjs";
-import { picture } from "./encode.mjs";
+import { encodeFrame } from "./frames.mjs";
 import { recordLog } from "./logs.mjs";
 import { makeScene, SCENES } from "./scenes.mjs";
 
@@ -23,13 +23,13 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   const options = { cells, modes };
   let generation = 1;
   let scene = makeScene("bounce", generation, options);
-  let [paused, slowness, owed, boxBytes] = [false, 1, 0, null];
+  let [paused, slowdown, pendingTime, boxBytes] = [false, 1, 0, null];
   const viewers = new Set();
-  const pictures = [];
+  const images = [];
   const recorded = kind === "live" ? [] : Array.from({ length: logs }, (_, i) => recordLog(i, options));
 
-  const say = (viewer, message) => viewer.socket.send(JSON.stringify(message));
-  const sayAll = (message) => viewers.forEach((viewer) => say(viewer, message));
+  const send = (viewer, message) => viewer.socket.send(JSON.stringify(message));
+  const broadcast = (message) => viewers.forEach((viewer) => send(viewer, message));
   const surfaces = () => {
     const { box } = recorded[0] ?? scene;
     boxBytes ??= { surface: surfaceBytes(box.surface), shapes: shapesBytes(box.surface, box.waves, box.size) };
@@ -43,14 +43,14 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     scene = makeScene(id, generation, options);
     if (same) scene.box.gravity = gravity;
     for (const viewer of viewers) viewer.pointers.clear();
-    sayAll(scene.message);
+    broadcast(scene.message);
   }
 
   const http = createServer((request, response) => {
     const url = new URL(request.url, "http://localhost");
     const answer = (body, type = "application/octet-stream") => response.writeHead(200, { "content-type": type }).end(body);
     if (/^\/scene\/\d+\/object\/0\/surface$/.test(url.pathname)) return answer(surfaces().surface);
-    if (/^\/scene\/\d+\/object\/0\/shapes$/.test(url.pathname)) return answer(surfaces().shapes);
+    if (/^\/scene\/\d+\/object\/0\/mode_shapes$/.test(url.pathname)) return answer(surfaces().shapes);
     const log = url.pathname.match(/^\/log\/(\d+)\/(frames|series)$/);
     if (log !== null && recorded[log[1]] !== undefined) {
       const { frames, series } = recorded[log[1]];
@@ -63,8 +63,8 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       const parts = [];
       request.on("data", (part) => parts.push(part));
       request.on("end", () => {
-        const drawn = url.pathname.match(/^\/picture\/(\d+)$/);
-        if (drawn !== null) pictures[drawn[1]] = Buffer.concat(parts);
+        const drawn = url.pathname.match(/^\/image\/(\d+)$/);
+        if (drawn !== null) images[drawn[1]] = Buffer.concat(parts);
         else record(url.searchParams.get("name") ?? "mesh");
         response.writeHead(drawn !== null ? 204 : 202).end();
       });
@@ -80,34 +80,34 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     let share = 0;
     const timer = setInterval(() => {
       share += 0.1;
-      const what = share < 0.3 ? "elements" : share < 0.8 ? "modes" : "residual";
-      if (share < 1) return sayAll({ type: "progress", job, what, share });
+      const phase = share < 0.3 ? "elements" : share < 0.8 ? "modes" : "residual";
+      if (share < 1) return broadcast({ type: "progress", job, phase, fraction: share });
       clearInterval(timer);
-      sayAll({ type: "progress", job, what: "certificate", share: 1, done: true });
+      broadcast({ type: "progress", job, phase: "certificate", fraction: 1, done: true });
       return open(scene.message.id);
     }, 300);
     timer.unref();
   }
 
   function press(viewer, message) {
-    const device = scene.box.devices.findIndex((d) => d.doing === 0);
-    say(viewer, { type: "granted", pointer: message.pointer, device: device < 0 ? null : device });
+    const device = scene.box.devices.findIndex((d) => d.mode === 0);
+    send(viewer, { type: "assigned", pointer: message.pointer, device: device < 0 ? null : device });
     if (device < 0) return;
     viewer.pointers.set(message.pointer, device);
     const d = scene.box.devices[device];
-    Object.assign(d, { doing: message.mode === "hold" ? 2 : 1, position: message.position, target: message.position, proxy: message.position, anchor: null });
+    Object.assign(d, { mode: message.mode === "hold" ? 2 : 1, position: message.position, target: message.position, proxy: message.position, anchor: null });
     if (message.mode !== "hold") return;
-    const { positions, corners } = scene.box.surface;
-    d.held = [0, 1, 2].map((k) => message.weights.reduce((sum, w, c) => sum + w * positions[3 * corners[3 * message.triangle + c] + k], 0));
+    const { positions, indices } = scene.box.surface;
+    d.held = [0, 1, 2].map((k) => message.weights.reduce((sum, w, c) => sum + w * positions[3 * indices[3 * message.triangle + c] + k], 0));
   }
 
-  function letGo(viewer, pointer) {
+  function release(viewer, pointer) {
     const device = viewer.pointers.get(pointer);
     viewer.pointers.delete(pointer);
-    if (device !== undefined) scene.box.devices[device].doing = 0;
+    if (device !== undefined) scene.box.devices[device].mode = 0;
   }
 
-  const acts = {
+  const handlers = {
     press,
     move: (viewer, { pointers }) => {
       for (const { pointer, position } of pointers) {
@@ -115,51 +115,51 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
         if (device !== undefined) scene.box.devices[device].target = position;
       }
     },
-    release: (viewer, { pointer }) => letGo(viewer, pointer),
+    release: (viewer, { pointer }) => release(viewer, pointer),
     pause: (_, message) => {
       paused = message.paused;
       status();
     },
-    step: () => {
-      if (paused) owed += 0.001;
+    single_step: () => {
+      if (paused) pendingTime += 0.001;
     },
-    slow: (_, message) => {
-      slowness = message.slowness;
+    slow_motion: (_, message) => {
+      slowdown = message.slowdown;
       status();
     },
     reset: () => open(scene.message.id),
-    open: (_, message) => open(message.scene),
-    set: (_, { gravity, friction, coupling }) => {
+    open_scene: (_, message) => open(message.scene),
+    set_physics: (_, { gravity, friction, coupling }) => {
       if (gravity !== undefined) scene.box.gravity = gravity;
       if (friction !== undefined) scene.box.friction = friction;
       if (coupling !== undefined) scene.box.coupling = coupling;
     },
-    material: () => record("cube"),
-    stream: (viewer, { form, every }) => Object.assign(viewer, { form, every }),
+    set_material: () => record("cube"),
+    stream: (viewer, { format, stride }) => Object.assign(viewer, { format, stride }),
   };
 
   const sockets = new WebSocketServer({ server: http, path: "/session" });
   sockets.on("connection", (socket) => {
-    const viewer = { socket, form: "modal", every: 1, count: 0, pointers: new Map(), heard: [] };
+    const viewer = { socket, format: "modal", stride: 1, count: 0, pointers: new Map(), received: [] };
     viewers.add(viewer);
-    say(viewer, {
+    send(viewer, {
       type: "hello",
-      protocol: 1,
+      protocol: 2,
       version: "stand-in",
       kind,
       scenes: kind === "live" ? SCENES.map(({ id, title, about }) => ({ id, title, about })) : [],
       logs: recorded.map(({ name }) => ({ name })),
       ...(kind === "render" ? { render } : {}),
     });
-    if (kind === "live") say(viewer, scene.message);
-    else recorded.forEach(({ message }, log) => say(viewer, { ...message, log }));
+    if (kind === "live") send(viewer, scene.message);
+    else recorded.forEach(({ message }, log) => send(viewer, { ...message, log }));
     socket.on("message", (data) => {
       const message = JSON.parse(data.toString());
-      viewer.heard.push(message);
-      acts[message.type]?.(viewer, message);
+      viewer.received.push(message);
+      handlers[message.type]?.(viewer, message);
     });
     socket.on("close", () => {
-      for (const pointer of [...viewer.pointers.keys()]) letGo(viewer, pointer);
+      for (const pointer of [...viewer.pointers.keys()]) release(viewer, pointer);
       viewers.delete(viewer);
     });
   });
@@ -167,28 +167,28 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   let last = performance.now();
   const timers = [];
   function status() {
-    const spread = { p50: 21, p99: 44, p999: 90, max: 310 };
-    sayAll({
+    const percentiles = { p50: 21, p99: 44, p999: 90, max: 310 };
+    broadcast({
       type: "status",
       generation,
       paused,
-      slowness,
+      slowdown,
       steps: scene.box.step,
       viewers: viewers.size,
-      force_process: { compute_us: spread, late_us: { p50: 8, p99: 60, p999: 140, max: 900 }, overruns: 3, own_overruns: 0, priority: false },
+      force_process: { compute_us: percentiles, lateness_us: { p50: 8, p99: 60, p999: 140, max: 900 }, overruns: 3, compute_overruns: 0, realtime_priority: false },
     });
   }
   function live() {
     const now = performance.now();
-    if (!paused) owed += Math.min(0.1, (now - last) / 1000) / slowness;
+    if (!paused) pendingTime += Math.min(0.1, (now - last) / 1000) / slowdown;
     last = now;
-    for (; owed >= 0.001; owed -= 0.001) scene.box.advance();
+    for (; pendingTime >= 0.001; pendingTime -= 0.001) scene.box.advance();
     for (const viewer of viewers) {
-      if (viewer.every === 0 || viewer.count++ % viewer.every !== 0 || viewer.socket.bufferedAmount > 1e6) continue;
-      viewer.socket.send(picture(scene.box, viewer.form, generation, scene.message));
+      if (viewer.stride === 0 || viewer.count++ % viewer.stride !== 0 || viewer.socket.bufferedAmount > 1e6) continue;
+      viewer.socket.send(encodeFrame(scene.box, viewer.format, generation, scene.message));
       viewer.sent = (viewer.sent ?? 0) + 1;
       if (garbage && viewer.sent % 30 === 0) {
-        viewer.socket.send(Buffer.from("this is no picture at all, and it is binary, and it is longer than a header has to be at the very least"));
+        viewer.socket.send(Buffer.from("binary data that is not a frame, and longer than the header of a frame, so that the magic number is read and refused"));
         viewer.socket.send('{"type":"what"');
         viewer.socket.send('{"type":"constructor"}');
       }
@@ -199,7 +199,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   const standin = {
     http,
     viewers,
-    pictures,
+    images,
     get scene() {
       return scene;
     },

@@ -1,4 +1,4 @@
-// Bytes of pictures, written by hand from docs/viewer-protocol.md.
+// Frame bytes written by hand from docs/viewer-protocol.md.
 
 export class Bytes {
   private readonly parts: Uint8Array[] = [];
@@ -31,9 +31,9 @@ export class Bytes {
   }
 }
 
-export function head(form: 1 | 2, counts: readonly [number, number, number, number], status = 0): Bytes {
+export function head(format: 1 | 2, counts: readonly [number, number, number, number], status = 0): Bytes {
   return new Bytes()
-    .u32(0x46504c50, form, 3, 77)
+    .u32(0x46504c50, format, 3, 77)
     .f64(1.25)
     .f32(1, 2, 3, 4, 5, 6, 7, 8, 9, 10)
     .u32(...counts, status, 0);

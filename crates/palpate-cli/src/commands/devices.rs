@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::terminal::{print, print_json};
 use clap::Args;
 use palpate_haptics::Error;
-use palpate_haptics::device::{Driver, Found, Traits, discover};
+use palpate_haptics::device::{DeviceSpec, DiscoveredDevice, Driver, discover};
 use serde_json::json;
 
 /// List haptic devices, with the reason where one is not available
@@ -22,7 +22,7 @@ pub struct Arguments {
     pub json: bool,
 }
 
-type Discovered = Vec<(Driver, Result<Vec<Found>, Error>)>;
+type Discovered = Vec<(Driver, Result<Vec<DiscoveredDevice>, Error>)>;
 
 /// Runs the command.
 pub fn devices(arguments: &Arguments) -> Result<(), Failure> {
@@ -31,13 +31,13 @@ pub fn devices(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn json(discovered: &Discovered) -> serde_json::Value {
-    let device = |one: &Found| {
+    let device = |one: &DiscoveredDevice| {
         json!({
             "index": one.index,
             "name": one.name,
             "serial": one.serial,
             "force_n": one.force_n,
-            "why_not": one.why_not,
+            "why_not": one.unavailable,
         })
     };
     let drivers = discovered.iter().map(|(driver, found)| {
@@ -48,7 +48,7 @@ fn json(discovered: &Discovered) -> serde_json::Value {
             "why_not": found.as_ref().err().map(ToString::to_string),
         })
     });
-    let simulated = Traits::KNOWN.map(|traits| json!({ "name": traits.kind, "force_n": traits.force_n }));
+    let simulated = DeviceSpec::KNOWN.map(|traits| json!({ "name": traits.kind, "force_n": traits.force_n }));
     json!({ "drivers": drivers.collect::<Vec<_>>(), "simulated": simulated })
 }
 
@@ -66,14 +66,14 @@ fn text(discovered: &Discovered) -> String {
             out += &format!("{:<12} {line}\n", driver.name());
         }
     }
-    for traits in Traits::KNOWN {
+    for traits in DeviceSpec::KNOWN {
         out += &format!("{:<12} {}, {} N\n", "simulated", traits.kind, traits.force_n);
     }
     out
 }
 
-fn line(one: &Found) -> String {
+fn line(one: &DiscoveredDevice) -> String {
     let force = one.force_n.map_or(String::new(), |force| format!(", {force} N"));
-    let why_not = one.why_not.as_ref().map_or(String::new(), |why| format!(": can't be had: {why}"));
+    let why_not = one.unavailable.as_ref().map_or(String::new(), |why| format!(": can't be had: {why}"));
     format!("{one}{force}{why_not}")
 }

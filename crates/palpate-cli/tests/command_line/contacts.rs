@@ -221,7 +221,7 @@ fn a_cube_meets_obstacles_of_every_shape() {
     let workplace = workplace();
     // A box of 8 cm, its faces in every format, centred at the origin.
     let mesh = palpate_fem::mesh::box_mesh([0.08; 3], [1; 3]).expect("a good box");
-    let triangles = palpate_fem::mesh::boundary(&mesh.tets);
+    let triangles = mesh.boundary();
     let mut obj: String = mesh.nodes.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
     let mut stl = String::from("solid box\n");
     let mut millimetres = vec![0; 80];

@@ -10,7 +10,7 @@ use palpate::{
     Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Obstacle, Pose, Recording, Shape, State, Twist, step,
 };
-use palpate_haptics::log::{LogWriter, Names, Reader};
+use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
@@ -52,7 +52,7 @@ fn model(workplace: &Workplace) -> Model {
 /// Where the cube's surface nodes are at the end of each step [m, world], from 0; computed from the log's inputs.
 fn surfaces(workplace: &Workplace) -> Vec<Vec<DVec3>> {
     let model = model(workplace);
-    let names = Names {
+    let names = SceneNames {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
@@ -67,10 +67,10 @@ fn surfaces(workplace: &Workplace) -> Vec<Vec<DVec3>> {
         rest.iter().zip(&displacement).map(|(rest, u)| pose.world_from_body(*rest + *u)).collect()
     };
     let mut surfaces = vec![placed(&state)];
-    for logged in Reader::new(&bytes).expect("a log").each_step() {
+    for logged in LogReader::new(&bytes).expect("a log").logged_steps() {
         let logged = logged.expect("a step");
         step(&model, &mut state, &logged.input(&names, &[DeviceMode::Touch; 2]).expect("an input"));
-        assert_eq!(logged.difference(&names, state.output()), None, "the test has the same scene");
+        assert_eq!(logged.first_difference(&names, state.output()), None, "the test has the same scene");
         surfaces.push(placed(&state));
     }
     surfaces
@@ -343,7 +343,7 @@ fn a_log_that_comes_out_differently_is_told_of_and_leaves_nothing() {
     let mut state = State::new(&model);
     let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles: vec![Pose::IDENTITY] };
     input.devices[0].position = DVec3::new(-0.058, 0.0, 0.05);
-    let names = Names {
+    let names = SceneNames {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
@@ -359,9 +359,9 @@ fn a_log_that_comes_out_differently_is_told_of_and_leaves_nothing() {
         LogWriter::new(out, names, facts, &files, (&model, &state, &input)).expect("a log in memory");
     for number in 1..=5 {
         step(&model, &mut state, &input);
-        hand.take(|record| {
+        hand.record_step(|record| {
             record.step = number;
-            record.take(&input, &state);
+            record.capture(&input, &state);
         });
     }
     let (steps, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");

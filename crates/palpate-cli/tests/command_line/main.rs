@@ -7,6 +7,7 @@ mod couplings;
 mod devices;
 mod exports;
 mod glb;
+mod old_logs;
 mod realtime;
 mod reproduction;
 mod results;

@@ -191,7 +191,7 @@ pub fn gmsh_bar() -> String {
     let mesh = palpate_fem::mesh::box_mesh([0.2, 0.1, 0.1], [4, 2, 2]).expect("a good box");
     let x = |node: &u32| mesh.nodes[*node as usize].x;
     let mut elements = Vec::new();
-    for triangle in palpate_fem::mesh::boundary(&mesh.tets) {
+    for triangle in mesh.boundary() {
         if triangle.iter().all(|node| x(node) < -0.0999) {
             elements.push(format!("2 2 7 1 {}", triangle.map(|node| (node + 1).to_string()).join(" ")));
         }

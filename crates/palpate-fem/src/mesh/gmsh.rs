@@ -12,6 +12,7 @@ mod element_types;
 mod elements;
 mod labels;
 mod nodes;
+mod sections;
 #[cfg(test)]
 mod tests;
 
@@ -20,21 +21,25 @@ use std::path::Path;
 use self::elements::Elements;
 use self::labels::Labels;
 use self::nodes::Nodes;
-use super::scan::{CURVED_REMARK, Encoding, Scan, quoted, read_bytes, regions};
-use super::{Mesh, MeshError};
+use self::sections::{Version, read_format, start_of_section};
+use super::error::MeshError;
+use super::scan::{CURVED_WARNING, Scanner, read_bytes, regions};
+use super::volume_mesh::Mesh;
 
-/// Reads a mesh file of Gmsh.
+/// Reads a Gmsh mesh file (`.msh`), MSH 2.2 or 4.1, text or binary.
+///
+/// Physical volumes become regions, physical groups become node groups.
 ///
 /// # Errors
-/// When the file cannot be opened, is damaged or of another version, or holds solid elements
-/// other than tetrahedra.
-pub fn read(path: &Path) -> Result<Mesh, MeshError> {
+/// [`MeshError::Read`] or [`MeshError::Format`] when the file cannot be opened, is damaged or of another version, or
+/// holds solid elements other than tetrahedra.
+pub fn read_gmsh(path: &Path) -> Result<Mesh, MeshError> {
     parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of a mesh file; `path` is for messages.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
-    let mut scan = Scan::new(bytes, path);
+    let mut scan = Scanner::new(bytes, path);
     let version = read_format(&mut scan)?;
 
     let mut labels = Labels::default();
@@ -68,90 +73,9 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
     }
 }
 
-/// The two layouts that are read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Version {
-    /// MSH 2.2.
-    V2,
-    /// MSH 4.1.
-    V4,
-}
-
-/// The section `$MeshFormat`: `version file-type data-size`, and in a binary file the integer 1.
-fn read_format(scan: &mut Scan) -> Result<Version, MeshError> {
-    scan.skip_blank();
-    while scan.peek() == b"$Comments" {
-        scan.skip_past(b"$EndComments")?;
-        scan.skip_blank();
-    }
-    scan.expect_word("$MeshFormat", "$MeshFormat, which a gmsh mesh begins with")?;
-    scan.end_of_line()?;
-    scan.skip_blank();
-    let version = match scan.word_in_line() {
-        b"2.2" => Version::V2,
-        b"4.1" => Version::V4,
-        other => {
-            return scan.fail(format!(
-                "MSH version {} cannot be read, only 2.2 and 4.1: \
-                 convert it with gmsh OLD.msh -save -format msh41 -o NEW.msh",
-                quoted(other)
-            ));
-        }
-    };
-    let is_binary = match scan.word_in_line() {
-        b"0" => false,
-        b"1" => true,
-        other => {
-            let message = format!("file type {}, expected 0 or 1", quoted(other));
-            return scan.fail(message);
-        }
-    };
-    let data_size = scan.word_in_line();
-    if data_size != b"8" {
-        let message = format!("data size {}, expected 8", quoted(data_size));
-        return scan.fail(message);
-    }
-    scan.end_of_line()?;
-    if is_binary {
-        scan.encoding = Encoding::LittleEndian;
-        match scan.binary("the integer 1 in binary")? {
-            [1, 0, 0, 0] => {}
-            [0, 0, 0, 1] => scan.encoding = Encoding::BigEndian,
-            other => {
-                let message = format!("expected the integer 1 in binary, found bytes {other:?}");
-                return scan.fail(message);
-            }
-        }
-    }
-    end_of_section(scan, "MeshFormat", "after the format")?;
-    Ok(version)
-}
-
-/// The name of the section that begins here, without `$`; `None` at the end of the file.
-fn start_of_section<'a>(scan: &mut Scan<'a>) -> Result<Option<&'a str>, MeshError> {
-    let word = scan.word();
-    if word.is_empty() {
-        return Ok(None);
-    }
-    let name = std::str::from_utf8(word).ok();
-    let name = name.and_then(|word| word.strip_prefix('$'));
-    let Some(name) = name.filter(|name| !name.starts_with("End")) else {
-        let message = format!("expected a section such as $Nodes, found {}", quoted(word));
-        return scan.fail(message);
-    };
-    scan.end_of_line()?;
-    Ok(Some(name))
-}
-
-/// The end of a section; `after` is for the message.
-fn end_of_section(scan: &mut Scan, name: &str, after: &str) -> Result<(), MeshError> {
-    let end = format!("$End{name}");
-    scan.expect_word(&end, &format!("{end} {after}"))
-}
-
 /// The mesh from its sections.
 fn assemble(
-    scan: &Scan,
+    scan: &Scanner,
     version: Version,
     labels: Labels,
     nodes: Nodes,
@@ -160,24 +84,24 @@ fn assemble(
     let (regions, tet_regions) = regions(&elements.tet_tags, |tag| labels.name(3, tag));
     let (groups, joined) = labels.groups(scan, version, elements.members)?;
 
-    let mut remarks = Vec::new();
+    let mut warnings = Vec::new();
     if elements.curved {
-        remarks.push(CURVED_REMARK.to_owned());
+        warnings.push(CURVED_WARNING.to_owned());
     }
     if elements.repeats > 0 {
-        remarks.push(format!(
+        warnings.push(format!(
             "tetrahedra listed again under another physical volume: {}; each is kept once, in \
              the volume listed first",
             elements.repeats
         ));
     }
     if elements.unlisted_blocks > 0 {
-        remarks.push(format!(
+        warnings.push(format!(
             "element blocks of entities that $Entities does not list, as in a partitioned \
              mesh: {}; they are in no region and no group",
             elements.unlisted_blocks
         ));
     }
-    remarks.extend(joined);
-    Ok(Mesh { nodes: nodes.positions, tets: elements.tets, tet_regions, regions, groups, remarks })
+    warnings.extend(joined);
+    Ok(Mesh { nodes: nodes.positions, tets: elements.tets, tet_regions, regions, groups, warnings })
 }

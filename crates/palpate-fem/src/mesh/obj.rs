@@ -1,28 +1,29 @@
 //! Wavefront OBJ files (`.obj`): vertices and faces, for surfaces.
 //!
-//! Faces with more than three corners are cut into a fan from their first. Everything but `v` and `f` is passed over:
+//! Faces with more than three corners become a triangle fan from their first. Other statements than `v` and `f` are skipped:
 //! objects and groups of a file make one surface.
 //!
 //! Reference: Wavefront, Object Files, version 3.0 (Appendix B1 of the Advanced Visualizer manual).
 
-use super::scan::{Scan, quoted, read_bytes};
-use super::{MeshError, SurfaceMesh};
+use super::error::MeshError;
+use super::scan::{Scanner, quoted, read_bytes};
+use super::surface_mesh::SurfaceMesh;
 use glam::DVec3;
 use std::path::Path;
 
-/// Reads a Wavefront OBJ file.
+/// Reads the surface of a Wavefront OBJ file (`.obj`).
 ///
 /// # Errors
-/// When the file cannot be opened, is damaged, or has no faces.
-pub fn read(path: &Path) -> Result<SurfaceMesh, MeshError> {
+/// [`MeshError::Read`] or [`MeshError::Format`] when the file cannot be opened, is damaged, or has no faces.
+pub fn read_obj(path: &Path) -> Result<SurfaceMesh, MeshError> {
     parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of an OBJ file; `path` is for messages.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<SurfaceMesh, MeshError> {
-    let mut scan = Scan::new(bytes, path);
+    let mut scan = Scanner::new(bytes, path);
     let mut mesh = SurfaceMesh::default();
-    // The highest vertex that a face names, and where; a face may stand before its vertices.
+    // The highest vertex number in a face, and its position; a face may come before its vertices.
     let mut highest = (0, 0);
     loop {
         match scan.word() {
@@ -39,10 +40,12 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<SurfaceMesh, MeshError>
         }
         scan.rest_of_line();
     }
-    let (number, place) = highest;
+    let (number, position) = highest;
     if number as usize > mesh.positions.len() {
         let count = mesh.positions.len();
-        return Err(scan.error_at(place, format!("the face names vertex {number}, and the file has {count}")));
+        return Err(
+            scan.error_at(position, format!("the face names vertex {number}, and the file has {count}"))
+        );
     }
     if mesh.triangles.is_empty() {
         return scan.fail("the file has no faces");
@@ -51,16 +54,16 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<SurfaceMesh, MeshError>
 }
 
 /// The corners of a face, counted from 0, up to the end of the line.
-fn read_face(scan: &mut Scan, vertices: usize, highest: &mut (u32, usize)) -> Result<Vec<u32>, MeshError> {
+fn read_face(scan: &mut Scanner, vertices: usize, highest: &mut (u32, usize)) -> Result<Vec<u32>, MeshError> {
     let mut corners = Vec::new();
-    let face = scan.begun();
+    let face = scan.token_start();
     while !scan.is_end_of_line() {
         let word = scan.word_in_line();
         if word.starts_with(b"#") {
             break;
         }
         if word == b"\\" {
-            // The face goes on in the next line.
+            // The face continues in the next line.
             scan.rest_of_line();
             continue;
         }
@@ -77,7 +80,7 @@ fn read_face(scan: &mut Scan, vertices: usize, highest: &mut (u32, usize)) -> Re
             return scan.fail(format!("expected a vertex of the face, found {}", quoted(word)));
         };
         if number > highest.0 {
-            *highest = (number, scan.begun());
+            *highest = (number, scan.token_start());
         }
         corners.push(number - 1);
     }

@@ -1,33 +1,33 @@
-//! Meshes that need no file: boxes and balls.
+//! Generated meshes: boxes and balls.
 
-use super::{Mesh, MeshError, Region};
+use super::error::MeshError;
+use super::volume_mesh::{Mesh, Region};
 use glam::DVec3;
 
-/// Largest number of cells: beyond it the factor does not fit into the memory of a common machine.
-const MOST_TETRAHEDRA: u64 = 20_000_000;
+/// Largest number of tetrahedra: beyond it the factor does not fit into the memory of a common machine.
+const MAX_TETRAHEDRA: u64 = 20_000_000;
 
-fn body(nodes: Vec<DVec3>, tets: Vec<[u32; 4]>) -> Mesh {
+/// Mesh of one region.
+fn one_region(nodes: Vec<DVec3>, tets: Vec<[u32; 4]>) -> Mesh {
     let tet_regions = vec![0; tets.len()];
     Mesh { nodes, tets, tet_regions, regions: vec![Region { tag: 0, name: None }], ..Mesh::default() }
 }
 
-/// A box of the given size [m] about the origin, each of its cells in five tetrahedra.
+/// Mesh of a box of the given sides [m] about the origin, with five tetrahedra per cell.
 ///
 /// The two mirror-image splits alternate, so that faces match: diagonals join the lattice points
 /// with an odd sum of indices. A corner of the box with an even sum belongs to one tetrahedron only;
 /// with even cell counts that is every corner, which is the paper's cube.
 ///
 /// # Errors
-/// When a size is not positive or the number of cells is 0 or too large.
+/// [`MeshError::BoxSize`] or [`MeshError::BoxCells`] for a side that is not positive, no cell, or too many cells.
 pub fn box_mesh(size: [f64; 3], cells: [u32; 3]) -> Result<Mesh, MeshError> {
-    let count = cells.iter().try_fold(5_u64, |n, &c| n.checked_mul(u64::from(c))).unwrap_or(u64::MAX);
+    let tetrahedra = cells.iter().try_fold(5_u64, |n, &c| n.checked_mul(u64::from(c))).unwrap_or(u64::MAX);
     if size.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        return Err(MeshError::Unusable(format!("box size is {size:?} m, expected three positive numbers")));
+        return Err(MeshError::BoxSize { size });
     }
-    if count == 0 || count > MOST_TETRAHEDRA {
-        return Err(MeshError::Unusable(format!(
-            "box of {cells:?} cells has {count} tetrahedra, expected 1 cell or more a side and at most {MOST_TETRAHEDRA} tetrahedra"
-        )));
+    if tetrahedra == 0 || tetrahedra > MAX_TETRAHEDRA {
+        return Err(MeshError::BoxCells { cells, tetrahedra, limit: MAX_TETRAHEDRA });
     }
     let [nx, ny, nz] = cells;
     let number = |i: u32, j: u32, k: u32| (i * (ny + 1) + j) * (nz + 1) + k;
@@ -65,26 +65,25 @@ pub fn box_mesh(size: [f64; 3], cells: [u32; 3]) -> Result<Mesh, MeshError> {
             }
         }
     }
-    Ok(body(nodes, tets))
+    Ok(one_region(nodes, tets))
 }
 
-/// A ball of the given radius [m] about the origin: the 20 tetrahedra between an icosahedron and its
-/// centre, each in `layers`³ smaller ones, with every shell drawn onto its sphere.
+/// Mesh of a ball of the given radius [m] about the origin, with 20·`layers`³ tetrahedra.
+///
+/// The 20 tetrahedra between an icosahedron and its centre are refined, and every shell is projected onto its sphere.
 ///
 /// # Errors
-/// When the radius is not positive or the number of layers is 0 or too large.
+/// [`MeshError::BallRadius`] or [`MeshError::BallLayers`] for a radius that is not positive, no layer, or too many layers.
 pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
     if !(radius.is_finite() && radius > 0.0) {
-        return Err(MeshError::Unusable(format!("sphere radius is {radius} m, expected a positive number")));
+        return Err(MeshError::BallRadius { radius });
     }
-    let count = u64::from(layers).checked_pow(3).and_then(|n| n.checked_mul(20)).unwrap_or(u64::MAX);
-    if layers == 0 || count > MOST_TETRAHEDRA {
-        return Err(MeshError::Unusable(format!(
-            "sphere of {layers} layers has {count} tetrahedra, expected 1 layer or more and at most {MOST_TETRAHEDRA} tetrahedra"
-        )));
+    let tetrahedra = u64::from(layers).checked_pow(3).and_then(|n| n.checked_mul(20)).unwrap_or(u64::MAX);
+    if layers == 0 || tetrahedra > MAX_TETRAHEDRA {
+        return Err(MeshError::BallLayers { layers, tetrahedra, limit: MAX_TETRAHEDRA });
     }
     let (corners, faces) = icosahedron();
-    let mut mesh = body(Vec::new(), Vec::new());
+    let mut mesh = one_region(Vec::new(), Vec::new());
     // A lattice point is (shell a, and b, c within the shell's triangle) with a ≥ b ≥ c ≥ 0. Points on
     // shared edges and faces are found by their sums over the icosahedron's corners.
     let mut numbers = std::collections::HashMap::new();
@@ -115,7 +114,7 @@ pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
             }
         }
     }
-    // Orientation: the Kuhn simplices come in both.
+    // The Kuhn simplices come in both orientations.
     for tet in &mut mesh.tets {
         let [a, b, c, d] = tet.map(|n| mesh.nodes[n as usize]);
         if (b - a).cross(c - a).dot(d - a) < 0.0 {
@@ -126,9 +125,10 @@ pub fn ball_mesh(radius: f64, layers: u32) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
-/// The six paths along the axes from (0,0,0) to (1,1,1): Kuhn's split of a cell.
+/// Six paths along the axes from (0,0,0) to (1,1,1): Kuhn's triangulation of a cell.
 const KUHN: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
+/// Cells of a refined tetrahedron.
 fn lattice(n: u32) -> impl Iterator<Item = [u32; 3]> {
     (0..n).flat_map(move |a| (0..=a).flat_map(move |b| (0..=b).map(move |c| [a, b, c])))
 }
@@ -163,13 +163,13 @@ fn icosahedron() -> ([DVec3; 12], Vec<[usize; 3]>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::check::{check, tet_volume};
+    use crate::mesh::faces::tet_volume;
 
     #[test]
     fn the_papers_cube_has_its_counts_and_lone_corners() {
-        let mesh = check(box_mesh([0.1; 3], [12; 3]).expect("a good box")).expect("a sound mesh");
+        let mesh = box_mesh([0.1; 3], [12; 3]).expect("a good box").checked().expect("a sound mesh");
         assert_eq!((mesh.nodes.len(), mesh.tets.len()), (2197, 8640));
-        let boundary = crate::mesh::boundary(&mesh.tets);
+        let boundary = mesh.boundary();
         assert_eq!(boundary.len(), 1728);
         let corners = mesh.nodes.iter().enumerate().filter(|(_, p)| p.abs().min_element() > 0.0499);
         for (corner, _) in corners {
@@ -180,15 +180,15 @@ mod tests {
 
     #[test]
     fn boxes_of_odd_cell_counts_fill_their_volume() {
-        let mesh = check(box_mesh([1.0, 2.0, 3.0], [3, 1, 2]).expect("a good box")).expect("a sound mesh");
+        let mesh = box_mesh([1.0, 2.0, 3.0], [3, 1, 2]).expect("a good box").checked().expect("a sound mesh");
         let volume: f64 = mesh.tets.iter().map(|tet| tet_volume(&mesh.nodes, tet)).sum();
-        assert!((volume - 6.0).abs() < 1e-14 && mesh.remarks.is_empty(), "{volume} {:?}", mesh.remarks);
+        assert!((volume - 6.0).abs() < 1e-14 && mesh.warnings.is_empty(), "{volume} {:?}", mesh.warnings);
     }
 
     #[test]
     fn balls_are_sound_and_their_volume_converges_with_second_order() {
         let missing = |layers: u32| {
-            let mesh = check(ball_mesh(0.5, layers).expect("a good ball")).expect("a sound mesh");
+            let mesh = ball_mesh(0.5, layers).expect("a good ball").checked().expect("a sound mesh");
             assert_eq!(mesh.tets.len() as u32, 20 * layers.pow(3));
             let volume: f64 = mesh.tets.iter().map(|tet| tet_volume(&mesh.nodes, tet)).sum();
             1.0 - volume / (std::f64::consts::PI / 6.0)

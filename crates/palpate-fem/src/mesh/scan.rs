@@ -1,17 +1,18 @@
-//! What the mesh readers share: a cursor over the bytes of a file that reads words and numbers,
-//! as text or binary, never past the end, and that knows the place for an error.
+//! Scanner of the mesh readers: a cursor over the bytes of a file that reads words and numbers, as text or binary,
+//! never past the end, and knows the position for an error.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::{MeshError, Region};
+use super::error::{FilePosition, MeshError};
+use super::volume_mesh::Region;
 
-/// The remark on tetrahedra with more than four nodes.
-pub(super) const CURVED_REMARK: &str = "curved or quadratic tetrahedra: only the corner nodes \
+/// Warning about tetrahedra with more than four nodes.
+pub(super) const CURVED_WARNING: &str = "curved or quadratic tetrahedra: only the corner nodes \
                                         are used, edges are taken straight";
 
-/// How numbers are written.
+/// Encoding of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
     Text,
@@ -19,7 +20,7 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// How a number is stored in a binary file.
+/// Type of a number in a binary file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Number {
     I8,
@@ -49,29 +50,29 @@ impl Number {
     }
 }
 
-/// The bytes of a mesh file.
+/// Content of a mesh file.
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshError> {
     std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })
 }
 
-/// A cursor over the bytes of a mesh file.
-pub(super) struct Scan<'a> {
+/// Cursor over the bytes of a mesh file.
+pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the last word or number begins: the place of an error.
-    begun: usize,
+    /// Offset of the last word or number: the position of an error.
+    token_start: usize,
     path: &'a Path,
     pub encoding: Encoding,
 }
 
-impl<'a> Scan<'a> {
+impl<'a> Scanner<'a> {
     /// At the start of a file, as text, past a byte-order mark.
     pub fn new(bytes: &'a [u8], path: &'a Path) -> Self {
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        Self { bytes, at, begun: at, path, encoding: Encoding::Text }
+        Self { bytes, at, token_start: at, path, encoding: Encoding::Text }
     }
 
-    /// Goes on at a byte of the file.
+    /// Moves to a byte of the file.
     pub fn go_to(&mut self, at: usize) {
         self.at = at;
     }
@@ -80,44 +81,44 @@ impl<'a> Scan<'a> {
         self.encoding == Encoding::Text
     }
 
-    /// How long the whole file is [bytes].
+    /// Size of the file [bytes].
     pub fn file_size(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Where the last word or number begins [bytes], for [`Scan::error_at`].
-    pub fn begun(&self) -> usize {
-        self.begun
+    /// Offset of the last word or number [bytes], for [`Scanner::error_at`].
+    pub fn token_start(&self) -> usize {
+        self.token_start
     }
 
     fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or_default()
     }
 
-    /// An error at the last word or number.
+    /// Error at the last word or number.
     pub fn error(&self, message: impl Into<String>) -> MeshError {
-        self.error_at(self.begun, message)
+        self.error_at(self.token_start, message)
     }
 
-    /// An error at a byte of the file: in text the line is named instead.
+    /// Error at a byte of the file: in text the line is named instead.
     pub fn error_at(&self, at: usize, message: impl Into<String>) -> MeshError {
-        let place = if self.is_text() {
+        let position = if self.is_text() {
             let before = self.bytes.get(..at).unwrap_or(self.bytes);
             let before = if at < self.bytes.len() { before } else { before.trim_ascii_end() };
             let lines_before = before.iter().filter(|&&byte| byte == b'\n').count();
-            format!("line {}", lines_before + 1)
+            FilePosition::Line(lines_before + 1)
         } else {
-            format!("byte {at}")
+            FilePosition::Byte(at)
         };
-        MeshError::Format { path: self.path.to_path_buf(), place, message: message.into() }
+        MeshError::Format { path: self.path.to_path_buf(), position, message: message.into() }
     }
 
-    /// [`Scan::error`] as a result.
+    /// [`Scanner::error`] as a result.
     pub fn fail<T>(&self, message: impl Into<String>) -> Result<T, MeshError> {
         Err(self.error(message))
     }
 
-    /// An error at the last word, which is not the expected one.
+    /// Error at the last word, which is not the expected one.
     pub fn unexpected(&self, expected: &str, found: &[u8]) -> MeshError {
         let found = match found {
             [] if self.rest().is_empty() => "the end of the file".to_owned(),
@@ -127,7 +128,7 @@ impl<'a> Scan<'a> {
         self.error(format!("expected {expected}, found {found}"))
     }
 
-    /// Goes past spaces and line ends.
+    /// Skips spaces and line ends.
     pub fn skip_blank(&mut self) {
         let blank = self.rest().iter().take_while(|b| b.is_ascii_whitespace());
         self.at += blank.count();
@@ -148,19 +149,19 @@ impl<'a> Scan<'a> {
     pub fn word_in_line(&mut self) -> &'a [u8] {
         self.skip_spaces();
         let word = self.peek();
-        self.begun = self.at;
+        self.token_start = self.at;
         self.at += word.len();
         word
     }
 
-    /// The bytes up to the next space or line end, without going past them.
+    /// Bytes up to the next space or line end, without moving.
     pub fn peek(&self) -> &'a [u8] {
         let rest = self.rest();
         let length = rest.iter().take_while(|b| !b.is_ascii_whitespace()).count();
         rest.get(..length).unwrap_or_default()
     }
 
-    /// Goes past this word, or fails: `expected` may say more than the word.
+    /// Skips this word, or fails; `expected` is for the error.
     pub fn expect_word(&mut self, word: &str, expected: &str) -> Result<(), MeshError> {
         let found = self.word();
         if found == word.as_bytes() {
@@ -169,7 +170,7 @@ impl<'a> Scan<'a> {
         Err(self.unexpected(expected, found))
     }
 
-    /// Goes past this word in upper or lower case, or fails.
+    /// Skips this word in upper or lower case, or fails.
     pub fn expect_keyword(&mut self, keyword: &str) -> Result<(), MeshError> {
         let found = self.word();
         if found.eq_ignore_ascii_case(keyword.as_bytes()) {
@@ -178,7 +179,7 @@ impl<'a> Scan<'a> {
         Err(self.unexpected(keyword, found))
     }
 
-    /// Goes past this word, if it is the next on this line.
+    /// Skips this word if it is the next on this line.
     pub fn skip_word_in_line(&mut self, word: &str) -> bool {
         self.skip_spaces();
         let is_next = self.peek() == word.as_bytes();
@@ -194,16 +195,16 @@ impl<'a> Scan<'a> {
         self.peek().is_empty()
     }
 
-    /// What is left of this line, trimmed; goes on to the next line.
+    /// Rest of this line, trimmed; moves to the next line.
     pub fn rest_of_line(&mut self) -> &'a [u8] {
-        self.begun = self.at;
+        self.token_start = self.at;
         let rest = self.rest();
         let length = rest.iter().take_while(|&&b| b != b'\n').count();
         self.at = (self.at + length + 1).min(self.bytes.len());
         rest.get(..length).unwrap_or_default().trim_ascii()
     }
 
-    /// Goes to the next line; nothing but spaces may be left of this one.
+    /// Moves to the next line; fails if words are left on this one.
     pub fn end_of_line(&mut self) -> Result<(), MeshError> {
         match self.word_in_line() {
             [] => {
@@ -214,19 +215,19 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// As [`Scan::end_of_line`] in a text file; a binary one has no lines.
+    /// As [`Scanner::end_of_line`] in a text file; a binary one has no lines.
     pub fn end_of_row(&mut self) -> Result<(), MeshError> {
         if self.is_text() { self.end_of_line() } else { Ok(()) }
     }
 
-    /// Goes to the next line that is not blank in a text file; a binary one has no lines.
+    /// Moves to the next line that is not blank in a text file; a binary one has no lines.
     pub fn start_of_row(&mut self) {
         if self.is_text() {
             self.skip_blank();
         }
     }
 
-    /// Goes past `mark`, which stands at the start of a line in a text file.
+    /// Skips past `mark`, which is at the start of a line in a text file.
     pub fn skip_past(&mut self, mark: &[u8]) -> Result<(), MeshError> {
         let mut from = self.at;
         while let Some(distance) =
@@ -254,7 +255,7 @@ impl<'a> Scan<'a> {
 
     /// The next bytes of a binary file, lowest first.
     pub fn binary<const N: usize>(&mut self, expected: &str) -> Result<[u8; N], MeshError> {
-        self.begun = self.at;
+        self.token_start = self.at;
         let Some(&bytes) = self.rest().first_chunk::<N>() else {
             return Err(self.error(format!("expected {expected}, found the end of the file")));
         };
@@ -309,7 +310,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// A stated count, if the rest of the file can hold so many things of these bytes each.
+    /// A stated count, if the rest of the file can hold that many items of this size.
     pub fn count(&self, stated: u64, bytes_each: usize, of: &str) -> Result<usize, MeshError> {
         let left = self.rest().len();
         let most = left / bytes_each.max(1) + 1;
@@ -322,7 +323,7 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// A word of the file for a message: no control characters, and not long.
+/// Word of the file for a message, escaped and shortened.
 pub(super) fn quoted(word: &[u8]) -> String {
     const SHOWN: usize = 32;
     let (shown, rest) = word.split_at(word.len().min(SHOWN));
@@ -330,7 +331,7 @@ pub(super) fn quoted(word: &[u8]) -> String {
     format!("'{}{more}'", String::from_utf8_lossy(shown).escape_debug())
 }
 
-/// Solid elements that are not tetrahedra: counted, so that one error can tell of all.
+/// Counts of solid elements that are not tetrahedra, for one error about all.
 #[derive(Default)]
 pub(super) struct OtherSolids {
     counts: BTreeMap<&'static str, u64>,
@@ -338,16 +339,16 @@ pub(super) struct OtherSolids {
 }
 
 impl OtherSolids {
-    /// Counts one, at the scanner's place; `kind` is a plural.
-    pub fn add(&mut self, scan: &Scan, kind: &'static str) {
+    /// Counts one at the position of the scanner; `kind` is a plural.
+    pub fn add(&mut self, scan: &Scanner, kind: &'static str) {
         if self.counts.is_empty() {
-            self.first_at = scan.begun();
+            self.first_at = scan.token_start();
         }
         *self.counts.entry(kind).or_default() += 1;
     }
 
-    /// An error at the first, if there are any.
-    pub fn none(&self, scan: &Scan) -> Result<(), MeshError> {
+    /// Error at the first, if there are any.
+    pub fn refuse(&self, scan: &Scanner) -> Result<(), MeshError> {
         if self.counts.is_empty() {
             return Ok(());
         }

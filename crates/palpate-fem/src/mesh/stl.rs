@@ -1,12 +1,13 @@
 //! STL files (`.stl`), text and binary, for surfaces.
 //!
-//! An STL file is a list of triangles with the places of their corners; [`SurfaceMesh::weld`] joins them. The normals
-//! in the file are passed over: the order of the corners says where outside is.
+//! An STL file is a list of triangles with the positions of their corners; [`SurfaceMesh::weld`] joins them. The normals
+//! in the file are skipped: the order of the corners gives the orientation.
 //!
 //! Reference: 3D Systems, StereoLithography Interface Specification (1989).
 
-use super::scan::{Encoding, Number, Scan, read_bytes};
-use super::{MeshError, SurfaceMesh};
+use super::error::MeshError;
+use super::scan::{Encoding, Number, Scanner, read_bytes};
+use super::surface_mesh::SurfaceMesh;
 use glam::DVec3;
 use std::path::Path;
 
@@ -15,17 +16,17 @@ const TITLE: usize = 80;
 const COUNT: usize = 4;
 const TRIANGLE: usize = 50;
 
-/// Reads an STL file.
+/// Reads the surface of an STL file (`.stl`). [`SurfaceMesh::weld`] joins its triangles.
 ///
 /// # Errors
-/// When the file cannot be opened, is damaged, or has no triangles.
-pub fn read(path: &Path) -> Result<SurfaceMesh, MeshError> {
+/// [`MeshError::Read`] or [`MeshError::Format`] when the file cannot be opened, is damaged, or has no triangles.
+pub fn read_stl(path: &Path) -> Result<SurfaceMesh, MeshError> {
     parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of an STL file; `path` is for messages.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<SurfaceMesh, MeshError> {
-    let mut scan = Scan::new(bytes, path);
+    let mut scan = Scanner::new(bytes, path);
     let mut mesh = SurfaceMesh::default();
     // The title of a binary file may begin with the word of a text file, so the length decides.
     let stated =
@@ -54,7 +55,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<SurfaceMesh, MeshError>
     Ok(mesh)
 }
 
-fn read_binary(scan: &mut Scan, count: u32, mesh: &mut SurfaceMesh) -> Result<(), MeshError> {
+fn read_binary(scan: &mut Scanner, count: u32, mesh: &mut SurfaceMesh) -> Result<(), MeshError> {
     scan.encoding = Encoding::LittleEndian;
     scan.go_to(TITLE + COUNT);
     for _ in 0..count {
@@ -67,7 +68,7 @@ fn read_binary(scan: &mut Scan, count: u32, mesh: &mut SurfaceMesh) -> Result<()
     Ok(())
 }
 
-fn read_text(scan: &mut Scan, mesh: &mut SurfaceMesh) -> Result<(), MeshError> {
+fn read_text(scan: &mut Scanner, mesh: &mut SurfaceMesh) -> Result<(), MeshError> {
     let mut is_open = false;
     loop {
         let word = scan.word();
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_place() {
+    fn errors_name_what_is_wrong_and_its_position() {
         let changed = |old: &str, new: &str| {
             message(String::from_utf8(text()).unwrap().replacen(old, new, 1).as_bytes())
         };

@@ -1,10 +1,11 @@
-//! A mesh of triangles: the surface of something that does not deform.
+//! Triangle meshes of rigid obstacles.
 
-use super::check::{COINCIDENT, coincident_pairs};
-use super::{Mesh, MeshError, boundary, check};
+use super::coincident::{COINCIDENT, coincident_pairs};
+use super::error::MeshError;
+use super::volume_mesh::Mesh;
 use glam::DVec3;
 
-/// Triangles and the places of their corners.
+/// Triangle mesh of a surface.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceMesh {
     /// Node positions [m], in the file's frame.
@@ -14,18 +15,18 @@ pub struct SurfaceMesh {
 }
 
 impl SurfaceMesh {
-    /// The boundary of a tetrahedral mesh.
+    /// Boundary of a tetrahedral mesh.
     ///
     /// # Errors
-    /// When the mesh is not one sound body, see [`check`].
-    pub fn around(mesh: Mesh) -> Result<Self, MeshError> {
-        let mesh = check(mesh)?;
-        let mut surface = Self { triangles: boundary(&mesh.tets), positions: mesh.nodes };
-        surface.drop_unused();
+    /// [`MeshError`] when the mesh is not one sound body, see [`Mesh::checked`].
+    pub fn from_boundary(mesh: Mesh) -> Result<Self, MeshError> {
+        let mesh = mesh.checked()?;
+        let mut surface = Self { triangles: mesh.boundary(), positions: mesh.nodes };
+        surface.remove_unused_nodes();
         Ok(surface)
     }
 
-    /// Let triangles use one node where several lie on the same point, and leave out triangles without three corners.
+    /// Merges nodes on one point and removes triangles without three distinct corners.
     pub fn weld(&mut self) {
         let finite = || self.positions.iter().copied().filter(|p| p.is_finite());
         let low = finite().reduce(DVec3::min).unwrap_or_default();
@@ -39,10 +40,10 @@ impl SurfaceMesh {
             *triangle = triangle.map(|node| first[node as usize]);
         }
         self.triangles.retain(|[a, b, c]| a != b && b != c && c != a);
-        self.drop_unused();
+        self.remove_unused_nodes();
     }
 
-    /// Volume inside [m³] of a closed surface; negative when its triangles face inwards.
+    /// Enclosed volume [m³] of a closed surface, negative when its triangles face inwards.
     pub fn volume(&self) -> f64 {
         let of = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|node| self.positions[node as usize]);
@@ -51,12 +52,13 @@ impl SurfaceMesh {
         self.triangles.iter().map(of).sum()
     }
 
-    /// Let all triangles face the other way.
-    pub fn turn_over(&mut self) {
+    /// Reverses the orientation of all triangles.
+    pub fn flip_orientation(&mut self) {
         self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     }
 
-    fn drop_unused(&mut self) {
+    /// Removes nodes without triangles.
+    fn remove_unused_nodes(&mut self) {
         let mut number = vec![u32::MAX; self.positions.len()];
         let mut kept = Vec::new();
         for node in self.triangles.iter_mut().flatten() {
@@ -79,14 +81,14 @@ mod tests {
 
     #[test]
     fn the_surface_of_a_box_is_closed_and_has_its_volume() {
-        let mut surface = SurfaceMesh::around(box_mesh([1.0, 2.0, 3.0], [2, 2, 2]).unwrap()).unwrap();
+        let mut surface = SurfaceMesh::from_boundary(box_mesh([1.0, 2.0, 3.0], [2, 2, 2]).unwrap()).unwrap();
         // 3³ nodes of which one lies within; two triangles a face of a cell.
         assert_eq!((surface.positions.len(), surface.triangles.len()), (26, 48));
         assert!((surface.volume() - 6.0).abs() < 1e-12);
         let before = surface.clone();
         surface.weld();
         assert_eq!(surface.triangles.len(), before.triangles.len());
-        surface.turn_over();
+        surface.flip_orientation();
         assert!((surface.volume() + 6.0).abs() < 1e-12);
     }
 

@@ -4,7 +4,7 @@
 //! `OFFSETS` and `CONNECTIVITY`), `CELL_TYPES`, and arrays under `POINT_DATA` and `CELL_DATA`.
 //!
 //! Regions come from the first integer array with one component under `CELL_DATA` whose name is
-//! in [`REGION_ARRAYS`]; without one there is one region, 0. Every integer array with one
+//! in `REGION_ARRAYS`; without one there is one region, 0. Every integer array with one
 //! component under `POINT_DATA` becomes a group of the array's name: the nodes where it is not
 //! zero.
 //!
@@ -13,43 +13,31 @@
 
 mod arrays;
 mod cells;
+mod reader;
 #[cfg(test)]
 mod tests;
 
 use std::path::Path;
 
-use glam::DVec3;
+use self::reader::{ArraysOf, Reader};
+use super::error::MeshError;
+use super::scan::{Encoding, Scanner, read_bytes};
+use super::volume_mesh::Mesh;
 
-use super::scan::{Encoding, Number, Scan, quoted, read_bytes, regions};
-use super::{Mesh, MeshError, NodeGroup};
-use cells::{Cells, Tets};
-
-/// Names of the cell arrays that tell regions apart; case does not matter.
-pub const REGION_ARRAYS: [&str; 11] = [
-    "material",
-    "materials",
-    "materialids",
-    "region",
-    "regions",
-    "regionid",
-    "gmsh:physical",
-    "cellentityids",
-    "medit:ref",
-    "physical",
-    "part",
-];
-
-/// Reads a legacy file of VTK.
+/// Reads a VTK legacy file (`.vtk`) with an unstructured grid, text or binary.
+///
+/// An integer cell array such as `material` gives regions, integer point arrays give node groups.
 ///
 /// # Errors
-/// When the file cannot be opened, is damaged, or holds solid cells other than tetrahedra.
-pub fn read(path: &Path) -> Result<Mesh, MeshError> {
+/// [`MeshError::Read`] or [`MeshError::Format`] when the file cannot be opened, is damaged, or holds solid cells other
+/// than tetrahedra.
+pub fn read_vtk(path: &Path) -> Result<Mesh, MeshError> {
     parse(&read_bytes(path)?, path)
 }
 
 /// Reads the bytes of a legacy file; `path` is for messages.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
-    let mut scan = Scan::new(bytes, path);
+    let mut scan = Scanner::new(bytes, path);
     read_header(&mut scan)?;
     let mut reader = Reader {
         scan,
@@ -59,7 +47,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
         arrays_of: ArraysOf::File,
         labels: None,
         groups: Vec::new(),
-        remarks: Vec::new(),
+        warnings: Vec::new(),
     };
     loop {
         let keyword = reader.keyword().to_ascii_uppercase();
@@ -75,7 +63,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh, MeshError> {
 }
 
 /// Version, title, `ASCII` or `BINARY`, and `DATASET UNSTRUCTURED_GRID`.
-fn read_header(scan: &mut Scan) -> Result<(), MeshError> {
+fn read_header(scan: &mut Scanner) -> Result<(), MeshError> {
     let first = scan.rest_of_line();
     if first.starts_with(b"<") {
         return scan.fail(
@@ -100,118 +88,4 @@ fn read_header(scan: &mut Scan) -> Result<(), MeshError> {
         scan.encoding = Encoding::BigEndian;
     }
     Ok(())
-}
-
-/// What the arrays that follow belong to, and how many tuples they have.
-#[derive(Clone, Copy)]
-enum ArraysOf {
-    File,
-    Points(usize),
-    Cells(usize),
-}
-
-struct Reader<'a> {
-    scan: Scan<'a>,
-    points: Option<Vec<DVec3>>,
-    cells: Option<Cells>,
-    tets: Option<Tets>,
-    arrays_of: ArraysOf,
-    /// The region of each cell.
-    labels: Option<Vec<i64>>,
-    groups: Vec<NodeGroup>,
-    remarks: Vec<String>,
-}
-
-impl<'a> Reader<'a> {
-    /// The next word that is not in a `METADATA` block, which ends with a blank line.
-    fn keyword(&mut self) -> &'a [u8] {
-        loop {
-            let word = self.scan.word();
-            if !word.eq_ignore_ascii_case(b"METADATA") {
-                return word;
-            }
-            self.scan.rest_of_line();
-            while !self.scan.rest_of_line().is_empty() {}
-        }
-    }
-
-    fn read_points(&mut self) -> Result<(), MeshError> {
-        if self.points.is_some() {
-            return self.scan.fail("POINTS is in the file twice");
-        }
-        let stated = self.scan.text_number("the number of points")?;
-        let number = self.number_type()?;
-        let count = self.scan.count(stated, 3 * self.least_bytes(number), "points")?;
-        self.scan.end_of_line()?;
-        if u32::try_from(count).is_err() {
-            return self.scan.fail(format!("{count} points are more than can be numbered"));
-        }
-        let mut points = Vec::with_capacity(count);
-        for _ in 0..count {
-            let mut coordinate = || {
-                self.scan.start_of_row();
-                self.scan.real(number, "a coordinate")
-            };
-            points.push(DVec3::new(coordinate()?, coordinate()?, coordinate()?));
-        }
-        self.points = Some(points);
-        Ok(())
-    }
-
-    /// A whole number; in a text file it may be on a later line.
-    fn integer(&mut self, number: Number, expected: &str) -> Result<i64, MeshError> {
-        self.scan.start_of_row();
-        self.scan.integer(number, expected)
-    }
-
-    /// How few bytes such a number takes.
-    fn least_bytes(&self, number: Number) -> usize {
-        if self.scan.is_text() { 2 } else { number.bytes() }
-    }
-
-    /// The name of a number type.
-    fn number_type(&mut self) -> Result<Number, MeshError> {
-        let name = self.scan.word_in_line();
-        Ok(match name.to_ascii_lowercase().as_slice() {
-            b"bit" if self.scan.is_text() => Number::U8,
-            b"char" | b"signed_char" | b"vtktypeint8" => Number::I8,
-            b"unsigned_char" | b"vtktypeuint8" => Number::U8,
-            b"short" | b"vtktypeint16" => Number::I16,
-            b"unsigned_short" | b"vtktypeuint16" => Number::U16,
-            // In legacy files vtkIdType is a C int.
-            b"int" | b"vtkidtype" | b"vtktypeint32" => Number::I32,
-            b"unsigned_int" | b"vtktypeuint32" => Number::U32,
-            b"long" | b"long_long" | b"vtktypeint64" => Number::I64,
-            b"unsigned_long" | b"unsigned_long_long" | b"vtktypeuint64" => Number::U64,
-            b"float" => Number::F32,
-            b"double" => Number::F64,
-            b"bit" | b"string" | b"utf8_string" | b"variant" => {
-                let name = quoted(name);
-                let message = format!("arrays of type {name} cannot be read: save as ASCII");
-                return self.scan.fail(message);
-            }
-            _ => return Err(self.scan.unexpected("a number type such as double", name)),
-        })
-    }
-
-    /// The mesh, at the end of the file.
-    fn assemble(self) -> Result<Mesh, MeshError> {
-        let (nodes, tets) = match (self.points, self.tets) {
-            (Some(points), Some(tets)) => (points, tets),
-            (None, _) => return self.scan.fail("the file has no POINTS"),
-            (_, None) => return self.scan.fail("the file has no CELL_TYPES"),
-        };
-        let labels = self.labels.unwrap_or_default();
-        let label = |&cell: &usize| labels.get(cell).copied().unwrap_or(0);
-        let tet_tags: Vec<i64> = tets.cells.iter().map(label).collect();
-        let (regions, tet_regions) = regions(&tet_tags, |_| None);
-        Ok(Mesh {
-            nodes,
-            tets: tets.corners,
-            tet_regions,
-            regions,
-            groups: self.groups,
-            remarks: self.remarks,
-        })
-    }
 }

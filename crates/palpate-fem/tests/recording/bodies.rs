@@ -1,14 +1,13 @@
-//! Bodies to record, and what the tests ask of a recording.
+//! Bodies of the tests, and matrices of a recording.
 
 use faer::{Mat, Side};
 use glam::DVec3;
 use palpate::{Damping, Material, ResidualCompliance};
-use palpate_fem::element::Order;
 use palpate_fem::mesh::{Mesh, Region, box_mesh};
-use palpate_fem::progress::{Progress, Silent};
-use palpate_fem::record::{Extent, RecordParameters, Recorded, record};
-use palpate_fem::residual::ResidualChoice;
-use palpate_fem::system::System;
+use palpate_fem::{
+    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, SilentProgress,
+};
+use std::sync::OnceLock;
 
 /// Solves with a factor of condition up to 1e6 keep ten of sixteen digits.
 pub const SOLVED: f64 = 1e-10;
@@ -16,14 +15,14 @@ pub const SOLVED: f64 = 1e-10;
 /// Sums and products of a few hundred terms keep all but three digits.
 pub const SUMMED: f64 = 1e-12;
 
-/// The most that rounding to f32 moves a number, as a share of it: half a unit in the 24th binary digit.
+/// Largest relative rounding error of f32: half a unit in the 24th binary digit.
 pub const F32_ROUNDING: f64 = 1.0 / 16_777_216.0;
 
 pub fn material(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
     Material { region: String::new(), young_pa, poisson, density_kg_m3 }
 }
 
-pub fn parameters(order: Order, modes: usize) -> RecordParameters {
+pub fn parameters(order: ElementOrder, modes: usize) -> RecordParameters {
     RecordParameters {
         materials: vec![material(2e4, 0.3, 1000.0)],
         order,
@@ -32,7 +31,7 @@ pub fn parameters(order: Order, modes: usize) -> RecordParameters {
         residual: ResidualChoice::Automatic,
         fixed_nodes: Vec::new(),
         source: "test".into(),
-        extent: Extent::Whole,
+        extent: RecordExtent::Full,
     }
 }
 
@@ -45,27 +44,27 @@ pub fn nodes_where(mesh: &Mesh, holds: impl Fn(DVec3) -> bool) -> Vec<u32> {
     (0..mesh.nodes.len() as u32).filter(|&node| holds(mesh.nodes[node as usize])).collect()
 }
 
-pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> Recorded {
-    record(mesh, parameters, &mut Silent).expect("a good recording")
+pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> RecordedBody {
+    RecordedBody::new(mesh, parameters, &mut SilentProgress).expect("a good recording")
 }
 
 pub fn refusal(mesh: Mesh, parameters: &RecordParameters) -> String {
-    record(mesh, parameters, &mut Silent).err().expect("an error").to_string()
+    RecordedBody::new(mesh, parameters, &mut SilentProgress).err().expect("an error").to_string()
 }
 
-/// Keeps the remarks.
+/// Listener that keeps the warnings.
 #[derive(Default)]
 pub struct Listener(pub Vec<String>);
 
 impl Progress for Listener {
     fn begin(&mut self, _stage: &str, _total: u64) {}
     fn advance(&mut self, _units: u64) {}
-    fn remark(&mut self, text: &str) {
+    fn warn(&mut self, text: &str) {
         self.0.push(text.into());
     }
 }
 
-/// A bar with a soft and a stiff half of other density, and what it is recorded with: 1149 degrees of freedom, so that
+/// A bar with a soft and a stiff half of other density, with its parameters: 1149 degrees of freedom, so that
 /// the modes come by block Krylov.
 pub fn two_material_bar(modes: usize) -> (Mesh, RecordParameters) {
     let mut mesh = block([0.2, 0.05, 0.05], [8, 2, 2]);
@@ -74,11 +73,11 @@ pub fn two_material_bar(modes: usize) -> (Mesh, RecordParameters) {
         *region = u32::from(tet.iter().map(|&n| mesh.nodes[n as usize].x).sum::<f64>() > 0.0);
     }
     let materials = vec![material(2e4, 0.45, 1000.0), material(3e5, 0.2, 2500.0)];
-    (mesh, RecordParameters { materials, ..parameters(Order::Quadratic, modes) })
+    (mesh, RecordParameters { materials, ..parameters(ElementOrder::Quadratic, modes) })
 }
 
-/// A bar that is held at its left end.
-pub fn fixed_bar(order: Order, modes: usize) -> (Mesh, RecordParameters) {
+/// A bar with its left end fixed.
+pub fn fixed_bar(order: ElementOrder, modes: usize) -> (Mesh, RecordParameters) {
     let mesh = block([0.2, 0.05, 0.05], [8, 2, 2]);
     let fixed_nodes = nodes_where(&mesh, |p| p.x < -0.0999);
     (mesh, RecordParameters { fixed_nodes, ..parameters(order, modes) })
@@ -93,11 +92,37 @@ pub fn row(surface_nodes: &[u32], touchable: usize) -> usize {
     3 * surface_nodes[touchable / 3] as usize + touchable % 3
 }
 
-/// Unit loads on surface degrees of freedom, one per column.
-pub fn unit_loads(system: &System, surface_nodes: &[u32]) -> Mat<f64> {
-    let mut loads = Mat::zeros(system.discretisation.dofs(), 3 * surface_nodes.len());
-    (0..loads.ncols()).for_each(|column| loads[(row(surface_nodes, column), column)] = 1.0);
-    loads
+/// Unit loads [N] on surface degrees of freedom.
+pub fn unit_loads(body: &RecordedBody, surface_nodes: &[u32]) -> Vec<Vec<f64>> {
+    let load = |touchable: usize| {
+        let mut load = vec![0.0; body.dofs()];
+        load[row(surface_nodes, touchable)] = 1.0;
+        load
+    };
+    (0..3 * surface_nodes.len()).map(load).collect()
+}
+
+/// Largest magnitude in some fields.
+pub fn largest(fields: &[Vec<f64>]) -> f64 {
+    fields.iter().flatten().fold(0.0, |largest, value| largest.max(value.abs()))
+}
+
+/// [`two_material_bar`] with 40 modes, recorded once per test process.
+pub fn shared_bar() -> &'static RecordedBody {
+    static BODY: OnceLock<RecordedBody> = OnceLock::new();
+    BODY.get_or_init(|| {
+        let (mesh, parameters) = two_material_bar(40);
+        recorded(mesh, &parameters)
+    })
+}
+
+/// [`fixed_bar`] of quadratic elements with 40 modes, recorded once per test process.
+pub fn shared_fixed_bar() -> &'static RecordedBody {
+    static BODY: OnceLock<RecordedBody> = OnceLock::new();
+    BODY.get_or_init(|| {
+        let (mesh, parameters) = fixed_bar(ElementOrder::Quadratic, 40);
+        recorded(mesh, &parameters)
+    })
 }
 
 /// Entry of the stored residual compliance [m/N].

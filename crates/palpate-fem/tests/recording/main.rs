@@ -1,4 +1,4 @@
-//! From a mesh to a recording: identities, closed forms and second routes for what `record` gives.
+//! From a mesh to a recording: identities, closed forms and second routes for the results of `record`.
 
 mod bodies;
 mod records;

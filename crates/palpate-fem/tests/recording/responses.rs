@@ -1,14 +1,9 @@
-//! Modes, residual compliance, reference and certificate against second routes.
+//! Modes, residual compliance, truncated response and certificate against second routes.
 
 use faer::Mat;
 use glam::DVec3;
 use palpate::{Damping, NearField, SampledOscillator};
-use palpate_fem::element::Order;
-use palpate_fem::modes::{all_modes, orthonormality_error};
-use palpate_fem::progress::Silent;
-use palpate_fem::record::{RecordParameters, Recorded, record};
-use palpate_fem::reference::Reference;
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::{ElementOrder, RecordParameters, RecordedBody, ResidualChoice, SilentProgress};
 
 use crate::bodies::*;
 
@@ -16,20 +11,26 @@ use crate::bodies::*;
 fn krylov_and_dense_modes_are_the_same_and_orthonormal() {
     /// Krylov stops at a residual of 1e-9 in ω², whose error is the square of that; the dense route loses condition.
     const SQUARES: f64 = 1e-9;
-    /// A shape is off by the residual over the gap to the next group, 1e-9/1e-5; what it lacks in its group is the square.
+    /// The error of a shape is the residual over the gap to the next group, 1e-9/1e-5; its defect in the group is the square.
     const SHAPES: f64 = 1e-7;
     const GROUP: f64 = 1e-5;
-    for (mesh, parameters) in [two_material_bar(40), fixed_bar(Order::Quadratic, 40)] {
-        let Recorded { system, modes, .. } = recorded(mesh, &parameters);
-        assert!(system.discretisation.dofs() > 900, "small enough for the dense route");
-        assert!(orthonormality_error(&system, modes.shapes.as_ref()) < SUMMED);
-        let all = all_modes(&system, 60, &mut Silent).expect("all modes");
-        assert!(orthonormality_error(&system, all.shapes.as_ref()) < SUMMED);
-        let overlap = all.shapes.transpose() * system.mass_times(modes.shapes.as_ref());
-        for (i, &square) in modes.squares.iter().enumerate() {
-            assert!((square / all.squares[i] - 1.0).abs() < SQUARES, "mode {i}: {square} {}", all.squares[i]);
-            let group = (0..60).filter(|&j| (all.squares[j] / square - 1.0).abs() < GROUP);
-            let within: f64 = group.map(|j| overlap[(j, i)].powi(2)).sum();
+    for body in [shared_bar(), shared_fixed_bar()] {
+        let unreduced = body.unreduced();
+        let modes = unreduced.kept_modes();
+        assert!(body.dofs() > 900, "small enough for the dense route");
+        assert!(unreduced.orthonormality_error(modes) < SUMMED);
+        let all = unreduced.dense_modes(60, &mut SilentProgress).expect("all modes");
+        assert!(unreduced.orthonormality_error(&all) < SUMMED);
+        let shapes: Vec<Vec<f64>> = (0..modes.count()).map(|i| modes.shape(i).to_vec()).collect();
+        let weighted = unreduced.mass_times(&shapes);
+        let overlap = |j: usize, i: usize| -> f64 {
+            all.shape(j).iter().zip(&weighted[i]).map(|(shape, weighted)| shape * weighted).sum()
+        };
+        let squares = all.squared_frequencies();
+        for (i, &square) in modes.squared_frequencies().iter().enumerate() {
+            assert!((square / squares[i] - 1.0).abs() < SQUARES, "mode {i}: {square} {}", squares[i]);
+            let group = (0..60).filter(|&j| (squares[j] / square - 1.0).abs() < GROUP);
+            let within: f64 = group.map(|j| overlap(j, i).powi(2)).sum();
             assert!((within - 1.0).abs() < SHAPES, "mode {i} lies in its group by {within}");
         }
     }
@@ -44,7 +45,8 @@ fn symmetry_gives_the_cubes_modes_in_twos_and_threes() {
     const GROUPS: [(usize, f64); 6] =
         [(2, 2.85605), (3, 3.84598), (3, 3.91125), (2, 4.44288), (1, 4.44288), (3, 4.57279)];
     const DISCRETISED: f64 = 0.01;
-    let parameters = RecordParameters { residual: ResidualChoice::None, ..parameters(Order::Quadratic, 14) };
+    let parameters =
+        RecordParameters { residual: ResidualChoice::None, ..parameters(ElementOrder::Quadratic, 14) };
     let recording = recorded(block([0.1; 3], [4; 3]), &parameters).recording;
     let shear_speed = (2e4_f64 / 2.6 / 1000.0).sqrt();
     let omegas: Vec<f64> =
@@ -62,24 +64,25 @@ fn symmetry_gives_the_cubes_modes_in_twos_and_threes() {
 
 #[test]
 fn modes_and_residual_together_are_the_static_compliance() {
-    let free = (small_cube(), parameters(Order::Quadratic, 12));
-    let mut fixed = (small_cube(), parameters(Order::Quadratic, 12));
+    let free = (small_cube(), parameters(ElementOrder::Quadratic, 12));
+    let mut fixed = (small_cube(), parameters(ElementOrder::Quadratic, 12));
     fixed.1.fixed_nodes = nodes_where(&fixed.0, |p| p.z < -0.0499);
     for (mesh, parameters) in [free, fixed] {
-        let Recorded { recording, system, modes } = recorded(mesh, &parameters);
-        let surface_nodes = system.discretisation.surface_nodes();
+        let body = recorded(mesh, &parameters);
+        let modes = body.unreduced().kept_modes();
+        let surface_nodes = body.surface_nodes();
         let n = 3 * surface_nodes.len();
-        let exact = system.elastic_compliance(unit_loads(&system, &surface_nodes));
-        let phi = Mat::from_fn(n, 12, |i, k| modes.shapes[(row(&surface_nodes, i), k)]);
-        let weighted = Mat::from_fn(n, 12, |i, k| phi[(i, k)] / modes.squares[k]);
+        let exact = body.unreduced().static_displacements(&unit_loads(&body, &surface_nodes));
+        let phi = Mat::from_fn(n, 12, |i, k| modes.shape(k)[row(&surface_nodes, i)]);
+        let weighted = Mat::from_fn(n, 12, |i, k| phi[(i, k)] / modes.squared_frequencies()[k]);
         let kept = &weighted * phi.transpose();
-        let residual = dense(&recording.residual, n);
-        let largest = exact.norm_max();
+        let residual = dense(&body.recording.residual, n);
+        let largest = largest(&exact);
         for j in 0..n {
             // Rounded to f32; the diagonal is raised by the same share of its row, to stay positive.
             let raised: f64 = (0..n).map(|i| residual[(i, j)].abs()).sum();
             for i in 0..n {
-                let error = (kept[(i, j)] + residual[(i, j)] - exact[(row(&surface_nodes, i), j)]).abs();
+                let error = (kept[(i, j)] + residual[(i, j)] - exact[j][row(&surface_nodes, i)]).abs();
                 let share = residual[(i, j)].abs() + if i == j { raised } else { 0.0 };
                 let allowed = 1.001 * F32_ROUNDING * share + SOLVED * largest;
                 assert!(error < allowed, "entry {i}, {j}: {error} above {allowed}");
@@ -93,14 +96,17 @@ fn modes_and_residual_together_are_the_static_compliance() {
 #[test]
 fn nothing_is_left_when_all_modes_are_kept() {
     let mut listener = Listener::default();
-    let mut parameters = parameters(Order::Linear, 1000);
+    let mut parameters = parameters(ElementOrder::Linear, 1000);
     parameters.damping = Damping::Ratio(0.05);
-    let all = record(small_cube(), &parameters, &mut listener).expect("a good recording");
+    let all = RecordedBody::new(small_cube(), &parameters, &mut listener).expect("a good recording");
     // 27 nodes, less six rigid motions.
-    assert_eq!(listener.0, ["1000 modes are wanted, the model has 75 elastic modes: all of them are kept"]);
+    assert_eq!(
+        listener.0,
+        ["1000 modes are requested, the model has 75 elastic modes: all of them are kept"]
+    );
     assert_eq!(all.recording.modes.len(), 75);
-    let surface_nodes = all.system.discretisation.surface_nodes();
-    let largest = all.system.elastic_compliance(unit_loads(&all.system, &surface_nodes)).norm_max();
+    let surface_nodes = all.surface_nodes();
+    let largest = largest(&all.unreduced().static_displacements(&unit_loads(&all, &surface_nodes)));
     let left = dense(&all.recording.residual, 3 * surface_nodes.len()).norm_max();
     assert!(left < SOLVED * largest, "{left} of {largest}");
     let certificate = all.recording.metadata.certificate.expect("a certificate");
@@ -113,7 +119,7 @@ fn the_near_field_is_the_whole_residual_tapered() {
     // Many entries of this body's blocks are zero by symmetry: round-off that only a copy makes equal.
     let with = |residual| {
         let (mesh, parameters) = two_material_bar(12);
-        let parameters = RecordParameters { residual, order: Order::Linear, ..parameters };
+        let parameters = RecordParameters { residual, order: ElementOrder::Linear, ..parameters };
         recorded(mesh, &parameters).recording
     };
     let whole = with(ResidualChoice::Whole);
@@ -155,10 +161,10 @@ fn compliances(modes: impl Iterator<Item = (f64, DVec3)>, damping: Damping, step
 }
 
 #[test]
-fn the_reference_answers_as_the_sum_over_all_modes_does() {
+fn truncated_response_is_the_sum_over_all_modes() {
     const STEP_S: f64 = 1e-3;
     const KEPT: usize = 20;
-    /// The space starts with the static answer itself, so that only the sum over 166 modes rounds.
+    /// The space starts with the static response itself, so that only the sum over 166 modes rounds.
     const AT_REST: f64 = SUMMED;
     /// R[0] converges geometrically, by five digits in six blocks (measured) down to round-off.
     const IN_A_STEP: [(usize, f64); 3] = [(4, 1e-4), (10, 1e-8), (18, 1e-11)];
@@ -168,36 +174,24 @@ fn the_reference_answers_as_the_sum_over_all_modes_does() {
         let parameters = RecordParameters {
             materials: vec![material(2000.0, 0.49, 110.0)],
             fixed_nodes,
-            ..parameters(Order::Linear, KEPT)
+            ..parameters(ElementOrder::Linear, KEPT)
         };
-        let Recorded { system, modes, .. } = recorded(mesh.clone(), &parameters);
-        let all = all_modes(&system, system.elastic_modes(), &mut Silent).expect("all modes");
+        let body = recorded(mesh.clone(), &parameters);
+        let unreduced = body.unreduced();
+        let all =
+            unreduced.dense_modes(unreduced.elastic_mode_count(), &mut SilentProgress).expect("all modes");
         // A corner, the middle of the top, and a node within the body.
-        let places = [DVec3::splat(0.05), DVec3::new(0.017, 0.017, 0.05), DVec3::splat(0.017)].map(|near| {
-            let distance = |node: &usize| (system.discretisation.nodes[*node] - near).length();
-            (0..system.discretisation.nodes.len())
-                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .expect("a node")
-        });
-        let mut loads = Mat::zeros(system.discretisation.dofs(), 9);
-        for (place, axis) in (0..3).flat_map(|place| (0..3).map(move |axis| (place, axis))) {
-            loads[(3 * places[place] + axis, 3 * place + axis)] = 1.0;
-        }
-        let reference =
-            Reference::new(&system, &modes, loads, STEP_S, 18, &mut Silent).expect("shifted factors");
+        let places = [DVec3::splat(0.05), DVec3::new(0.017, 0.017, 0.05), DVec3::splat(0.017)]
+            .map(|near| body.nearest_node(near));
+        let truncated =
+            unreduced.truncated_response(&places, STEP_S, 18, &mut SilentProgress).expect("shifted factors");
         for (place, &node) in places.iter().enumerate() {
-            let gain = |i: usize| {
-                DVec3::new(
-                    all.shapes[(3 * node, i)],
-                    all.shapes[(3 * node + 1, i)],
-                    all.shapes[(3 * node + 2, i)],
-                )
-            };
-            let exact = (KEPT..all.squares.len()).map(|i| (all.squares[i], gain(i)));
+            let gain = |i: usize| DVec3::from_slice(&all.shape(i)[3 * node..]);
+            let exact = (KEPT..all.count()).map(|i| (all.squared_frequencies()[i], gain(i)));
             let [rest, first] = compliances(exact, parameters.damping, STEP_S);
             for (blocks, allowed) in IN_A_STEP {
-                let left_out = reference.left_out(&system, place, blocks).expect("small eigenproblems");
-                let modes = left_out.iter().map(|mode| (mode.square, mode.gain));
+                let modes = truncated.modes(place, blocks).expect("small eigenproblems");
+                let modes = modes.iter().map(|mode| (mode.square, mode.gain));
                 let got = compliances(modes, parameters.damping, STEP_S);
                 let error = |got: DVec3, exact: DVec3| (got - exact).length() / exact.length();
                 assert!(error(got[0], rest) < AT_REST, "static, node {node}: {} {rest}", got[0]);
@@ -216,7 +210,7 @@ fn certified_errors_fall_with_modes_and_show_what_a_missing_residual_costs() {
         let parameters = RecordParameters {
             materials: vec![material(2000.0, 0.49, 110.0)],
             residual,
-            ..parameters(Order::Linear, modes)
+            ..parameters(ElementOrder::Linear, modes)
         };
         let recording = recorded(block([0.1; 3], [4; 3]), &parameters).recording;
         recording.metadata.certificate.expect("a certificate")

@@ -1,39 +1,39 @@
-//! The drivers of real devices: what they find, and how one is opened.
+//! Drivers of real devices: discovery and opening.
 
-use super::{Device, Traits, dhd, haply, openhaptics};
-use crate::error::Error;
+use super::{Device, DeviceSpec, dhd, haply, openhaptics};
+use crate::error::{DeviceError, Error};
 
-/// How a real device is driven.
+/// Driver of real devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Driver {
-    /// 3D Systems' OpenHaptics (Touch, Touch X, Phantom), the successor of the paper's GHOST.
+    /// OpenHaptics of 3D Systems (Touch, Touch X, Phantom), the successor of the paper's GHOST.
     OpenHaptics,
-    /// Force Dimension's DHD (omega, delta, sigma, lambda, Falcon).
+    /// DHD of Force Dimension (omega, delta, sigma, lambda, Falcon).
     Dhd,
-    /// Haply's Inverse Service (Inverse3, with a VerseGrip).
+    /// Inverse Service of Haply (Inverse3, with a VerseGrip).
     Haply,
 }
 
-/// A device that was found.
+/// Device that a driver has discovered.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// What it is called.
+pub struct DiscoveredDevice {
+    /// Name of the model.
     pub name: String,
-    /// Its number among the driver's devices, from 0.
+    /// Index among the driver's devices, from 0.
     pub index: usize,
-    /// Its maker's number or name for it, if it tells.
+    /// Serial number or identifier, if the vendor's software tells it.
     pub serial: Option<String>,
-    /// Largest force [N] by its maker's software, if that tells.
+    /// Largest force [N], if the vendor's software tells it.
     pub force_n: Option<f64>,
-    /// Why it can't be had.
-    pub why_not: Option<String>,
+    /// Reason why it can't be opened; `None` if it can.
+    pub unavailable: Option<String>,
 }
 
 impl Driver {
-    /// All.
+    /// All drivers.
     pub const ALL: [Self; 3] = [Self::OpenHaptics, Self::Dhd, Self::Haply];
 
-    /// Its name.
+    /// Name of the driver.
     pub fn name(self) -> &'static str {
         match self {
             Self::OpenHaptics => "openhaptics",
@@ -42,21 +42,21 @@ impl Driver {
         }
     }
 
-    /// One by its name.
+    /// Driver with a name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|driver| driver.name() == name)
     }
 
-    /// What its devices are like, as far as nothing else is known: the lightest of those that it drives.
-    pub fn usual_traits(self) -> Traits {
+    /// Specification of its lightest device, for a device that is not known yet.
+    pub fn typical_spec(self) -> DeviceSpec {
         match self {
-            Self::OpenHaptics => Traits::TOUCH,
-            Self::Dhd => Traits::OMEGA_3,
-            Self::Haply => Traits::INVERSE_3,
+            Self::OpenHaptics => DeviceSpec::TOUCH,
+            Self::Dhd => DeviceSpec::OMEGA_3,
+            Self::Haply => DeviceSpec::INVERSE_3,
         }
     }
 
-    /// The environment variable that says where the vendor's library, or service, is.
+    /// Environment variable with the file of the vendor's library, or the address of its service.
     pub fn variable(self) -> &'static str {
         match self {
             Self::OpenHaptics => openhaptics::VENDOR.variable,
@@ -65,66 +65,74 @@ impl Driver {
         }
     }
 
-    /// The devices that are there. `place` is the file of the vendor's library, or the address of its service; without one the
-    /// environment variable's, or the usual one. Devices are opened for a moment, without force.
+    /// Connected devices. `location` is the file of the vendor's library, or the address of its service; by default that of the
+    /// environment variable, or the usual one. Opens each device for a short time, without force.
     ///
     /// # Errors
-    /// When the vendor's software is not there, or tells of no device.
-    pub fn find(self, place: Option<&str>) -> Result<Vec<Found>, Error> {
-        let own = self.place();
-        let place = place.or(own.as_deref());
+    /// If the vendor's software is missing, or lists no device.
+    pub fn find(self, location: Option<&str>) -> Result<Vec<DiscoveredDevice>, Error> {
+        let default = self.default_location();
+        let location = location.or(default.as_deref());
         match self {
-            Self::OpenHaptics => openhaptics::find(place),
-            Self::Dhd => dhd::find(place),
-            Self::Haply => haply::find(place),
+            Self::OpenHaptics => openhaptics::find(location),
+            Self::Dhd => dhd::find(location),
+            Self::Haply => haply::find(location),
         }
     }
 
-    /// Open a device, by its serial or its index; with OpenHaptics by the name of its configuration, 0 for the default one.
-    /// It gives no force before the first push, and none after it is dropped.
+    /// Opens a device by its serial number or index; with OpenHaptics by the name of its configuration, 0 for the default one. It
+    /// gives no force before the first command, and none after it is dropped.
     ///
     /// # Errors
-    /// When it is not there, or somebody else has it.
-    pub fn open(self, which: &str, place: Option<&str>) -> Result<(Found, Box<dyn Device>), Error> {
-        let own = self.place();
-        let place = place.or(own.as_deref());
+    /// If it is missing, or in use.
+    pub fn open(
+        self,
+        which: &str,
+        location: Option<&str>,
+    ) -> Result<(DiscoveredDevice, Box<dyn Device>), Error> {
+        let default = self.default_location();
+        let location = location.or(default.as_deref());
         Ok(match self {
             Self::OpenHaptics => {
-                let (found, device) = openhaptics::open(which, place)?;
+                let (found, device) = openhaptics::open(which, location)?;
                 (found, Box::new(device))
             }
             Self::Dhd => {
-                let (found, device) = dhd::open(which, place)?;
+                let (found, device) = dhd::open(which, location)?;
                 (found, Box::new(device))
             }
             Self::Haply => {
-                let (found, device) = haply::open(which, place)?;
+                let (found, device) = haply::open(which, location)?;
                 (found, Box::new(device))
             }
         })
     }
 
-    fn place(self) -> Option<String> {
-        std::env::var(self.variable()).ok().filter(|place| !place.is_empty())
+    fn default_location(self) -> Option<String> {
+        std::env::var(self.variable()).ok().filter(|location| !location.is_empty())
     }
 }
 
-/// What every driver finds, or why it finds nothing.
-pub fn discover() -> Vec<(Driver, Result<Vec<Found>, Error>)> {
+/// Devices of every driver, or the reason why it has none.
+pub fn discover() -> Vec<(Driver, Result<Vec<DiscoveredDevice>, Error>)> {
     Driver::ALL.into_iter().map(|driver| (driver, driver.find(None))).collect()
 }
 
-/// The one that is meant by a serial or an index.
-pub(super) fn pick<'f>(driver: &str, found: &'f [Found], which: &str) -> Result<&'f Found, Error> {
+/// Device with a serial number or an index.
+pub(super) fn select<'f>(
+    driver: &'static str,
+    found: &'f [DiscoveredDevice],
+    which: &str,
+) -> Result<&'f DiscoveredDevice, Error> {
     let by_serial = found.iter().find(|one| one.serial.as_deref() == Some(which));
     let by_index = || found.iter().find(|one| one.index.to_string() == which);
     by_serial.or_else(by_index).ok_or_else(|| {
-        let there: Vec<String> = found.iter().map(Found::to_string).collect();
-        Error::Device(format!("{driver}: there is no device {which:?}, only {}", there.join(", ")))
+        let available: Vec<String> = found.iter().map(DiscoveredDevice::to_string).collect();
+        DeviceError::NotFound { driver, which: which.to_string(), available: available.join(", ") }.into()
     })
 }
 
-impl std::fmt::Display for Found {
+impl std::fmt::Display for DiscoveredDevice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.index, self.name)?;
         match &self.serial {

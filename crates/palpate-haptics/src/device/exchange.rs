@@ -1,98 +1,116 @@
-//! Between a haptic update and a thread that drives a device: the newest reading one way, the newest force the other, without
-//! locks. What one end has not renewed for [`SILENCE`] does not count at the other.
+//! Lock-free exchange between a haptic update and a driver's thread: newest reading one way, newest force the other.
+//!
+//! A value that its sender has not renewed for [`STALE_AFTER`] does not count (watchdog).
 
 use super::Reading;
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// A reading, or a force, that has not been renewed for so long is none.
-pub(super) const SILENCE: Duration = Duration::from_millis(20);
+/// Age beyond which a reading or a force does not count.
+pub(super) const STALE_AFTER: Duration = Duration::from_millis(20);
 
-/// What the driving thread tells.
+/// Reading of the driver's thread, with a fault code.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct Sample {
     sequence: u64,
-    /// The newest reading.
+    /// Reading.
     pub reading: Reading,
-    /// The vendor's code for what went wrong with it; 0 for nothing.
+    /// Fault code of the vendor's library; 0 for none.
     pub fault: u32,
 }
 
+/// Force command of the haptic update.
 #[derive(Debug, Clone, Copy)]
-struct Wanted {
+struct Command {
     sequence: u64,
     force: DVec3,
 }
 
-/// The haptic update's end.
-pub(super) struct UpdateEnd {
-    told: Output<Told>,
-    wanted: Input<Wanted>,
-    pushes: u64,
+/// Haptic update's side.
+pub(super) struct UpdateSide {
+    samples: Output<Sample>,
+    commands: Input<Command>,
+    commands_sent: u64,
     seen: u64,
     seen_s: f64,
 }
 
-/// The driving thread's end.
-pub(super) struct DriverEnd {
-    told: Input<Told>,
-    wanted: Output<Wanted>,
-    tells: u64,
+/// Driver's side.
+pub(super) struct DriverSide {
+    samples: Input<Sample>,
+    commands: Output<Command>,
+    samples_sent: u64,
     seen: u64,
     seen_at: Instant,
 }
 
-/// Both ends.
-pub(super) fn exchange() -> (UpdateEnd, DriverEnd) {
+/// Both sides of an exchange.
+pub(super) fn exchange() -> (UpdateSide, DriverSide) {
     let reading = Reading { position: DVec3::ZERO, orientation: None, buttons: 0 };
-    let (told_in, told_out) = triple_buffer(&Told { sequence: 0, reading, fault: 0 });
-    let (wanted_in, wanted_out) = triple_buffer(&Wanted { sequence: 0, force: DVec3::ZERO });
-    let update =
-        UpdateEnd { told: told_out, wanted: wanted_in, pushes: 0, seen: 0, seen_s: f64::NEG_INFINITY };
-    let driver = DriverEnd { told: told_in, wanted: wanted_out, tells: 0, seen: 0, seen_at: Instant::now() };
+    let (samples_in, samples_out) = triple_buffer(&Sample { sequence: 0, reading, fault: 0 });
+    let (commands_in, commands_out) = triple_buffer(&Command { sequence: 0, force: DVec3::ZERO });
+    let update = UpdateSide {
+        samples: samples_out,
+        commands: commands_in,
+        commands_sent: 0,
+        seen: 0,
+        seen_s: f64::NEG_INFINITY,
+    };
+    let driver = DriverSide {
+        samples: samples_in,
+        commands: commands_out,
+        samples_sent: 0,
+        seen: 0,
+        seen_at: Instant::now(),
+    };
     (update, driver)
 }
 
-impl UpdateEnd {
-    /// The newest that was told; none if that was too long before a time [s].
+impl UpdateSide {
+    /// Newest sample at a time [s]; `None` if it is stale.
     ///
     /// # Real time
-    pub fn newest(&mut self, now_s: f64) -> Option<Told> {
-        let told = *self.told.read();
-        if told.sequence != self.seen {
-            (self.seen, self.seen_s) = (told.sequence, now_s);
+    /// No allocation, lock or system call.
+    pub fn newest(&mut self, now_s: f64) -> Option<Sample> {
+        let sample = *self.samples.read();
+        if sample.sequence != self.seen {
+            (self.seen, self.seen_s) = (sample.sequence, now_s);
         }
-        (now_s - self.seen_s <= SILENCE.as_secs_f64()).then_some(told)
+        (now_s - self.seen_s <= STALE_AFTER.as_secs_f64()).then_some(sample)
     }
 
-    /// Want a force [N] from now on.
+    /// Commands a force [N].
     ///
     /// # Real time
-    pub fn push(&mut self, force: DVec3) {
-        self.pushes += 1;
-        self.wanted.write(Wanted { sequence: self.pushes, force });
+    /// No allocation, lock or system call.
+    pub fn set_force(&mut self, force: DVec3) {
+        self.commands_sent += 1;
+        self.commands.write(Command { sequence: self.commands_sent, force });
     }
 }
 
-impl DriverEnd {
-    /// Tell a reading, with the vendor's code for what went wrong.
+impl DriverSide {
+    /// Sends a reading with a fault code; 0 for none.
     ///
     /// # Real time
-    pub fn tell(&mut self, reading: Reading, fault: u32) {
-        self.tells += 1;
-        self.told.write(Told { sequence: self.tells, reading, fault });
+    /// No allocation, lock or system call.
+    pub fn send(&mut self, reading: Reading, fault: u32) {
+        self.samples_sent += 1;
+        self.samples.write(Sample { sequence: self.samples_sent, reading, fault });
     }
 
-    /// The force [N] that is wanted now: none if nobody has wanted one for too long, or if it is no number.
+    /// Commanded force at a time [N]; zero if it is stale or not finite.
     ///
     /// # Real time
-    pub fn wanted(&mut self) -> DVec3 {
-        let wanted = *self.wanted.read();
-        if wanted.sequence != self.seen {
-            (self.seen, self.seen_at) = (wanted.sequence, Instant::now());
+    /// No allocation, lock or system call.
+    pub fn commanded_force(&mut self, now: Instant) -> DVec3 {
+        let command = *self.commands.read();
+        if command.sequence != self.seen {
+            (self.seen, self.seen_at) = (command.sequence, now);
         }
-        if wanted.force.is_finite() && self.seen_at.elapsed() <= SILENCE { wanted.force } else { DVec3::ZERO }
+        let fresh = now.saturating_duration_since(self.seen_at) <= STALE_AFTER;
+        if command.force.is_finite() && fresh { command.force } else { DVec3::ZERO }
     }
 }
 
@@ -101,21 +119,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_renewed_does_not_count() {
+    fn stale_readings_and_forces_do_not_count() {
         let (mut update, mut driver) = exchange();
-        assert!(update.newest(0.0).is_none(), "nothing was told yet");
+        assert!(update.newest(0.0).is_none(), "nothing was sent yet");
         let reading = Reading { position: DVec3::X, orientation: None, buttons: 1 };
-        driver.tell(reading, 7);
-        let told = update.newest(1.0).expect("it was told");
-        assert_eq!((told.reading, told.fault), (reading, 7));
+        driver.send(reading, 7);
+        let sample = update.newest(1.0).expect("it was sent");
+        assert_eq!((sample.reading, sample.fault), (reading, 7));
         assert!(update.newest(1.019).is_some() && update.newest(1.021).is_none());
 
-        assert_eq!(driver.wanted(), DVec3::ZERO);
-        update.push(DVec3::Y);
-        assert_eq!(driver.wanted(), DVec3::Y);
-        std::thread::sleep(SILENCE + Duration::from_millis(1));
-        assert_eq!(driver.wanted(), DVec3::ZERO, "whoever pushed has gone");
-        update.push(DVec3::NAN);
-        assert_eq!(driver.wanted(), DVec3::ZERO);
+        let now = Instant::now();
+        let later = |millis| now + Duration::from_millis(millis);
+        assert_eq!(driver.commanded_force(now), DVec3::ZERO);
+        update.set_force(DVec3::Y);
+        assert_eq!(driver.commanded_force(now), DVec3::Y);
+        assert_eq!(driver.commanded_force(later(20)), DVec3::Y);
+        assert_eq!(driver.commanded_force(later(21)), DVec3::ZERO, "the haptic update has stopped");
+        update.set_force(DVec3::NAN);
+        assert_eq!(driver.commanded_force(later(21)), DVec3::ZERO);
     }
 }

@@ -1,21 +1,21 @@
-//! Vendors' libraries, loaded when the program runs: nothing of theirs is needed to build.
+//! Vendors' libraries, loaded at run time: none is needed to build.
 
-use crate::error::Error;
+use crate::error::{DeviceError, Error};
 use libloading::Library;
 
-/// A vendor's library: how it is looked for, and what to do when it is not there.
+/// Library of a vendor, and how to find it.
 pub(super) struct Vendor {
-    /// The driver's name.
+    /// Name of the driver.
     pub driver: &'static str,
-    /// File names, the first of which that the system's loader finds is taken.
+    /// File names, in the order in which the system's loader tries them.
     pub files: &'static [&'static str],
-    /// What brings the library.
+    /// Software that brings the library.
     pub software: &'static str,
-    /// The environment variable that names another file.
+    /// Environment variable that names another file.
     pub variable: &'static str,
 }
 
-/// A library that is loaded, and stays so: vendors' threads may outlive whoever opened a device.
+/// Loaded library. It is never unloaded: threads of the vendor may outlive the last device.
 pub(super) struct Loaded {
     library: &'static Library,
     file: String,
@@ -23,10 +23,10 @@ pub(super) struct Loaded {
 }
 
 impl Vendor {
-    /// Load the library from a file, or from where the system looks.
-    pub fn load(&'static self, place: Option<&str>) -> Result<Loaded, Error> {
-        let files = place.map_or(self.files.to_vec(), |place| vec![place]);
-        let mut why = String::new();
+    /// Loads the library from a file, or from the system's search path.
+    pub fn load(&'static self, location: Option<&str>) -> Result<Loaded, Error> {
+        let files = location.map_or(self.files.to_vec(), |file| vec![file]);
+        let mut reason = String::new();
         for file in &files {
             // SAFETY: loading runs the library's initialisers, as it would for any program that is linked with it; which file
             // that is, the vendor's installation or the user says.
@@ -35,36 +35,31 @@ impl Vendor {
                     let library = Box::leak(Box::new(library));
                     return Ok(Loaded { library, file: (*file).to_string(), vendor: self });
                 }
-                Err(error) => why = error.to_string(),
+                Err(error) => reason = error.to_string(),
             }
         }
-        let Self { driver, software, variable, .. } = self;
-        Err(Error::Device(format!(
-            "{driver}: no library could be loaded as {} ({why}): install {software}, or name the library's file in the \
-             environment variable {variable}",
-            files.join(" or ")
-        )))
+        let Self { driver, software, variable, .. } = *self;
+        let files = files.join(" or ");
+        Err(DeviceError::LibraryNotLoaded { driver, files, reason, software, variable }.into())
     }
 }
 
 impl Loaded {
-    /// A function of the library.
+    /// Function of the library.
     ///
     /// # Safety
     /// `F` must be the type of a pointer to the function of that name.
     pub unsafe fn function<F: Copy>(&self, name: &str) -> Result<F, Error> {
         // SAFETY: the caller knows the type; the library is never unloaded, so that the pointer stays good.
         unsafe { self.library.get::<F>(name.as_bytes()) }.map(|found| *found).map_err(|_| {
-            let Vendor { driver, software, .. } = self.vendor;
-            Error::Device(format!(
-                "{driver}: {} has no function {name}: it is not the library of {software}, or an old one",
-                self.file
-            ))
+            let Vendor { driver, software, .. } = *self.vendor;
+            let (file, function) = (self.file.clone(), name.to_string());
+            DeviceError::FunctionMissing { driver, file, function, software }.into()
         })
     }
 }
 
-/// A table of a library's functions, which loads them by their names.
+/// Table of a library's functions, which loads them by name.
 macro_rules! functions {
     ($(#[$doc:meta])* struct $table:ident { $($name:ident: fn($($argument:ty),*) $(-> $result:ty)?,)* }) => {
         $(#[$doc])*

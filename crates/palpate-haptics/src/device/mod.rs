@@ -1,7 +1,7 @@
-//! Devices behind one small interface: a position in, a force out.
+//! Haptic devices behind one interface: position in, force out.
 //!
-//! Every driver speaks SI units in the device's frame as palpate takes it: x to the right of the user, y up, z towards the
-//! user. A [`Mount`] says where that frame is in the world. A [`Driver`] speaks to a real device, through its maker's software.
+//! All quantities are in SI units and in the device frame: x to the right of the user, y up, z towards the user. A [`Mount`] places
+//! that frame in the world. A [`Driver`] talks to a real device through the vendor's software.
 
 mod dhd;
 mod driver;
@@ -9,52 +9,52 @@ mod exchange;
 mod haply;
 mod library;
 mod openhaptics;
-mod scripted;
+mod path;
 mod simulated;
 
-pub use driver::{Driver, Found, discover};
-pub use scripted::Scripted;
-pub use simulated::{Hand, Simulated};
+pub use driver::{DiscoveredDevice, Driver, discover};
+pub use path::PathDevice;
+pub use simulated::{Hand, SimulatedDevice};
 
 use crate::error::Error;
 use glam::{DMat3, DQuat, DVec3};
 use palpate::Pose;
 
-/// What a device reads.
+/// Reading of a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// Interface point [m, device frame].
     pub position: DVec3,
-    /// How the handle is turned, for devices that tell.
+    /// Orientation of the handle, for devices that measure it: device frame from handle.
     pub orientation: Option<DQuat>,
     /// Pressed buttons, one bit each.
     pub buttons: u32,
 }
 
-/// A device that pushes a hand. Calls come from one thread, `read` and `push` in turns.
+/// Haptic device. All calls come from one thread, `read` and `set_force` alternately.
 pub trait Device: Send {
-    /// What it is.
-    fn traits(&self) -> Traits;
+    /// Specification.
+    fn spec(&self) -> DeviceSpec;
 
-    /// Where the hand is now, at a time [s] since the start of all processes.
+    /// Reads the device at a time [s] since the start of all processes.
     ///
     /// # Errors
-    /// When the device can't tell; it is asked again at the next update.
+    /// If the device fails. It is read again at the next update.
     fn read(&mut self, now_s: f64) -> Result<Reading, Error>;
 
-    /// Push the hand with a force [N, device frame] until the next call.
+    /// Commands a force on the hand [N, device frame], held until the next call (zero-order hold).
     ///
     /// # Errors
-    /// When the device can't be reached.
-    fn push(&mut self, force: DVec3, now_s: f64) -> Result<(), Error>;
+    /// If the device can't be reached.
+    fn set_force(&mut self, force: DVec3, now_s: f64) -> Result<(), Error>;
 }
 
-/// What a device is, as its maker tells.
+/// Specification of a device, from its data sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Traits {
-    /// Its kind.
+pub struct DeviceSpec {
+    /// Kind of device.
     pub kind: &'static str,
-    /// Largest force [N] that it gives for long; infinite for one that pushes nobody.
+    /// Largest continuous force [N]; infinite for a device without force feedback.
     pub force_n: f64,
     /// Effective mass at the handle [kg].
     pub mass_kg: f64,
@@ -62,12 +62,12 @@ pub struct Traits {
     pub friction_n: f64,
     /// Viscous damping at the handle [N·s/m].
     pub damping_n_s_m: f64,
-    /// Smallest movement [m] that it tells.
+    /// Resolution of the encoder at the handle [m].
     pub resolution_m: f64,
 }
 
-impl Traits {
-    /// No device: nothing is pushed.
+impl DeviceSpec {
+    /// Specification of no device: without force feedback.
     pub const NONE: Self = Self {
         kind: "none",
         force_n: f64::INFINITY,
@@ -107,21 +107,21 @@ impl Traits {
         resolution_m: 10e-6,
     };
 
-    /// The devices that are known by name.
+    /// Specifications that are known by name.
     pub const KNOWN: [Self; 3] = [Self::TOUCH, Self::OMEGA_3, Self::INVERSE_3];
 
-    /// One of [`Self::KNOWN`].
+    /// Specification of [`Self::KNOWN`] with a kind.
     pub fn named(kind: &str) -> Option<Self> {
-        Self::KNOWN.into_iter().find(|traits| traits.kind == kind)
+        Self::KNOWN.into_iter().find(|spec| spec.kind == kind)
     }
 }
 
-/// Where a device's frame is in the world, and how much larger its movements are there.
+/// Mount: pose of the device frame in the world, and scale of its movements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mount {
-    /// World from device, lengths apart.
+    /// World from device frame, without the scale.
     pub pose: Pose,
-    /// Lengths in the world per length of the device. Forces stay as they are.
+    /// Metres in the world per metre of the device. Forces are not scaled.
     pub scale: f64,
 }
 
@@ -132,62 +132,68 @@ impl Default for Mount {
 }
 
 impl Mount {
-    /// A place [m, world] from one in the device's frame.
+    /// Position [m, world] from one in the device frame [m].
     pub fn world_from_device(&self, position: DVec3) -> DVec3 {
         self.pose.world_from_body(position * self.scale)
     }
 
-    /// A force in the device's frame from one in the world [N].
+    /// Force in the device frame [N] from one in the world [N].
     pub fn device_force(&self, force: DVec3) -> DVec3 {
         self.pose.orientation.inverse() * force
     }
 
-    /// How a handle is turned in the world.
+    /// Orientation in the world from one in the device frame.
     pub fn world_orientation(&self, orientation: DQuat) -> DQuat {
         self.pose.orientation * orientation
     }
 }
 
-/// How a handle is turned, from its axes in a vendor's frame. The handle's own axes are renamed alike, so that one that is not
-/// turned there is not turned here. None for what is no rotation.
-fn handle_turned(axes: DMat3, ours_from_theirs: fn(DVec3) -> DVec3) -> Option<DQuat> {
+/// Orientation of a handle from its axes in a vendor's frame. The handle's axes are permuted like the frame's, so that the identity
+/// stays the identity. `None` if the axes are no rotation.
+fn handle_orientation(axes: DMat3, ours_from_theirs: fn(DVec3) -> DVec3) -> Option<DQuat> {
     let square = axes * axes.transpose() - DMat3::IDENTITY;
-    let rotation = square.to_cols_array().iter().all(|x| x.abs() < NO_ROTATION) && axes.determinant() > 0.0;
+    let rotation =
+        square.to_cols_array().iter().all(|x| x.abs() < ROTATION_TOLERANCE) && axes.determinant() > 0.0;
     if !rotation {
         return None;
     }
-    let turned = DQuat::from_mat3(&axes);
-    quaternion_turned(DVec3::new(turned.x, turned.y, turned.z), turned.w, ours_from_theirs)
+    let q = DQuat::from_mat3(&axes);
+    orientation_from_quaternion(DVec3::new(q.x, q.y, q.z), q.w, ours_from_theirs)
 }
 
-/// The same from a quaternion's vector and scalar.
-fn quaternion_turned(vector: DVec3, scalar: f64, ours_from_theirs: fn(DVec3) -> DVec3) -> Option<DQuat> {
-    let turned = DQuat::from_vec4(ours_from_theirs(vector).extend(scalar));
-    let length = turned.length();
-    ((length - 1.0).abs() < NO_ROTATION).then(|| turned / length)
+/// Orientation of a handle from the vector and scalar part of a quaternion in a vendor's frame; `None` if its length is not 1.
+fn orientation_from_quaternion(
+    vector: DVec3,
+    scalar: f64,
+    ours_from_theirs: fn(DVec3) -> DVec3,
+) -> Option<DQuat> {
+    let q = DQuat::from_vec4(ours_from_theirs(vector).extend(scalar));
+    let length = q.length();
+    ((length - 1.0).abs() < ROTATION_TOLERANCE).then(|| q / length)
 }
 
-/// Farther from a rotation than this (numbers of single precision, and sensors, are off a little) is garbage.
-const NO_ROTATION: f64 = 1e-2;
+/// Largest deviation from a rotation, in any entry of R·Rᵀ − 1 or in a quaternion's length: single precision and sensors are off a
+/// little, anything else is garbage.
+const ROTATION_TOLERANCE: f64 = 1e-2;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_mount_turns_places_and_turns_forces_back() {
+    fn a_mount_transforms_positions_forwards_and_forces_back() {
         let quarter = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
         let mount = Mount { pose: Pose { position: DVec3::X, orientation: quarter }, scale: 2.0 };
-        let place = mount.world_from_device(DVec3::new(0.1, 0.0, 0.0));
-        assert!((place - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-15, "{place}");
+        let position = mount.world_from_device(DVec3::new(0.1, 0.0, 0.0));
+        assert!((position - DVec3::new(1.0, 0.2, 0.0)).length() < 1e-15, "{position}");
         let force = mount.device_force(DVec3::Y);
         assert!((force - DVec3::X).length() < 1e-15, "{force}");
     }
 
     #[test]
-    fn axes_that_are_renamed_turn_handles_alike_and_garbage_does_not() {
+    fn permuted_axes_permute_rotations_and_garbage_is_refused() {
         // A quarter turn about their x, which is our z.
-        let turned = handle_turned(DMat3::from_rotation_x(1.0), |v| DVec3::new(v.y, v.z, v.x));
+        let turned = handle_orientation(DMat3::from_rotation_x(1.0), |v| DVec3::new(v.y, v.z, v.x));
         assert!(
             turned.is_some_and(|turned| turned.angle_between(DQuat::from_rotation_z(1.0)) < 1e-12),
             "{turned:?}"
@@ -198,13 +204,13 @@ mod tests {
             DMat3::IDENTITY * 2.0,
             DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)),
         ];
-        assert!(garbage.into_iter().all(|axes| handle_turned(axes, |v| v).is_none()));
-        assert_eq!(quaternion_turned(DVec3::NAN, 1.0, |v| v), None);
+        assert!(garbage.into_iter().all(|axes| handle_orientation(axes, |v| v).is_none()));
+        assert_eq!(orientation_from_quaternion(DVec3::NAN, 1.0, |v| v), None);
     }
 
     #[test]
     fn known_devices_are_found_by_name() {
-        assert_eq!(Traits::named("omega.3").map(|traits| traits.force_n), Some(12.0));
-        assert_eq!(Traits::named("nobody"), None);
+        assert_eq!(DeviceSpec::named("omega.3").map(|spec| spec.force_n), Some(12.0));
+        assert_eq!(DeviceSpec::named("nobody"), None);
     }
 }

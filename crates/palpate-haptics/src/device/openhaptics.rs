@@ -1,15 +1,15 @@
-//! 3D Systems devices by OpenHaptics, the successor of the paper's GHOST, loaded at run time.
+//! 3D Systems devices, through OpenHaptics (the successor of the paper's GHOST), loaded at run time.
 //!
-//! Its frame is ours (x to the right, y up, z towards the user), in millimetres and newtons. Devices may be asked and pushed in
-//! frames only, which its scheduler's thread makes, 1000 a second: a frame leaves what it read for the haptic update, and sends
-//! the newest force that the haptic update wants ([`exchange`](super::exchange)). One scheduler serves all devices of a process;
-//! it stands still for a moment when one is opened or left. Devices must have been calibrated with the vendor's tools.
+//! The vendor's frame is the device frame (x to the right, y up, z towards the user), in millimetres and newtons. Devices may be read
+//! and commanded within frames only, which the library's scheduler thread makes at 1 kHz. A frame passes its reading to the haptic
+//! update and takes the newest force from it (see [`exchange`](super::exchange)). One scheduler serves all devices of a process; it
+//! is stopped while a device is opened or closed. Devices must have been calibrated with the vendor's tools.
 
-use super::driver::Found;
-use super::exchange::{DriverEnd, UpdateEnd, exchange};
+use super::driver::DiscoveredDevice;
+use super::exchange::{DriverSide, UpdateSide, exchange};
 use super::library::{Vendor, functions};
-use super::{Device, Reading, Traits, handle_turned};
-use crate::error::Error;
+use super::{Device, DeviceSpec, Reading, handle_orientation};
+use crate::error::{DeviceError, Error};
 use glam::{DMat3, DVec3};
 use std::ffi::{CStr, CString, c_char, c_double, c_int, c_uint, c_ulong, c_ushort, c_void};
 use std::ptr::null;
@@ -24,13 +24,13 @@ pub(super) static VENDOR: Vendor = Vendor {
     variable: "PALPATE_LIBHD",
 };
 
-/// The constants of hdDefines.h that are used.
+/// Constants of hdDefines.h.
 mod hd {
     use super::{c_uint, c_ushort};
 
     pub const SUCCESS: c_uint = 0;
     pub const INVALID_HANDLE: c_uint = 0xFFFF_FFFF;
-    /// Errors from here to below [`FIRST_DEVICE_ERROR`] are of forces: too large, motors too warm. The position is good.
+    /// Errors from here to below [`FIRST_DEVICE_ERROR`] concern forces: too large, motors too warm. The position is valid.
     pub const FIRST_FORCE_ERROR: c_uint = 0x0200;
     pub const FIRST_DEVICE_ERROR: c_uint = 0x0300;
     pub const CURRENT_BUTTONS: c_uint = 0x2000;
@@ -45,16 +45,16 @@ mod hd {
     pub const CALLBACK_CONTINUE: c_uint = 1;
 }
 
-/// Metres in a millimetre.
-const METRE: f64 = 1e-3;
+/// Millimetre [m].
+const MILLIMETRE: f64 = 1e-3;
 
-/// A last frame, without force, is waited for so long.
-const LAST_FRAME: Duration = Duration::from_millis(100);
+/// Timeout for the last frame, which commands zero force.
+const LAST_FRAME_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// The library remembers no more errors than these at once.
-const MOST_ERRORS: usize = 64;
+/// Size of the library's error stack.
+const MAX_ERRORS: usize = 64;
 
-/// An error of the library's stack.
+/// Error of the library's stack.
 #[repr(C)]
 #[derive(Clone, Copy)]
 struct ErrorInfo {
@@ -66,7 +66,7 @@ struct ErrorInfo {
 type Callback = unsafe extern "C" fn(*mut c_void) -> c_uint;
 
 functions! {
-    /// What is called of the library (hdDevice.h, hdScheduler.h).
+    /// Functions of the library (hdDevice.h, hdScheduler.h).
     struct Functions {
         hdInitDevice: fn(*const c_char) -> c_uint,
         hdDisableDevice: fn(c_uint),
@@ -88,112 +88,117 @@ functions! {
     }
 }
 
-/// Devices that the scheduler serves; held while one is opened or left.
-static SERVED: Mutex<usize> = Mutex::new(0);
+/// Number of devices on the scheduler; locked while one is opened or closed.
+static SCHEDULED: Mutex<usize> = Mutex::new(0);
 
-/// An open device.
+/// Open device.
 pub(super) struct OpenHaptics {
     functions: Functions,
-    end: UpdateEnd,
+    exchange: UpdateSide,
     flags: Arc<Flags>,
-    served: Served,
-    traits: Traits,
+    scheduled: Scheduled,
+    spec: DeviceSpec,
 }
 
+/// Shutdown handshake between the device and its servo.
 #[derive(Default)]
 struct Flags {
+    /// Set by the device: the next frame is the last.
     ending: AtomicBool,
+    /// Set by the servo in its last frame.
     ended: AtomicBool,
 }
 
-/// What the scheduler holds of a device.
-struct Served {
+/// Device on the scheduler.
+struct Scheduled {
     device: c_uint,
     handle: c_ulong,
     servo: *mut Servo,
 }
 
-// SAFETY: the pointer is only used by the scheduler's thread, until that has ended with it.
-unsafe impl Send for Served {}
+// SAFETY: only the scheduler's thread uses the pointer, until it has ended with it.
+unsafe impl Send for Scheduled {}
 
-/// What a frame works with, in the scheduler's thread.
+/// Servo of a device: the state of its frames, in the scheduler's thread.
 struct Servo {
     functions: Functions,
     device: c_uint,
-    end: DriverEnd,
+    exchange: DriverSide,
     flags: Arc<Flags>,
 }
 
-/// What is there: the library opens devices by the names of their configurations and lists none, so the default one is tried.
-pub(super) fn find(place: Option<&str>) -> Result<Vec<Found>, Error> {
-    let functions = Functions::of(&VENDOR.load(place)?)?;
-    let served = serve();
-    functions.pause(*served);
+/// Connected devices: the default one. The library opens devices by the names of their configurations, and lists none.
+pub(super) fn find(location: Option<&str>) -> Result<Vec<DiscoveredDevice>, Error> {
+    let functions = Functions::of(&VENDOR.load(location)?)?;
+    let scheduled = lock_scheduled();
+    functions.pause(*scheduled);
     let found = functions.init("0").map(|(found, device)| {
         // SAFETY: the device was opened above, and is not used after.
         unsafe { (functions.hdDisableDevice)(device) };
         found
     });
-    functions.resume(*served)?;
+    functions.resume(*scheduled)?;
     Ok(vec![found?])
 }
 
-/// Open one.
-pub(super) fn open(which: &str, place: Option<&str>) -> Result<(Found, OpenHaptics), Error> {
-    let functions = Functions::of(&VENDOR.load(place)?)?;
-    let mut served = serve();
-    functions.pause(*served);
+/// Opens a device by the name of its configuration; "0" is the default one.
+pub(super) fn open(which: &str, location: Option<&str>) -> Result<(DiscoveredDevice, OpenHaptics), Error> {
+    let functions = Functions::of(&VENDOR.load(location)?)?;
+    let mut scheduled = lock_scheduled();
+    functions.pause(*scheduled);
     let opened = functions.schedule(which);
-    *served += usize::from(opened.is_ok());
-    let resumed = functions.resume(*served);
-    // What was opened is left again if the scheduler does not run, which needs the lock.
-    drop(served);
+    *scheduled += usize::from(opened.is_ok());
+    let resumed = functions.resume(*scheduled);
+    // If the scheduler does not run, the device is dropped below, which takes the lock.
+    drop(scheduled);
     let opened = opened?;
     resumed.map(|()| opened)
 }
 
-fn serve() -> MutexGuard<'static, usize> {
-    SERVED.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock_scheduled() -> MutexGuard<'static, usize> {
+    SCHEDULED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Functions {
-    /// Let the scheduler stand still, if it serves devices.
-    fn pause(&self, served: usize) {
-        if served > 0 {
+    /// Stops the scheduler, if it has devices.
+    fn pause(&self, scheduled: usize) {
+        if scheduled > 0 {
             // SAFETY: a plain call.
             unsafe { (self.hdStopScheduler)() };
         }
     }
 
-    /// Let it run again, if it serves devices.
-    fn resume(&self, served: usize) -> Result<(), Error> {
-        if served == 0 {
+    /// Starts the scheduler, if it has devices.
+    fn resume(&self, scheduled: usize) -> Result<(), Error> {
+        if scheduled == 0 {
             return Ok(());
         }
-        self.errors();
+        self.pop_errors();
         // SAFETY: a plain call.
         unsafe { (self.hdStartScheduler)() };
-        self.check("openhaptics: the scheduler does not start")
+        self.check("the scheduler does not start")
     }
 
-    /// Open a device and ask it what it is. Gives its handle.
-    fn init(&self, which: &str) -> Result<(Found, c_uint), Error> {
-        let name = CString::new(which)
-            .map_err(|_| Error::Device(format!("openhaptics: {which:?} is no name of a configuration")))?;
-        self.errors();
+    /// Opens a device. Returns its description and handle.
+    fn init(&self, which: &str) -> Result<(DiscoveredDevice, c_uint), Error> {
+        let name = CString::new(which).map_err(|_| DeviceError::NoDevice {
+            driver: "openhaptics",
+            message: format!("{which:?} is no name of a configuration"),
+        })?;
+        self.pop_errors();
         let default = which == "0";
-        // SAFETY: the name ends with 0 and outlives the call; none means the default device.
+        // SAFETY: the name ends with 0 and outlives the call; a null pointer means the default device.
         let device = unsafe { (self.hdInitDevice)(if default { null() } else { name.as_ptr() }) };
         let what = if default { "the default device".to_string() } else { format!("the device {which:?}") };
-        self.check(&format!("openhaptics: {what} can't be had"))?;
+        self.check(&format!("{what} can't be had"))?;
         if device == hd::INVALID_HANDLE {
-            return Err(Error::Device(format!(
-                "openhaptics: there is no {}: connect it, and name it with the vendor's setup program",
-                what.trim_start_matches("the ")
-            )));
+            let what = what.trim_start_matches("the ");
+            let message =
+                format!("there is no {what}: connect it, and name it with the vendor's setup program");
+            return Err(DeviceError::NoDevice { driver: "openhaptics", message }.into());
         }
         let mut force = f64::NAN;
-        // SAFETY: the device is open and current; a force is one number, whose place outlives the call.
+        // SAFETY: the device is open and current; a force is one number, whose memory outlives the call.
         let (name, serial) = unsafe {
             (self.hdGetDoublev)(hd::NOMINAL_MAX_CONTINUOUS_FORCE, &raw mut force);
             (
@@ -201,42 +206,42 @@ impl Functions {
                 text((self.hdGetString)(hd::DEVICE_SERIAL_NUMBER)),
             )
         };
-        self.errors();
+        self.pop_errors();
         let force_n = (force.is_finite() && force > 0.0).then_some(force);
         let name = name.unwrap_or_else(|| "a device".into());
-        Ok((Found { name, index: 0, serial, force_n, why_not: None }, device))
+        Ok((DiscoveredDevice { name, index: 0, serial, force_n, unavailable: None }, device))
     }
 
-    /// Open a device and put it on the scheduler.
-    fn schedule(&self, which: &str) -> Result<(Found, OpenHaptics), Error> {
+    /// Opens a device and schedules its servo.
+    fn schedule(&self, which: &str) -> Result<(DiscoveredDevice, OpenHaptics), Error> {
         let (found, device) = self.init(which)?;
         // SAFETY: the device is open and current.
         unsafe { (self.hdEnable)(hd::FORCE_OUTPUT) };
-        let (end, driver) = exchange();
+        let (exchange, driver) = exchange();
         let flags = Arc::new(Flags::default());
-        let servo = Servo { functions: *self, device, end: driver, flags: flags.clone() };
+        let servo = Servo { functions: *self, device, exchange: driver, flags: flags.clone() };
         let servo = Box::into_raw(Box::new(servo));
         // SAFETY: the callback gets its servo, which stays until the scheduler has ended with it.
         let handle =
             unsafe { (self.hdScheduleAsynchronous)(frame, servo.cast(), hd::MAX_SCHEDULER_PRIORITY) };
-        if let Err(error) = self.check("openhaptics: the scheduler does not take the device") {
-            // SAFETY: the scheduler has not taken the servo, and stands still; the device is not used after.
+        if let Err(error) = self.check("the scheduler does not take the device") {
+            // SAFETY: the scheduler is stopped and has not taken the servo; the device is not used after.
             unsafe {
                 drop(Box::from_raw(servo));
                 (self.hdDisableDevice)(device);
             }
             return Err(error);
         }
-        let force_n = found.force_n.unwrap_or(Traits::TOUCH.force_n);
-        let traits = Traits { kind: "openhaptics", force_n, ..Traits::TOUCH };
-        let served = Served { device, handle, servo };
-        Ok((found, OpenHaptics { functions: *self, end, flags, served, traits }))
+        let force_n = found.force_n.unwrap_or(DeviceSpec::TOUCH.force_n);
+        let spec = DeviceSpec { kind: "openhaptics", force_n, ..DeviceSpec::TOUCH };
+        let scheduled = Scheduled { device, handle, servo };
+        Ok((found, OpenHaptics { functions: *self, exchange, flags, scheduled, spec }))
     }
 
-    /// Empty the stack of errors; gives the first that came, which explains the others, or success.
-    fn errors(&self) -> c_uint {
+    /// Empties the error stack. Returns the oldest error, which caused the others, or success.
+    fn pop_errors(&self) -> c_uint {
         let mut first = hd::SUCCESS;
-        for _ in 0..MOST_ERRORS {
+        for _ in 0..MAX_ERRORS {
             // SAFETY: a plain call; the newest error comes first.
             match unsafe { (self.hdGetError)() }.code {
                 hd::SUCCESS => break,
@@ -246,41 +251,43 @@ impl Functions {
         first
     }
 
-    fn check(&self, what: &str) -> Result<(), Error> {
-        match self.errors() {
+    /// Error of the calls since the last check, if there was one.
+    fn check(&self, call: &str) -> Result<(), Error> {
+        match self.pop_errors() {
             hd::SUCCESS => Ok(()),
-            code => Err(self.failed(what, code)),
+            code => Err(self.call_error(call, code)),
         }
     }
 
-    fn failed(&self, what: &str, code: c_uint) -> Error {
+    fn call_error(&self, call: &str, code: c_uint) -> Error {
         // SAFETY: a plain call; it gives a text of the library's.
-        let why = text(unsafe { (self.hdGetErrorString)(code) }).unwrap_or_default();
-        Error::Device(format!("{what}: {why} (error {code:#06x})"))
+        let message = text(unsafe { (self.hdGetErrorString)(code) }).unwrap_or_default();
+        let reason = format!("{message} (error {code:#06x})");
+        DeviceError::Call { driver: "openhaptics", call: call.to_string(), reason }.into()
     }
 }
 
-/// A text of the library's, if there is one.
+/// Text from the library; `None` if it is null or empty.
 fn text(text: *const c_char) -> Option<String> {
     // SAFETY: the library gives texts that end with 0 and stay, or nothing.
     let text = (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned());
     text.filter(|text| !text.is_empty())
 }
 
-/// A frame, by the scheduler.
+/// Callback of the scheduler: one frame of a servo.
 unsafe extern "C" fn frame(servo: *mut c_void) -> c_uint {
     // SAFETY: it was scheduled with a servo, which stays until `ended` is set, and which nobody else uses.
     unsafe { &mut *servo.cast::<Servo>() }.frame()
 }
 
 impl Servo {
-    /// Read, push, tell.
+    /// Frame: reads the device, commands the newest force, sends the reading.
     ///
     /// # Real time
-    /// No allocation or lock but the library's.
+    /// No allocation or lock except the library's.
     fn frame(&mut self) -> c_uint {
         let ending = self.flags.ending.load(Ordering::Acquire);
-        let force = if ending { DVec3::ZERO } else { self.end.wanted() };
+        let force = if ending { DVec3::ZERO } else { self.exchange.commanded_force(Instant::now()) };
         let (mut columns, mut buttons) = ([f64::NAN; 16], 0);
         // SAFETY: calls of a frame with an open device; a transform is 16 numbers, a force 3, and all outlive the calls.
         unsafe {
@@ -291,13 +298,13 @@ impl Servo {
             (self.functions.hdEndFrame)(self.device);
         }
         let column = |at: usize| DVec3::from_slice(&columns[at..at + 3]);
-        let turned = DMat3::from_cols(column(0), column(4), column(8));
+        let axes = DMat3::from_cols(column(0), column(4), column(8));
         let reading = Reading {
-            position: column(12) * METRE,
-            orientation: handle_turned(turned, |v| v),
+            position: column(12) * MILLIMETRE,
+            orientation: handle_orientation(axes, |v| v),
             buttons: buttons as u32,
         };
-        self.end.tell(reading, self.functions.errors());
+        self.exchange.send(reading, self.functions.pop_errors());
         if ending {
             self.flags.ended.store(true, Ordering::Release);
             return hd::CALLBACK_DONE;
@@ -307,32 +314,35 @@ impl Servo {
 }
 
 impl OpenHaptics {
-    /// Errors of forces spoil no reading, and other ones no force.
-    fn force_fault(code: c_uint) -> bool {
+    /// Whether a fault concerns the force. Such a fault leaves the reading valid, any other one the force.
+    fn is_force_fault(code: c_uint) -> bool {
         (hd::FIRST_FORCE_ERROR..hd::FIRST_DEVICE_ERROR).contains(&code)
     }
 }
 
 impl Device for OpenHaptics {
-    fn traits(&self) -> Traits {
-        self.traits
+    fn spec(&self) -> DeviceSpec {
+        self.spec
     }
 
     fn read(&mut self, now_s: f64) -> Result<Reading, Error> {
-        match self.end.newest(now_s) {
-            None => Err(Error::Device("openhaptics: the scheduler makes no frames".into())),
-            Some(told) if told.fault != hd::SUCCESS && !Self::force_fault(told.fault) => {
-                Err(self.functions.failed("openhaptics: the device does not tell where it is", told.fault))
+        match self.exchange.newest(now_s) {
+            None => {
+                let reason = "the scheduler makes no frames".to_string();
+                Err(DeviceError::Silent { driver: "openhaptics", reason }.into())
             }
-            Some(told) => Ok(told.reading),
+            Some(sample) if sample.fault != hd::SUCCESS && !Self::is_force_fault(sample.fault) => {
+                Err(self.functions.call_error("the device reports no position", sample.fault))
+            }
+            Some(sample) => Ok(sample.reading),
         }
     }
 
-    fn push(&mut self, force: DVec3, now_s: f64) -> Result<(), Error> {
-        self.end.push(force);
-        match self.end.newest(now_s) {
-            Some(told) if Self::force_fault(told.fault) => {
-                Err(self.functions.failed("openhaptics: the force was not given", told.fault))
+    fn set_force(&mut self, force: DVec3, now_s: f64) -> Result<(), Error> {
+        self.exchange.set_force(force);
+        match self.exchange.newest(now_s) {
+            Some(sample) if Self::is_force_fault(sample.fault) => {
+                Err(self.functions.call_error("the force was not given", sample.fault))
             }
             _ => Ok(()),
         }
@@ -341,16 +351,16 @@ impl Device for OpenHaptics {
 
 impl Drop for OpenHaptics {
     fn drop(&mut self) {
-        let Self { functions, flags, served: Served { device, handle, servo }, .. } = self;
-        // The last frame carries no force.
+        let Self { functions, flags, scheduled: Scheduled { device, handle, servo }, .. } = self;
+        // The last frame commands zero force.
         flags.ending.store(true, Ordering::Release);
-        let patience = Instant::now() + LAST_FRAME;
-        while !flags.ended.load(Ordering::Acquire) && Instant::now() < patience {
+        let deadline = Instant::now() + LAST_FRAME_TIMEOUT;
+        while !flags.ended.load(Ordering::Acquire) && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(1));
         }
         let ended = flags.ended.load(Ordering::Acquire);
-        let mut served = serve();
-        // SAFETY: the device is open and not used after; the scheduler stands still while it is left.
+        let mut scheduled = lock_scheduled();
+        // SAFETY: the device is open and not used after; the scheduler is stopped while it is closed.
         unsafe {
             (functions.hdStopScheduler)();
             if !ended {
@@ -360,12 +370,11 @@ impl Drop for OpenHaptics {
             (functions.hdDisable)(hd::FORCE_OUTPUT);
             (functions.hdDisableDevice)(*device);
         }
-        *served -= 1;
-        // If it does not run again, the other devices fall silent and say so.
-        let _ = functions.resume(*served);
+        *scheduled -= 1;
+        // If the scheduler does not start again, the other devices report that they are silent.
+        let _ = functions.resume(*scheduled);
         if ended {
-            // SAFETY: the scheduler has said that it is done with the servo, and nobody else has it. A scheduler that hangs may
-            // still come to it: then it is left where it is.
+            // SAFETY: the servo has ended, and nobody else has it. A scheduler that hangs may still call it: then it is leaked.
             drop(unsafe { Box::from_raw(*servo) });
         }
     }

@@ -1,9 +1,9 @@
-//! Both ends of a link prove to each other that they know one secret.
+//! Mutual authentication of both ends of a link by a shared secret.
 //!
-//! An Ed25519 key is derived from the secret, and one certificate from the key: the same on both ends. TLS 1.3 lets each end
-//! prove that it has the key; here it is checked that the certificate is the own one.
+//! An Ed25519 key is derived from the secret, and a self-signed certificate from the key: the same on both ends. In TLS 1.3 each end
+//! proves that it has the key; the verifier here accepts this one certificate only (certificate pinning).
 
-use crate::error::Error;
+use crate::error::{Error, LinkError};
 use quinn::rustls;
 use rcgen::{CertificateParams, KeyPair, SerialNumber};
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
@@ -15,17 +15,17 @@ use std::fmt;
 use std::net::IpAddr;
 use std::sync::Arc;
 
-/// The name in the certificate; nobody looks at it.
+/// Name in the certificate; it is not checked.
 const NAME: &str = "palpate";
 
-/// Shortest secret between machines, in bytes.
-const SHORTEST: usize = 12;
+/// Shortest secret [bytes].
+const MIN_SECRET: usize = 12;
 
-/// Before a seed, an Ed25519 key in PKCS #8 (RFC 8410).
+/// Prefix that makes a seed an Ed25519 key in PKCS #8 (RFC 8410).
 const ED25519_PKCS8: [u8; 16] =
     [0x30, 0x2e, 0x02, 0x01, 0x00, 0x30, 0x05, 0x06, 0x03, 0x2b, 0x65, 0x70, 0x04, 0x22, 0x04, 0x20];
 
-/// What both ends of a link know.
+/// Secret that both ends of a link share.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub struct Secret(Vec<u8>);
 
@@ -36,39 +36,33 @@ impl fmt::Debug for Secret {
 }
 
 impl Secret {
-    /// From a text, without the white space around it.
+    /// Secret from a text, without surrounding white space.
     ///
     /// # Errors
-    /// When it is short enough to be guessed.
+    /// If it has less than 12 bytes, and could be guessed.
     pub fn new(text: &str) -> Result<Self, Error> {
         let text = text.trim();
-        if text.len() < SHORTEST {
-            return Err(Error::Setup(format!(
-                "the secret has {} bytes, expected at least {SHORTEST}: `openssl rand -hex 16` makes a good one",
-                text.len()
-            )));
+        if text.len() < MIN_SECRET {
+            return Err(LinkError::SecretTooShort { bytes: text.len() }.into());
         }
         Ok(Self(text.as_bytes().to_vec()))
     }
 
-    /// None: for processes on one machine.
+    /// Empty secret, for processes on one machine.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// Refuse an address that others can reach without a secret.
+    /// Refuses an address that other machines can reach, if the secret is empty.
     pub(super) fn check(&self, address: IpAddr) -> Result<(), Error> {
         if self.0.is_empty() && !address.is_loopback() {
-            return Err(Error::Setup(format!(
-                "{address} is reached from other machines: a link there needs a secret"
-            )));
+            return Err(LinkError::SecretRequired { address }.into());
         }
         Ok(())
     }
 
     fn identity(&self) -> Result<Identity, Error> {
-        let failed =
-            |error: rcgen::Error| Error::Setup(format!("no certificate can be made for the link: {error}"));
+        let failed = |error: rcgen::Error| LinkError::Certificate { reason: error.to_string() };
         let seed = blake3::derive_key("palpate 2026-11-22 link identity v1", &self.0);
         let key = PrivatePkcs8KeyDer::from([&ED25519_PKCS8[..], &seed].concat());
         let pair = KeyPair::try_from(&key).map_err(failed)?;
@@ -79,59 +73,58 @@ impl Secret {
         Ok(Identity {
             certificate: certificate.clone(),
             key: key.into(),
-            same: Arc::new(Same { certificate, provider }),
+            verifier: Arc::new(PinnedCertificate { certificate, provider }),
         })
     }
 
-    /// The force process's side.
+    /// TLS settings of the server.
     pub(super) fn server(&self) -> Result<rustls::ServerConfig, Error> {
-        let Identity { certificate, key, same } = self.identity()?;
-        let config = rustls::ServerConfig::builder_with_provider(same.provider.clone())
+        let Identity { certificate, key, verifier } = self.identity()?;
+        let config = rustls::ServerConfig::builder_with_provider(verifier.provider.clone())
             .with_protocol_versions(&[&rustls::version::TLS13])
             .and_then(|builder| {
-                builder.with_client_cert_verifier(same).with_single_cert(vec![certificate], key)
+                builder.with_client_cert_verifier(verifier).with_single_cert(vec![certificate], key)
             });
-        let mut config =
-            config.map_err(|error| Error::Setup(format!("the link can't be encrypted: {error}")))?;
+        let mut config = config.map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
         config.alpn_protocols = vec![PROTOCOL.to_vec()];
         Ok(config)
     }
 
-    /// The device's side.
+    /// TLS settings of the client.
     pub(super) fn client(&self) -> Result<rustls::ClientConfig, Error> {
-        let Identity { certificate, key, same } = self.identity()?;
-        let config = rustls::ClientConfig::builder_with_provider(same.provider.clone())
+        let Identity { certificate, key, verifier } = self.identity()?;
+        let config = rustls::ClientConfig::builder_with_provider(verifier.provider.clone())
             .with_protocol_versions(&[&rustls::version::TLS13])
             .and_then(|builder| {
                 builder
                     .dangerous()
-                    .with_custom_certificate_verifier(same)
+                    .with_custom_certificate_verifier(verifier)
                     .with_client_auth_cert(vec![certificate], key)
             });
-        let mut config =
-            config.map_err(|error| Error::Setup(format!("the link can't be encrypted: {error}")))?;
+        let mut config = config.map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
         config.alpn_protocols = vec![PROTOCOL.to_vec()];
         Ok(config)
     }
 }
 
-/// The protocol and its version, as TLS negotiates it.
+/// Protocol and version, negotiated by TLS (ALPN).
 const PROTOCOL: &[u8] = b"palpate-link/1";
 
+/// Certificate and key of both ends, with the verifier of the other end's.
 struct Identity {
     certificate: CertificateDer<'static>,
     key: PrivateKeyDer<'static>,
-    same: Arc<Same>,
+    verifier: Arc<PinnedCertificate>,
 }
 
-/// Accepts the own certificate only, from who has its key.
+/// Verifier that accepts one certificate only, from an end that has its key.
 #[derive(Debug)]
-struct Same {
+struct PinnedCertificate {
     certificate: CertificateDer<'static>,
     provider: Arc<CryptoProvider>,
 }
 
-impl Same {
+impl PinnedCertificate {
     fn check(&self, other: &CertificateDer<'_>) -> Result<(), rustls::Error> {
         let same = *other == self.certificate;
         same.then_some(()).ok_or(CertificateError::ApplicationVerificationFailure.into())
@@ -146,13 +139,13 @@ impl Same {
         verify_tls13_signature(message, certificate, signed, &self.provider.signature_verification_algorithms)
     }
 
-    /// TLS 1.2 is not offered.
+    /// Refuses TLS 1.2, which is not offered.
     fn refuse(&self) -> Result<HandshakeSignatureValid, rustls::Error> {
         Err(rustls::Error::General("TLS 1.3 only".to_string()))
     }
 }
 
-impl ServerCertVerifier for Same {
+impl ServerCertVerifier for PinnedCertificate {
     fn verify_server_cert(
         &self,
         certificate: &CertificateDer<'_>,
@@ -187,7 +180,7 @@ impl ServerCertVerifier for Same {
     }
 }
 
-impl ClientCertVerifier for Same {
+impl ClientCertVerifier for PinnedCertificate {
     fn root_hint_subjects(&self) -> &[DistinguishedName] {
         &[]
     }

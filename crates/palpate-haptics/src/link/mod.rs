@@ -1,12 +1,13 @@
-//! Devices on other machines, or in other processes: QUIC datagrams, encrypted, between two ends that know one secret.
+//! Links to devices in other processes or on other machines: encrypted QUIC datagrams between two ends that share a secret.
 //!
-//! A device's end sends its motions as they come; the force process's end sends every effort on as soon as it is there. Whatever is lost
-//! is lost: the next one is newer. What is late, doubled or out of order is told by its sequence and passed over. An end that hears
-//! nothing more begins anew, as often as it takes.
+//! The client sends the motions of a device, the server the efforts of the force process. A lost datagram is not sent again: the next
+//! one is newer. Late, duplicate and reordered datagrams are recognised by their sequence numbers and dropped. A broken link is
+//! connected again, as often as needed.
 
 mod client;
 mod identity;
 mod messages;
+mod sequence;
 mod server;
 mod transport;
 
@@ -17,7 +18,7 @@ pub use server::{LinkCounts, LinkServer};
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What was left by a thread that ended by a bug is still what it was.
+/// Locks a mutex, also after a panic of another thread: all guarded values are replaced whole.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,11 +1,12 @@
-//! The force process's end of links.
+//! Server: the force process's end of links.
 
 use super::identity::Secret;
 use super::lock;
 use super::messages::{Hello, Welcome, effort_bytes, motion};
+use super::sequence::SequenceFilter;
 use super::transport::transport;
 use crate::clock::Clock;
-use crate::error::Error;
+use crate::error::{Error, LinkError};
 use crate::port::{DevicePort, Effort};
 use crate::scheduling::Scheduling;
 use quinn::crypto::rustls::QuicServerConfig;
@@ -19,33 +20,33 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use triple_buffer::Output;
 
-/// Efforts are looked for this share of a step after it is due: a step that takes longer is answered a step later.
-const AFTER: f64 = 0.2;
+/// Phase at which efforts are sent, as a share of the step after its deadline. The effort of a longer step is sent a step later.
+const SEND_PHASE: f64 = 0.2;
 
-/// Real-time priority of the answers: below the force process and the haptic updates.
+/// Real-time priority of the sending thread: below the force process and the haptic updates.
 const PRIORITY: u8 = 60;
 
-/// A device must say which it is within this.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Timeout of a device's greeting.
+const GREETING_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The longest greeting [bytes].
-const LONGEST_HELLO: usize = 1024;
+/// Largest greeting [bytes].
+const MAX_HELLO: usize = 1024;
 
-/// More devices than these at once are no scene's.
-const MOST_CONNECTIONS: usize = 64;
+/// Largest number of connections at once.
+const MAX_CONNECTIONS: usize = 64;
 
-/// What came over all links.
+/// Counters of a link server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkCounts {
-    /// Devices that came, again after a cut too.
+    /// Accepted connections, reconnections included.
     pub connected: u64,
-    /// Those that were refused: a wrong secret, a name that is not one, a device that is taken.
+    /// Refused connections: another secret, an unknown device, a device that is connected already.
     pub refused: u64,
-    /// Motions that were taken.
+    /// Accepted motions.
     pub motions: u64,
-    /// Motions that were not newer than the last: doubled, or late.
+    /// Dropped motions: duplicate or late.
     pub old: u64,
-    /// Datagrams that were no motions.
+    /// Datagrams that are no motions.
     pub garbage: u64,
 }
 
@@ -58,38 +59,40 @@ struct Counters {
     garbage: AtomicU64,
 }
 
-/// The ports that no device has now, by their devices' names; the devices that have one; all names.
-struct Seats {
+/// Device slots of a server.
+struct DeviceSlots {
+    /// Ports of devices without a connection, by name.
     free: Mutex<HashMap<String, DevicePort>>,
-    taken: Mutex<HashMap<String, Taken>>,
+    /// Connected devices, by name.
+    connected: Mutex<HashMap<String, ConnectedDevice>>,
     names: Vec<String>,
     counters: Counters,
     start: Instant,
 }
 
-/// A device that has a port: where its efforts come from and go to.
-struct Taken {
+/// Connected device: source and destination of its efforts.
+struct ConnectedDevice {
     efforts: Output<Effort>,
     connection: Connection,
-    /// The newest that was sent.
+    /// Sequence number of the newest effort that was sent.
     sent: u64,
 }
 
-/// Listens for devices. It stops when it is dropped.
+/// Server that listens for devices, until it is dropped.
 pub struct LinkServer {
     runtime: Option<Runtime>,
     endpoint: Endpoint,
-    seats: Arc<Seats>,
-    over: Arc<AtomicBool>,
-    answering: Option<JoinHandle<()>>,
+    slots: Arc<DeviceSlots>,
+    stop: Arc<AtomicBool>,
+    sending: Option<JoinHandle<()>>,
 }
 
 impl LinkServer {
-    /// Listen at an address for devices of these names. Times count from `start`; a force process with a period of `step_s` [s]
-    /// is answering, whose efforts are sent on right after they are there.
+    /// Server at an address for devices with names and ports. Times count from `start`. Efforts are sent 0.2·`step_s` after each
+    /// deadline of the force process, whose period is `step_s` [s].
     ///
     /// # Errors
-    /// When it is an address that others can reach and there is no secret; when the system does not let it listen there.
+    /// If other machines can reach the address and there is no secret, or the system refuses to bind it.
     pub fn new(
         address: SocketAddr,
         secret: &Secret,
@@ -97,9 +100,9 @@ impl LinkServer {
         (start, step_s): (Instant, f64),
     ) -> Result<Self, Error> {
         secret.check(address.ip())?;
-        let failed = |error: std::io::Error| Error::Setup(format!("cannot listen at {address}: {error}"));
+        let failed = |error: std::io::Error| LinkError::Bind { address, reason: error.to_string() };
         let crypto = QuicServerConfig::try_from(secret.server()?)
-            .map_err(|error| Error::Setup(format!("the link can't be encrypted: {error}")))?;
+            .map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
         let mut config = ServerConfig::with_crypto(Arc::new(crypto));
         config.transport_config(transport());
         let runtime = runtime()?;
@@ -111,31 +114,35 @@ impl LinkServer {
         };
         let names = ports.iter().map(|(name, _)| name.clone()).collect();
         let free = Mutex::new(ports.into_iter().collect());
-        let taken = Mutex::new(HashMap::new());
-        let seats = Arc::new(Seats { free, taken, names, counters: Counters::default(), start });
-        runtime.spawn(listen(endpoint.clone(), seats.clone()));
-        let over = Arc::new(AtomicBool::new(false));
-        let clock = Clock::new(start, step_s).later(AFTER * step_s).asleep();
-        let (answers, until) = (seats.clone(), over.clone());
-        let answering = std::thread::Builder::new().name("palpate answers".to_string());
-        let answering = answering.spawn(move || answer(&answers, &clock, &until)).map_err(|error| {
-            Error::Thread(format!("cannot start a thread for the link's answers: {error}"))
+        let connected = Mutex::new(HashMap::new());
+        let slots = Arc::new(DeviceSlots { free, connected, names, counters: Counters::default(), start });
+        runtime.spawn(listen(endpoint.clone(), slots.clone()));
+        let stop = Arc::new(AtomicBool::new(false));
+        let clock = Clock::new(start, step_s).with_phase(SEND_PHASE * step_s).without_spinning();
+        let sending = std::thread::Builder::new().name("palpate efforts".to_string()).spawn({
+            let (slots, stop) = (slots.clone(), stop.clone());
+            move || send_efforts(&slots, &clock, &stop)
+        });
+        let sending = sending.map_err(|error| Error::ThreadSpawn {
+            purpose: "link's efforts".to_string(),
+            reason: error.to_string(),
         })?;
-        Ok(Self { runtime: Some(runtime), endpoint, seats, over, answering: Some(answering) })
+        Ok(Self { runtime: Some(runtime), endpoint, slots, stop, sending: Some(sending) })
     }
 
-    /// Where it listens.
+    /// Address that the server listens at.
     ///
     /// # Errors
-    /// When the system does not tell.
+    /// If the system does not tell.
     pub fn address(&self) -> Result<SocketAddr, Error> {
-        self.endpoint.local_addr().map_err(|error| Error::Setup(format!("the link has no address: {error}")))
+        let address = self.endpoint.local_addr();
+        Ok(address.map_err(|error| LinkError::NoAddress { reason: error.to_string() })?)
     }
 
-    /// What has come.
+    /// Counters since the start.
     pub fn counts(&self) -> LinkCounts {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        let Counters { connected, refused, motions, old, garbage } = &self.seats.counters;
+        let Counters { connected, refused, motions, old, garbage } = &self.slots.counters;
         LinkCounts {
             connected: of(connected),
             refused: of(refused),
@@ -148,10 +155,10 @@ impl LinkServer {
 
 impl Drop for LinkServer {
     fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(answering) = self.answering.take() {
-            // It has ended, or by a bug of its own.
-            let _ = answering.join();
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(sending) = self.sending.take() {
+            // A panic of the thread was printed; nothing more can be done.
+            let _ = sending.join();
         }
         self.endpoint.close(0_u32.into(), b"the session has ended");
         if let Some(runtime) = self.runtime.take() {
@@ -160,111 +167,113 @@ impl Drop for LinkServer {
     }
 }
 
-/// A thread of its own for everything that comes over links.
+/// Tokio runtime with one thread, for everything that links receive.
 pub(super) fn runtime() -> Result<Runtime, Error> {
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("palpate link")
         .enable_all()
         .build()
-        .map_err(|error| Error::Thread(format!("cannot start a thread for the link: {error}")))
+        .map_err(|error| Error::ThreadSpawn { purpose: "link".to_string(), reason: error.to_string() })
 }
 
-async fn listen(endpoint: Endpoint, seats: Arc<Seats>) {
+/// Accepts connections until the endpoint is closed.
+async fn listen(endpoint: Endpoint, slots: Arc<DeviceSlots>) {
     while let Some(incoming) = endpoint.accept().await {
-        if endpoint.open_connections() > MOST_CONNECTIONS {
+        if endpoint.open_connections() > MAX_CONNECTIONS {
             incoming.refuse();
             continue;
         }
-        tokio::spawn(serve(incoming, seats.clone()));
+        tokio::spawn(serve(incoming, slots.clone()));
     }
 }
 
-async fn serve(incoming: Incoming, seats: Arc<Seats>) {
+/// Serves one connection: gives the device its port, then passes its motions on until the link breaks.
+async fn serve(incoming: Incoming, slots: Arc<DeviceSlots>) {
     let add = |counter: &AtomicU64| counter.fetch_add(1, Ordering::Relaxed);
     let Ok(connection) = incoming.await else {
-        add(&seats.counters.refused);
+        add(&slots.counters.refused);
         return;
     };
-    let Ok(Some((name, port))) = tokio::time::timeout(PATIENCE, greet(&connection, &seats)).await else {
-        add(&seats.counters.refused);
+    let Ok(Some((name, port))) = tokio::time::timeout(GREETING_TIMEOUT, greet(&connection, &slots)).await
+    else {
+        add(&slots.counters.refused);
         return;
     };
-    add(&seats.counters.connected);
-    let DevicePort { motion: mut telling, effort: efforts } = port;
-    let taken = Taken { efforts, connection: connection.clone(), sent: 0 };
-    lock(&seats.taken).insert(name.clone(), taken);
-    let mut newest = 0;
+    add(&slots.counters.connected);
+    let DevicePort { motion: mut motions, effort: efforts } = port;
+    let device = ConnectedDevice { efforts, connection: connection.clone(), sent: 0 };
+    lock(&slots.connected).insert(name.clone(), device);
+    let mut filter = SequenceFilter::default();
     while let Ok(bytes) = connection.read_datagram().await {
-        let Some(motion) = motion(&bytes, seats.start.elapsed().as_secs_f64()) else {
-            add(&seats.counters.garbage);
+        let Some(motion) = motion(&bytes, slots.start.elapsed().as_secs_f64()) else {
+            add(&slots.counters.garbage);
             continue;
         };
-        if motion.sequence <= newest {
-            add(&seats.counters.old);
+        if !filter.is_newer(motion.sequence) {
+            add(&slots.counters.old);
             continue;
         }
-        newest = motion.sequence;
-        add(&seats.counters.motions);
-        telling.tell(motion);
+        add(&slots.counters.motions);
+        motions.send(motion);
     }
-    let taken = lock(&seats.taken).remove(&name);
-    if let Some(Taken { efforts, .. }) = taken {
-        lock(&seats.free).insert(name, DevicePort { motion: telling, effort: efforts });
+    let device = lock(&slots.connected).remove(&name);
+    if let Some(ConnectedDevice { efforts, .. }) = device {
+        lock(&slots.free).insert(name, DevicePort { motion: motions, effort: efforts });
     }
 }
 
-/// Send efforts on as they come.
-fn answer(seats: &Seats, clock: &Clock, over: &AtomicBool) {
-    // What is not granted is done without.
-    let _ = Scheduling { priority: Some(PRIORITY), core: None }.claim();
+/// Sends new efforts at every tick until `stop` is set.
+fn send_efforts(slots: &DeviceSlots, clock: &Clock, stop: &AtomicBool) {
+    // Goes on without a real-time priority that is not granted.
+    let _ = Scheduling { priority: Some(PRIORITY), core: None }.apply();
     let mut tick = clock.next_after(0);
-    while !over.load(Ordering::Relaxed) {
+    while !stop.load(Ordering::Relaxed) {
         clock.wait(tick);
         tick = clock.next_after(tick);
-        for taken in lock(&seats.taken).values_mut() {
-            let effort = *taken.efforts.read();
-            if effort.sequence > taken.sent {
-                taken.sent = effort.sequence;
-                // A datagram that can't be sent now would be too old later.
-                let _ = taken.connection.send_datagram(effort_bytes(&effort).to_vec().into());
+        for device in lock(&slots.connected).values_mut() {
+            let effort = *device.efforts.read();
+            if effort.sequence > device.sent {
+                device.sent = effort.sequence;
+                // A datagram that can't be sent now would be outdated later.
+                let _ = device.connection.send_datagram(effort_bytes(&effort).to_vec().into());
             }
         }
     }
 }
 
-/// Hear which device it is, and give it its port.
-async fn greet(connection: &Connection, seats: &Seats) -> Option<(String, DevicePort)> {
+/// Receives a greeting, replies, and returns the device's name and port if it is accepted.
+async fn greet(connection: &Connection, slots: &DeviceSlots) -> Option<(String, DevicePort)> {
     let (mut send, mut receive) = connection.accept_bi().await.ok()?;
-    let bytes = receive.read_to_end(LONGEST_HELLO).await.ok()?;
+    let bytes = receive.read_to_end(MAX_HELLO).await.ok()?;
     let hello: Result<Hello, _> = serde_json::from_slice(&bytes);
-    let taken = match &hello {
+    let accepted = match &hello {
         Err(_) => Err("it does not say which device it is".to_string()),
         Ok(Hello { device }) => {
-            let port = lock(&seats.free).remove(device);
+            let port = lock(&slots.free).remove(device);
             port.map(|port| (device.clone(), port)).ok_or_else(|| {
-                if seats.names.contains(device) {
+                if slots.names.contains(device) {
                     format!("the device {device:?} is taken")
                 } else {
-                    format!("the scene has no device {device:?} for a link, only {}", seats.names.join(", "))
+                    format!("the scene has no device {device:?} for a link, only {}", slots.names.join(", "))
                 }
             })
         }
     };
-    let welcome = match &taken {
-        Ok(_) => Welcome::Taken,
+    let welcome = match &accepted {
+        Ok(_) => Welcome::Accepted,
         Err(why) => Welcome::Refused(why.clone()),
     };
     let text = serde_json::to_vec(&welcome).ok()?;
     let sent = send.write_all(&text).await.is_ok() && send.finish().is_ok();
-    match taken {
-        Ok(taken) if sent => Some(taken),
+    match accepted {
+        Ok(accepted) if sent => Some(accepted),
         Ok((name, port)) => {
-            lock(&seats.free).insert(name, port);
+            lock(&slots.free).insert(name, port);
             None
         }
         Err(_) => {
-            // Until it is read.
+            // Keeps the connection open until the refusal is read.
             let _ = send.stopped().await;
             None
         }

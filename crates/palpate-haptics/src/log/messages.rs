@@ -1,6 +1,6 @@
-//! The messages of a log as JSON.
+//! Messages of a log, as JSON.
 
-use super::record::{Picture, Record};
+use super::records::{FrameRecord, StepRecord};
 use glam::{DQuat, DVec3};
 use palpate::{
     Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose, SurfacePoint, Twist,
@@ -9,17 +9,18 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::HashMap;
 
-/// The names of a scene's parts, in the model's order.
+/// Names of a scene's parts, in the model's order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Names {
-    /// Objects.
+pub struct SceneNames {
+    /// Names of the objects.
     pub objects: Vec<String>,
-    /// Devices.
+    /// Names of the devices.
     pub devices: Vec<String>,
-    /// Planes and obstacles.
+    /// Names of the planes and obstacles.
     pub obstacles: Vec<String>,
 }
 
+/// Vector.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct Xyz {
     x: f64,
@@ -27,6 +28,7 @@ pub(super) struct Xyz {
     z: f64,
 }
 
+/// Quaternion.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 struct Xyzw {
     x: f64,
@@ -35,8 +37,9 @@ struct Xyzw {
     w: f64,
 }
 
+/// Pose [m, world].
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placement {
+pub(super) struct PoseMessage {
     position: Xyz,
     orientation: Xyzw,
 }
@@ -59,63 +62,67 @@ impl From<DQuat> for Xyzw {
     }
 }
 
-impl From<Pose> for Placement {
+impl From<Pose> for PoseMessage {
     fn from(pose: Pose) -> Self {
         Self { position: pose.position.into(), orientation: pose.orientation.into() }
     }
 }
 
-impl From<Placement> for Pose {
-    fn from(placement: Placement) -> Self {
+impl From<PoseMessage> for Pose {
+    fn from(placement: PoseMessage) -> Self {
         let Xyzw { x, y, z, w } = placement.orientation;
         Self { position: placement.position.into(), orientation: DQuat::from_xyzw(x, y, z, w) }
     }
 }
 
+/// Input and output of a device: position [m], force on the hand [N] and proxy [m], all in world axes.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeviceMessage {
+    /// Whether the device is active.
     pub present: bool,
     pub position: Xyz,
     pub force: Xyz,
     pub proxy: Xyz,
-    /// The point that it holds; none when it touches, and in logs of the first version.
+    /// Held point; `None` for a device that touches, and in logs of the first form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub holds: Option<HoldMessage>,
+    pub holds: Option<HeldPointMessage>,
 }
 
+/// Held point: object, triangle of its surface, barycentric weights.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
-pub(super) struct HoldMessage {
+pub(super) struct HeldPointMessage {
     object: usize,
     triangle: u32,
     weights: [f64; 3],
 }
 
-impl From<Grasp> for HoldMessage {
+impl From<Grasp> for HeldPointMessage {
     fn from(Grasp { object, point }: Grasp) -> Self {
         Self { object, triangle: point.triangle, weights: point.weights }
     }
 }
 
-impl From<HoldMessage> for Grasp {
-    fn from(HoldMessage { object, triangle, weights }: HoldMessage) -> Self {
+impl From<HeldPointMessage> for Grasp {
+    fn from(HeldPointMessage { object, triangle, weights }: HeldPointMessage) -> Self {
         Self { object, point: SurfacePoint { triangle, weights } }
     }
 }
 
+/// Motion of an object [m, m/s, rad/s, world].
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct ObjectMessage {
-    pub pose: Placement,
+    pub pose: PoseMessage,
     pub velocity: Xyz,
     pub angular_velocity: Xyz,
 }
 
-/// How an object begins.
+/// Initial state of an object.
 #[derive(Serialize, Deserialize, Clone, Debug, PartialEq)]
 pub(super) struct StartMessage {
     #[serde(flatten)]
     object: ObjectMessage,
     angular_momentum: Xyz,
-    /// q [m·√kg] and its rate of every mode.
+    /// Modal coordinate q [m·√kg] and its rate, of every mode.
     modes: Vec<[f64; 2]>,
 }
 
@@ -142,6 +149,7 @@ impl From<StartMessage> for ObjectSnapshot {
     }
 }
 
+/// Energy ledger of the scene [J].
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct EnergyMessage {
     pub kinetic: f64,
@@ -188,6 +196,7 @@ impl From<&EnergyMessage> for EnergyLedger {
     }
 }
 
+/// Status of the step: residual of the solver [m], unsolved islands, dropped contacts, rejected inputs.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct StatusMessage {
     pub residual_m: f64,
@@ -196,6 +205,7 @@ pub(super) struct StatusMessage {
     pub rejected: u32,
 }
 
+/// Timing of the cycle: tick of the clock, lateness [µs], compute time [µs].
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct TimingMessage {
     pub tick: u64,
@@ -203,20 +213,20 @@ pub(super) struct TimingMessage {
     pub compute_us: f64,
 }
 
-/// `/step` as it is read.
+/// Message `/step`, for reading.
 #[derive(Deserialize, Debug)]
 pub(super) struct StepMessage {
     pub step: u64,
     pub devices: HashMap<String, DeviceMessage>,
-    pub obstacles: HashMap<String, Placement>,
+    pub obstacles: HashMap<String, PoseMessage>,
     pub objects: HashMap<String, ObjectMessage>,
     pub energy: EnergyMessage,
 }
 
-/// `/step` as it is written.
-pub(super) struct StepOf<'a>(pub &'a Record, pub &'a Names);
+/// Message `/step`, for writing.
+pub(super) struct StepMessageOf<'a>(pub &'a StepRecord, pub &'a SceneNames);
 
-/// Entries by their names.
+/// Map from names to entries, in the order of the names.
 struct Named<'a, F>(&'a [String], F);
 
 impl<T: Serialize, F: Fn(usize) -> T> Serialize for Named<'_, F> {
@@ -229,7 +239,7 @@ impl<T: Serialize, F: Fn(usize) -> T> Serialize for Named<'_, F> {
     }
 }
 
-impl Serialize for StepOf<'_> {
+impl Serialize for StepMessageOf<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let Self(record, names) = self;
         let device = |at: usize| {
@@ -262,13 +272,13 @@ impl Serialize for StepOf<'_> {
         let microseconds = |time: std::time::Duration| time.as_nanos() as f64 * 1e-3;
         let timing = TimingMessage {
             tick: record.tick,
-            late_us: microseconds(record.late),
-            compute_us: microseconds(record.took),
+            late_us: microseconds(record.lateness),
+            compute_us: microseconds(record.compute),
         };
         let mut map = serializer.serialize_map(Some(7))?;
         map.serialize_entry("step", &record.step)?;
         map.serialize_entry("devices", &Named(&names.devices, device))?;
-        let obstacle = |at: usize| Placement::from(record.input.obstacles[at]);
+        let obstacle = |at: usize| PoseMessage::from(record.input.obstacles[at]);
         map.serialize_entry("obstacles", &Named(&names.obstacles, obstacle))?;
         map.serialize_entry("objects", &Named(&names.objects, object))?;
         map.serialize_entry("energy", &EnergyMessage::from(&record.energy))?;
@@ -278,7 +288,7 @@ impl Serialize for StepOf<'_> {
     }
 }
 
-/// `/contacts`.
+/// Contact of message `/contacts`: point [m], normal out of the object, force on the object [N], gap [m], slip speed [m/s].
 #[derive(Serialize)]
 pub(super) struct ContactMessage<'a> {
     object: &'a str,
@@ -290,9 +300,10 @@ pub(super) struct ContactMessage<'a> {
     slip_speed: f64,
 }
 
+/// Message `/contacts`.
 pub(super) fn contacts<'a>(
-    picture: &Picture,
-    names: &'a Names,
+    frame: &FrameRecord,
+    names: &'a SceneNames,
 ) -> HashMap<&'static str, Vec<ContactMessage<'a>>> {
     let name = |list: &'a [String], at: usize| list.get(at).map_or("", String::as_str);
     let one = |contact: &palpate::ContactOutput| ContactMessage {
@@ -308,26 +319,26 @@ pub(super) fn contacts<'a>(
         gap: contact.gap,
         slip_speed: contact.slip_speed,
     };
-    HashMap::from([("contacts", picture.contacts.iter().map(one).collect())])
+    HashMap::from([("contacts", frame.contacts.iter().map(one).collect())])
 }
 
-/// `/modes`.
-pub(super) struct ModesOf<'a>(pub &'a Picture, pub &'a Names);
+/// Message `/modes`.
+pub(super) struct ModesMessage<'a>(pub &'a FrameRecord, pub &'a SceneNames);
 
-impl Serialize for ModesOf<'_> {
+impl Serialize for ModesMessage<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         Named(&self.1.objects, |at: usize| &self.0.modes[at]).serialize(serializer)
     }
 }
 
-/// `/tf`: foxglove.FrameTransforms.
-pub(super) fn transforms(picture: &Picture, names: &Names, nanoseconds: u64) -> serde_json::Value {
+/// Message `/tf`: `foxglove.FrameTransforms`.
+pub(super) fn transforms(frame: &FrameRecord, names: &SceneNames, nanoseconds: u64) -> serde_json::Value {
     let stamp =
         serde_json::json!({ "sec": nanoseconds / 1_000_000_000, "nsec": nanoseconds % 1_000_000_000 });
-    let objects = names.objects.iter().zip(picture.objects.iter().copied());
-    let obstacles = names.obstacles.iter().zip(picture.obstacles.iter().copied());
+    let objects = names.objects.iter().zip(frame.objects.iter().copied());
+    let obstacles = names.obstacles.iter().zip(frame.obstacles.iter().copied());
     let one = |(name, pose): (&String, Pose)| {
-        let Placement { position, orientation } = pose.into();
+        let PoseMessage { position, orientation } = pose.into();
         serde_json::json!({
             "timestamp": stamp, "parent_frame_id": "world", "child_frame_id": name,
             "translation": position, "rotation": orientation,

@@ -1,21 +1,22 @@
-//! Logs: everything that a run in real time was, as an MCAP file.
+//! Logs: a complete record of a run in real time, as an MCAP file.
 //!
-//! | topic | each | holds |
+//! | topic | rate | contents |
 //! |---|---|---|
-//! | `/step` | step | what the devices and obstacles did, forces, proxies, poses, velocities, energies, how it went, timing |
-//! | `/contacts` | picture | every contact that carries force |
-//! | `/modes` | picture | modal coordinates of every object |
-//! | `/tf` | picture | poses, as Foxglove's 3D panel takes them |
+//! | `/step` | every step | input of devices and obstacles; forces, proxies, poses, velocities, energies, status, timing |
+//! | `/contacts` | every frame | contacts that carry force |
+//! | `/modes` | every frame | modal coordinates of every object |
+//! | `/tf` | every frame | poses, as `foxglove.FrameTransforms` |
 //!
-//! Messages are JSON, in which every number stands to the last bit. The files that the scene was read from are attached, so
-//! that a log can be replayed, and drawn, anywhere.
+//! Messages are JSON, in which every number keeps its last bit. The files that the scene was read from are attached, and the metadata
+//! record `start` holds the initial state of every object, so that a log replays bit for bit anywhere.
 
+mod buffer_pool;
 mod messages;
 mod reader;
-mod record;
+mod records;
 mod writer;
 
-pub use messages::Names;
-pub use reader::{LoggedStep, Reader};
-pub use record::{Picture, Record};
+pub use messages::SceneNames;
+pub use reader::{LogReader, LoggedStep};
+pub use records::{FrameRecord, StepRecord};
 pub use writer::{LogSender, LogSummary, LogWriter};

@@ -1,8 +1,8 @@
-//! Reading a log.
+//! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
-use super::messages::{EnergyMessage, Names, StartMessage, StepMessage};
+use super::messages::{EnergyMessage, SceneNames, StartMessage, StepMessage};
 use super::writer::START;
-use crate::error::Error;
+use crate::error::{Error, LogError};
 use glam::DVec3;
 use mcap::Summary;
 use mcap::read::parse_record;
@@ -11,78 +11,74 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose};
 use std::collections::BTreeMap;
 
-/// A log in memory.
-pub struct Reader<'a> {
+/// Log in memory.
+pub struct LogReader<'a> {
     bytes: &'a [u8],
     summary: Summary,
 }
 
-/// One step as it was logged.
+/// Logged step.
 #[derive(Debug)]
 pub struct LoggedStep {
-    /// Its number, from 1.
+    /// Number of the step, from 1.
     pub step: u64,
     message: StepMessage,
 }
 
 fn unreadable(error: impl std::fmt::Display) -> Error {
-    Error::Log(format!("the log can't be read: {error}"))
+    LogError::Unreadable { reason: error.to_string() }.into()
 }
 
-impl<'a> Reader<'a> {
-    /// Of the bytes of a log file.
+impl<'a> LogReader<'a> {
+    /// Log from the bytes of its file.
     ///
     /// # Errors
-    /// When they are no MCAP file, or one that was not finished.
+    /// If they are no MCAP file, or one that was not finished.
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         let summary = Summary::read(bytes).map_err(unreadable)?;
-        let summary =
-            summary.ok_or_else(|| Error::Log("the log was not finished: it has no index".to_string()))?;
-        Ok(Self { bytes, summary })
+        Ok(Self { bytes, summary: summary.ok_or(LogError::Unfinished)? })
     }
 
-    /// The facts about the scene.
+    /// Metadata about the scene.
     ///
     /// # Errors
-    /// When there are none: it is no log of palpate's.
-    pub fn facts(&self) -> Result<BTreeMap<String, String>, Error> {
-        let facts = self.metadata("palpate")?;
-        facts.ok_or_else(|| Error::Log("it is an MCAP file, but no log of palpate's".to_string()))
+    /// If there is none: the file was not written by palpate.
+    pub fn metadata(&self) -> Result<BTreeMap<String, String>, Error> {
+        Ok(self.metadata_record("palpate")?.ok_or(LogError::NotPalpate)?)
     }
 
-    /// How the objects begin; none in logs of the first version, which all begin as their scene says.
+    /// Initial states of the objects; `None` in logs of the first two forms, whose objects start as their scene says.
     ///
     /// # Errors
-    /// When the log does not tell of one of them.
-    pub fn start(&self, names: &Names) -> Result<Option<Vec<ObjectSnapshot>>, Error> {
-        let Some(starts) = self.metadata(START)? else { return Ok(None) };
+    /// If an object is missing.
+    pub fn start(&self, names: &SceneNames) -> Result<Option<Vec<ObjectSnapshot>>, Error> {
+        let Some(starts) = self.metadata_record(START)? else { return Ok(None) };
         let motion = |name: &String| {
             let text = starts.get(name);
-            let text =
-                text.ok_or_else(|| Error::Log(format!("the log does not tell how {name:?} begins")))?;
+            let text = text.ok_or_else(|| LogError::StartMissing { object: name.clone() })?;
             serde_json::from_str::<StartMessage>(text).map(ObjectSnapshot::from).map_err(unreadable)
         };
         names.objects.iter().map(motion).collect::<Result<_, _>>().map(Some)
     }
 
-    fn metadata(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, Error> {
+    fn metadata_record(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, Error> {
         let index = self.summary.metadata_indexes.iter().find(|index| index.name == name);
         let read = |index| mcap::read::metadata(self.bytes, index).map_err(unreadable);
         index.map(|index| read(index).map(|metadata| metadata.metadata)).transpose()
     }
 
-    /// The files that the scene was read from, by their names.
+    /// Names and contents of the files that the scene was read from.
     ///
     /// # Errors
-    /// When one can't be read.
+    /// If one can't be read.
     pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let read = |index| mcap::read::attachment(self.bytes, index).map_err(unreadable);
         let indexes = self.summary.attachment_indexes.iter();
         indexes.map(|index| read(index).map(|a| (a.name, a.data.into_owned()))).collect()
     }
 
-    /// How many steps it holds.
-    pub fn steps(&self) -> u64 {
+    /// Number of steps.
+    pub fn step_count(&self) -> u64 {
         let counts = self.summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
         self.step_channel().and_then(|id| counts?.get(&id).copied()).unwrap_or(0)
     }
@@ -92,9 +88,9 @@ impl<'a> Reader<'a> {
         channels.find(|(_, channel)| channel.topic == "/step").map(|(id, _)| *id)
     }
 
-    /// The steps, in their order: each on its own is one, or why it can't be read.
-    pub fn each_step(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> + use<'a> {
-        // No length that a file states is longer than the file, or than a piece of ours.
+    /// Steps in order. After an error there are no more.
+    pub fn logged_steps(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> + use<'a> {
+        // Bounds the lengths that a damaged file may claim: the file's own, or one chunk.
         let options = LinearReaderOptions::default()
             .with_record_length_limit(self.bytes.len().max(1 << 20))
             .with_validate_chunk_crcs(true);
@@ -106,7 +102,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Reads steps piece by piece; after an error there are no more.
+/// Iterator over the steps of a log.
 struct Steps<'a> {
     bytes: &'a [u8],
     reader: LinearReader,
@@ -120,8 +116,8 @@ impl Iterator for Steps<'_> {
         let channel = self.channel?;
         let found = loop {
             match self.reader.next_event()? {
-                Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                    let (now, later) = self.bytes.split_at(wanted.min(self.bytes.len()));
+                Ok(LinearReadEvent::ReadRequest(requested)) => {
+                    let (now, later) = self.bytes.split_at(requested.min(self.bytes.len()));
                     self.reader.insert(now.len()).copy_from_slice(now);
                     self.reader.notify_read(now.len());
                     self.bytes = later;
@@ -145,13 +141,13 @@ impl Iterator for Steps<'_> {
 }
 
 impl LoggedStep {
-    /// What the step was given; `modes` are what the devices do while they are there, and hold nothing.
+    /// Input of the step. `modes` are the modes of active devices that hold nothing.
     ///
     /// # Errors
-    /// When the log does not tell of a device or an obstacle.
-    pub fn input(&self, names: &Names, modes: &[DeviceMode]) -> Result<Input, Error> {
+    /// If a device or an obstacle is missing.
+    pub fn input(&self, names: &SceneNames, modes: &[DeviceMode]) -> Result<Input, Error> {
         let step = self.step;
-        let missing = |name: &String| Error::Log(format!("step {step} of the log does not tell of {name:?}"));
+        let missing = |name: &String| LogError::PartMissing { step, name: name.clone() };
         let mut input = Input::default();
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
@@ -168,8 +164,8 @@ impl LoggedStep {
         Ok(input)
     }
 
-    /// What is not, to the bit, what a step gave: a name, what was logged and what came out.
-    pub fn difference(&self, names: &Names, output: &Output) -> Option<(String, f64, f64)> {
+    /// First number of the output that differs in any bit: its name, logged value and replayed value.
+    pub fn first_difference(&self, names: &SceneNames, output: &Output) -> Option<(String, f64, f64)> {
         let vector = |name: String, logged: DVec3, now: DVec3| {
             let axes = ["x", "y", "z"].into_iter().zip(logged.to_array()).zip(now.to_array());
             let mut off = axes.filter(|((_, a), b)| a.to_bits() != b.to_bits());
@@ -209,7 +205,7 @@ impl LoggedStep {
 }
 
 fn energy_difference(logged: &EnergyMessage, now: &EnergyLedger) -> Option<(String, f64, f64)> {
-    // The defect is the sums' own round-off, and is not logged.
+    // The defect is round-off of the sums, and is not logged.
     let pairs = EnergyLedger::from(logged).named().into_iter().zip(now.named());
     let mut off = pairs.filter(|((name, a), (_, b))| *name != "defect" && a.to_bits() != b.to_bits());
     off.next().map(|((name, a), (_, b))| (format!("energy.{name}"), a, b))

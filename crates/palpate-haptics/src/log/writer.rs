@@ -1,8 +1,9 @@
-//! Writing a log beside the force process, by a thread that can't disturb it.
+//! Log writer: a thread beside the force process that cannot disturb it.
 
-use super::messages::{ModesOf, Names, StartMessage, StepOf, contacts, transforms};
-use super::record::{Picture, Record};
-use crate::error::Error;
+use super::buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
+use super::messages::{ModesMessage, SceneNames, StartMessage, StepMessageOf, contacts, transforms};
+use super::records::{FrameRecord, StepRecord};
+use crate::error::{Error, LogError, with_sources};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 use palpate::{Input, Model, State};
@@ -13,85 +14,42 @@ use std::io::{Seek, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// Steps and pictures that may wait for the writer.
-const STEPS_WAITING: usize = 8192;
-const PICTURES_WAITING: usize = 64;
+/// Buffers for steps: 2 s at 4 kHz.
+const STEP_BUFFERS: usize = 8192;
 
-/// The record that tells how the objects begin.
+/// Buffers for frames: 1 s at 60 Hz.
+const FRAME_BUFFERS: usize = 64;
+
+/// Name of the metadata record with the initial state of every object.
 pub(super) const START: &str = "start";
 
-/// How long the writer sleeps when there is nothing to write.
-const NAP: Duration = Duration::from_millis(5);
+/// Sleep of the writer when there is nothing to write.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// One end of a round: what is full goes one way, what is spare comes back.
-struct Giver<T> {
-    full: rtrb::Producer<Box<T>>,
-    spare: rtrb::Consumer<Box<T>>,
-    /// How often nothing was spare.
-    missed: u64,
-}
-
-/// The other end.
-struct Taker<T> {
-    full: rtrb::Consumer<Box<T>>,
-    spare: rtrb::Producer<Box<T>>,
-}
-
-/// A round of so many.
-fn round<T>(places: usize, make: impl Fn() -> T) -> (Giver<T>, Taker<T>) {
-    let (full_in, full_out) = rtrb::RingBuffer::new(places);
-    let (mut spare_in, spare_out) = rtrb::RingBuffer::new(places);
-    // Not clones, whose buffers would have no room.
-    while spare_in.push(Box::new(make())).is_ok() {}
-    (Giver { full: full_in, spare: spare_out, missed: 0 }, Taker { full: full_out, spare: spare_in })
-}
-
-impl<T> Giver<T> {
-    fn give(&mut self, fill: impl FnOnce(&mut T)) {
-        let Ok(mut one) = self.spare.pop() else {
-            self.missed += 1;
-            return;
-        };
-        fill(&mut one);
-        // There are no more of them than places.
-        self.missed += u64::from(self.full.push(one).is_err());
-    }
-}
-
-impl<T> Taker<T> {
-    fn each<E>(&mut self, mut take: impl FnMut(&T) -> Result<(), E>) -> Result<(), E> {
-        while let Ok(one) = self.full.pop() {
-            take(&one)?;
-            // There are no more of them than places.
-            let _ = self.spare.push(one);
-        }
-        Ok(())
-    }
-}
-
-/// The force process's end of a log.
+/// Force process's end of a log.
 pub struct LogSender {
-    steps: Giver<Record>,
-    pictures: Giver<Picture>,
+    steps: PoolProducer<StepRecord>,
+    frames: PoolProducer<FrameRecord>,
 }
 
-/// The writer's end.
+/// Writer's end of a log.
 pub struct LogWriter<W: Write + Seek> {
-    steps: Taker<Record>,
-    pictures: Taker<Picture>,
-    out: Out<W>,
+    steps: PoolConsumer<StepRecord>,
+    frames: PoolConsumer<FrameRecord>,
+    file: LogFile<W>,
 }
 
-/// The file, and what it takes to write to it.
-struct Out<W: Write + Seek> {
+/// MCAP file that is being written.
+struct LogFile<W: Write + Seek> {
     writer: Writer<W>,
-    names: Names,
+    names: SceneNames,
     channels: Channels,
     text: Vec<u8>,
     start_ns: u64,
     steps: u64,
 }
 
+/// Channel ids of the topics.
 struct Channels {
     step: u16,
     contacts: u16,
@@ -99,58 +57,51 @@ struct Channels {
     tf: u16,
 }
 
-/// What a log came to.
+/// Summary of a finished log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LogSummary {
-    /// Steps that were written.
+    /// Written steps.
     pub steps: u64,
-    /// Steps that the writer was too slow for: a replay ends there.
+    /// Steps that were dropped because the writer was too slow. A replay ends before the first.
     pub missed: u64,
 }
 
 impl LogSender {
-    /// Hand a step to the log, if a record is free.
+    /// Records a step, if a buffer is free.
     ///
     /// # Real time
     /// No allocation, lock or system call.
-    pub fn take(&mut self, fill: impl FnOnce(&mut Record)) {
-        self.steps.give(fill);
+    pub fn record_step(&mut self, fill: impl FnOnce(&mut StepRecord)) {
+        self.steps.produce(fill);
     }
 
-    /// The same with what a picture takes.
+    /// Records a frame, if a buffer is free.
     ///
     /// # Real time
     /// No allocation, lock or system call.
-    pub fn take_picture(&mut self, fill: impl FnOnce(&mut Picture)) {
-        self.pictures.give(fill);
+    pub fn record_frame(&mut self, fill: impl FnOnce(&mut FrameRecord)) {
+        self.frames.produce(fill);
     }
 
-    /// Steps for which the writer was too slow.
+    /// Number of steps that were dropped because the writer was too slow.
     pub fn missed(&self) -> u64 {
-        self.steps.missed
+        self.steps.missed()
     }
 }
 
-/// With what the error came from: that the disk is full stands there.
 fn failed(error: impl std::error::Error) -> Error {
-    let mut text = format!("cannot write the log: {error}");
-    let mut source = error.source();
-    while let Some(inner) = source {
-        text += &format!(": {inner}");
-        source = inner.source();
-    }
-    Error::Log(text)
+    LogError::Write { reason: with_sources(&error) }.into()
 }
 
 impl<W: Write + Seek> LogWriter<W> {
-    /// Begin a log of a scene that goes from a state on, with facts about it and the files that it was read from.
+    /// Begins a log of a scene with its current state, metadata about the scene, and the files that it was read from.
     ///
     /// # Errors
-    /// When it can't be written.
+    /// If writing fails.
     pub fn new(
         out: W,
-        names: Names,
-        facts: BTreeMap<String, String>,
+        names: SceneNames,
+        metadata: BTreeMap<String, String>,
         files: &[(String, Vec<u8>)],
         (model, state, input): (&Model, &State, &Input),
     ) -> Result<(LogSender, Self), Error> {
@@ -170,12 +121,12 @@ impl<W: Write + Seek> LogWriter<W> {
             };
             writer.attach(&attachment).map_err(failed)?;
         }
-        let begins = |(name, motion)| {
+        let start = |(name, motion)| {
             serde_json::to_string(&StartMessage::from(motion)).map(|text| (String::clone(name), text))
         };
         let motions = state.snapshots();
-        let starts: Result<_, _> = names.objects.iter().zip(&motions).map(begins).collect();
-        for (name, metadata) in [("palpate", facts), (START, starts.map_err(failed)?)] {
+        let starts: Result<_, _> = names.objects.iter().zip(&motions).map(start).collect();
+        for (name, metadata) in [("palpate", metadata), (START, starts.map_err(failed)?)] {
             writer.write_metadata(&Metadata { name: name.to_string(), metadata }).map_err(failed)?;
         }
         let mut channel = |topic: &str, schema: &str, text: &str| -> Result<u16, Error> {
@@ -187,63 +138,63 @@ impl<W: Write + Seek> LogWriter<W> {
             step: channel("/step", "palpate.Step", object)?,
             contacts: channel("/contacts", "palpate.Contacts", object)?,
             modes: channel("/modes", "palpate.Modes", object)?,
-            tf: channel("/tf", "foxglove.FrameTransforms", TRANSFORMS)?,
+            tf: channel("/tf", "foxglove.FrameTransforms", TRANSFORMS_SCHEMA)?,
         };
-        let (give_steps, steps) = round(STEPS_WAITING, || Record::new(state, input));
-        let (give_pictures, pictures) = round(PICTURES_WAITING, || Picture::new(model, state, input));
-        let hand = LogSender { steps: give_steps, pictures: give_pictures };
-        let out = Out { writer, names, channels, text: Vec::new(), start_ns, steps: 0 };
-        Ok((hand, Self { steps, pictures, out }))
+        let (step_producer, steps) = buffer_pool(STEP_BUFFERS, || StepRecord::new(state, input));
+        let (frame_producer, frames) = buffer_pool(FRAME_BUFFERS, || FrameRecord::new(model, state, input));
+        let sender = LogSender { steps: step_producer, frames: frame_producer };
+        let file = LogFile { writer, names, channels, text: Vec::new(), start_ns, steps: 0 };
+        Ok((sender, Self { steps, frames, file }))
     }
 
-    /// Write until `done` is set and nothing is left; gives how many steps were written, and what they were written to.
+    /// Writes until `done` is set and all buffers are empty. Returns the number of written steps and the finished sink.
     ///
     /// # Errors
-    /// When the log can't be written: the disk is full, for one.
+    /// If writing fails, for example on a full disk.
     pub fn run(self, done: &AtomicBool) -> Result<(u64, W), Error> {
-        let Self { mut steps, mut pictures, mut out } = self;
+        let Self { mut steps, mut frames, mut file } = self;
         loop {
-            // Whatever was handed over before it was done is written.
+            // Read before the buffers: whatever was recorded before `done` was set is written.
             let last = done.load(Ordering::Acquire);
-            steps.each(|record| out.step(record))?;
-            pictures.each(|picture| out.picture(picture))?;
+            steps.consume(|record| file.write_step(record))?;
+            frames.consume(|record| file.write_frame(record))?;
             if last {
                 break;
             }
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_INTERVAL);
         }
-        out.writer.finish().map_err(failed)?;
-        let mut to = out.writer.into_inner();
-        to.flush().map_err(failed)?;
-        Ok((out.steps, to))
+        file.writer.finish().map_err(failed)?;
+        let mut out = file.writer.into_inner();
+        out.flush().map_err(failed)?;
+        Ok((file.steps, out))
     }
 }
 
-impl<W: Write + Seek> Out<W> {
-    fn step(&mut self, record: &Record) -> Result<(), Error> {
+impl<W: Write + Seek> LogFile<W> {
+    fn write_step(&mut self, record: &StepRecord) -> Result<(), Error> {
         self.steps += 1;
-        let time = self.stamp(record.time_s);
-        self.put(self.channels.step, record.step, time, |names| StepOf(record, names))
+        let time = self.time_ns(record.time_s);
+        self.write(self.channels.step, record.step, time, |names| StepMessageOf(record, names))
     }
 
-    fn picture(&mut self, picture: &Picture) -> Result<(), Error> {
-        let (step, time) = (picture.step, self.stamp(picture.time_s));
-        self.put(self.channels.contacts, step, time, |names| contacts(picture, names))?;
-        self.put(self.channels.modes, step, time, |names| ModesOf(picture, names))?;
-        self.put(self.channels.tf, step, time, |names| transforms(picture, names, time))
+    fn write_frame(&mut self, record: &FrameRecord) -> Result<(), Error> {
+        let (step, time) = (record.step, self.time_ns(record.time_s));
+        self.write(self.channels.contacts, step, time, |names| contacts(record, names))?;
+        self.write(self.channels.modes, step, time, |names| ModesMessage(record, names))?;
+        self.write(self.channels.tf, step, time, |names| transforms(record, names, time))
     }
 
-    /// Simulated time as nanoseconds of the day that the log began.
-    fn stamp(&self, time_s: f64) -> u64 {
+    /// Log time [ns since 1970]: wall-clock time of the log's beginning plus simulated time.
+    fn time_ns(&self, time_s: f64) -> u64 {
         self.start_ns + (time_s * 1e9) as u64
     }
 
-    fn put<'s, M: Serialize>(
+    fn write<'s, M: Serialize>(
         &'s mut self,
         channel_id: u16,
         step: u64,
         time: u64,
-        message: impl FnOnce(&'s Names) -> M,
+        message: impl FnOnce(&'s SceneNames) -> M,
     ) -> Result<(), Error> {
         self.text.clear();
         serde_json::to_writer(&mut self.text, &message(&self.names)).map_err(failed)?;
@@ -252,8 +203,8 @@ impl<W: Write + Seek> Out<W> {
     }
 }
 
-/// Foxglove's own schema of the same name, as far as its 3D panel needs it.
-const TRANSFORMS: &str = r#"{"title":"foxglove.FrameTransforms","type":"object","properties":{"transforms":{"type":"array","items":{
+/// Foxglove's schema `foxglove.FrameTransforms`, as far as its 3D panel needs it.
+const TRANSFORMS_SCHEMA: &str = r#"{"title":"foxglove.FrameTransforms","type":"object","properties":{"transforms":{"type":"array","items":{
 "type":"object","properties":{"timestamp":{"type":"object","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
 "parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},
 "translation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},

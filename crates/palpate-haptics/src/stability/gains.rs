@@ -1,82 +1,89 @@
-//! The coupling to begin with: as stiff as the object makes sense of, and as all hands leave a margin for.
+//! Default coupling: as stiff as the object justifies and all hands allow with a margin; critical stiffness; stiffest point.
 
 use super::closed_loop::{ClosedLoop, Margins};
-use super::place::{PlaceResponse, normal_at};
+use super::point_response::{PointResponse, normal_at};
 use palpate::{Coupling, Recording, SurfacePoint};
 
-/// A coupling that takes less than this share of what the object gives within a step is not felt as softer.
-const SHARE: f64 = 0.1;
+/// Compliance of the coupling, as a share of R\[0\], below which a stiffer coupling would not be felt.
+const MIN_COMPLIANCE: f64 = 0.1;
 
-/// Both gains, or the age of what a force answers, may be this many times as large before anything is unstable.
+/// Margin: factor by which both gains, or the age of the position behind a force, may grow before the loop is unstable.
 const MARGIN: f64 = 2.0;
 
-/// Dampings [N·s/m] beyond this are no device's.
-const MOST_DAMPING: f64 = 1e4;
+/// Largest damping that is considered [N·s/m].
+const MAX_DAMPING: f64 = 1e4;
 
-/// Stiffnesses are looked for down to this share of the stiffest; halvings of the search, to a per cent.
+/// Smallest stiffness that is considered, as a share of the largest.
 const SOFTEST: f64 = 1e-6;
-const HALVINGS: u32 = 11;
 
-/// Dampings that are tried, between these times stiffness × age.
+/// Bisection steps on the logarithm of the stiffness, to 1 %.
+const BISECTIONS: u32 = 11;
+
+/// Number of dampings that are tried.
 const TRIED: u32 = 12;
-const LEAST: f64 = 0.2;
-const MOST: f64 = 50.0;
 
-/// Places of a surface that are looked at for the stiffest.
-const MOST_PLACES: usize = 200;
+/// Smallest damping that is tried, over stiffness × age.
+const MIN_DAMPING_RATIO: f64 = 0.2;
 
-/// What limits a stiffness.
+/// Largest damping that is tried, over stiffness × age.
+const MAX_DAMPING_RATIO: f64 = 50.0;
+
+/// Largest number of points that are examined for the stiffest.
+const MAX_POINTS: usize = 200;
+
+/// Limit of a default coupling's stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Limit {
-    /// Stiffer than this the coupling would not be felt as stiffer: 10/R\[0\].
+pub enum StiffnessLimit {
+    /// The object: a coupling above 10/R\[0\] would not be felt as stiffer.
     Object,
-    /// Device, hand, rate and delay bear no more with the margin.
+    /// The loop of device, hand, update rate and delay: a stiffer coupling lacks the margin.
     Loop,
 }
 
-/// A coupling with what it was limited by, and the least margins over the hands.
+/// Default coupling, with its limit and margins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DefaultCoupling {
-    /// The gains, to two digits.
+    /// Gains, to two significant digits.
     pub coupling: Coupling,
-    /// Why it is not stiffer.
-    pub limit: Limit,
-    /// The smallest margins.
+    /// Limit of the stiffness.
+    pub limit: StiffnessLimit,
+    /// Smallest margins over the loops.
     pub margins: Margins,
 }
 
-/// The stiffest coupling that all loops (hands, directions) bear with twice the gains, and also with twice the age of what
-/// a force answers; at most 10/R\[0\] with R\[0\] = `within_step` [m/N]. Of the dampings the one that leaves most delay to spare.
-/// None if there is no such coupling.
+/// Default coupling: the stiffest that is stable in all loops (hands, directions) with twice the gains, and with twice the age of the
+/// position behind a force; at most 10/R\[0\] with R\[0\] = `within_step` [m/N]. Its damping has the largest delay margin. `None` if
+/// there is no such coupling.
 pub fn default_coupling(loops: &[ClosedLoop], within_step: f64) -> Option<DefaultCoupling> {
-    let stiffest = 1.0 / (SHARE * within_step);
+    let stiffest = 1.0 / (MIN_COMPLIANCE * within_step);
     if let Some(found) = with_margin(loops, stiffest) {
-        return rounded(loops, found, Limit::Object);
+        return rounded(loops, found, StiffnessLimit::Object);
     }
-    let (mut good, mut bad) = (stiffest * SOFTEST, stiffest);
-    let mut best = with_margin(loops, good)?;
-    for _ in 0..HALVINGS {
-        let middle = (good * bad).sqrt();
+    let (mut stable, mut unstable) = (stiffest * SOFTEST, stiffest);
+    let mut best = with_margin(loops, stable)?;
+    for _ in 0..BISECTIONS {
+        let middle = (stable * unstable).sqrt();
         match with_margin(loops, middle) {
-            Some(found) => (good, best) = (middle, found),
-            None => bad = middle,
+            Some(found) => (stable, best) = (middle, found),
+            None => unstable = middle,
         }
     }
-    rounded(loops, best, Limit::Loop)
+    rounded(loops, best, StiffnessLimit::Loop)
 }
 
-/// Of a stiffness, the damping with the most margin; none if it is too little.
+/// Coupling with a stiffness [N/m] and the damping of largest delay margin; `None` if the margin is too small.
 fn with_margin(loops: &[ClosedLoop], stiffness: f64) -> Option<Coupling> {
     let [low, high] = stable_damping(loops, stiffness)?;
     let age_s = loops.iter().map(|closed| closed.timing().age_s()).fold(0.0, f64::max);
-    // Evenly by ratio, from a share of what would make up for the age.
-    let (low, high) = (low.max(LEAST * age_s * stiffness), high.min(MOST * age_s * stiffness));
+    // Geometric sequence of dampings.
+    let (low, high) =
+        (low.max(MIN_DAMPING_RATIO * age_s * stiffness), high.min(MAX_DAMPING_RATIO * age_s * stiffness));
     let tried = (1..TRIED).map(|k| low * (high / low).powf(f64::from(k) / f64::from(TRIED)));
     let spare = |coupling: Coupling| {
         let scaled =
             |by: f64| Coupling { stiffness: by * coupling.stiffness, damping: by * coupling.damping };
-        let bears = |by: f64| loops.iter().all(|closed| closed.is_stable(scaled(by)));
-        let all = [1.0 / MARGIN, 1.0, MARGIN.sqrt(), MARGIN].into_iter().all(bears);
+        let is_stable = |by: f64| loops.iter().all(|closed| closed.is_stable(scaled(by)));
+        let all = [1.0 / MARGIN, 1.0, MARGIN.sqrt(), MARGIN].into_iter().all(is_stable);
         let delay_s =
             loops.iter().map(|closed| closed.delay_margin_s(coupling)).fold(f64::INFINITY, f64::min);
         if all { delay_s / ((MARGIN - 1.0) * age_s) } else { 0.0 }
@@ -87,45 +94,49 @@ fn with_margin(loops: &[ClosedLoop], stiffness: f64) -> Option<Coupling> {
     best.map(|(_, coupling)| coupling)
 }
 
-/// The widest range of dampings [N·s/m] with which a stiffness [N/m] is stable in all loops; none if there is none.
+/// Widest range of damping [N·s/m] that is stable with a stiffness [N/m] in all loops; `None` if there is none.
 pub fn stable_damping(loops: &[ClosedLoop], stiffness: f64) -> Option<[f64; 2]> {
-    let mut common = vec![[0.0, MOST_DAMPING]];
+    let mut common = vec![[0.0, MAX_DAMPING]];
     for closed in loops {
-        let own = closed.stable_damping(stiffness, MOST_DAMPING);
+        let own = closed.stable_damping(stiffness, MAX_DAMPING);
         let pairs = common.iter().flat_map(|a| own.iter().map(move |b| [a[0].max(b[0]), a[1].min(b[1])]));
         common = pairs.filter(|[low, high]| low < high).collect();
     }
     common.into_iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
 }
 
-/// The stiffness [N/m] from which on no damping is enough in all loops; none if there is no such up to `most`.
-pub fn unstable_from(loops: &[ClosedLoop], most: f64) -> Option<f64> {
-    if stable_damping(loops, most).is_some() {
+/// Critical stiffness [N/m], beyond which no damping is stable in all loops; `None` if it is above `max`.
+pub fn critical_stiffness(loops: &[ClosedLoop], max: f64) -> Option<f64> {
+    if stable_damping(loops, max).is_some() {
         return None;
     }
-    let (mut good, mut bad) = (most * SOFTEST * SOFTEST, most);
-    for _ in 0..2 * HALVINGS {
-        let middle = (good * bad).sqrt();
-        *(if stable_damping(loops, middle).is_some() { &mut good } else { &mut bad }) = middle;
+    let (mut stable, mut unstable) = (max * SOFTEST * SOFTEST, max);
+    for _ in 0..2 * BISECTIONS {
+        let middle = (stable * unstable).sqrt();
+        *(if stable_damping(loops, middle).is_some() { &mut stable } else { &mut unstable }) = middle;
     }
-    Some(bad)
+    Some(unstable)
 }
 
-/// The stiffest place of a body: where the surface gives least along its normal within a step [s].
-pub fn stiffest_place(recording: &Recording, patch_radius: f64, step_s: f64) -> Option<SurfacePoint> {
+/// Stiffest point of a body: that with the smallest R\[0\] along its normal, for a step [s]. `None` if no point is movable.
+pub fn stiffest_point(recording: &Recording, patch_radius: f64, step_s: f64) -> Option<SurfacePoint> {
     let surface = &recording.surface;
-    let every = surface.triangles.len().div_ceil(MOST_PLACES).max(1);
-    let places = (0..surface.triangles.len()).step_by(every);
-    let places = places.map(|triangle| SurfacePoint { triangle: triangle as u32, weights: [1.0, 0.0, 0.0] });
-    let gives = |point: &SurfacePoint| {
-        PlaceResponse::new(recording, point, patch_radius, normal_at(surface, point)).within_step(step_s)
+    let every = surface.triangles.len().div_ceil(MAX_POINTS).max(1);
+    let points = (0..surface.triangles.len()).step_by(every);
+    let points = points.map(|triangle| SurfacePoint { triangle: triangle as u32, weights: [1.0, 0.0, 0.0] });
+    let compliance = |point: &SurfacePoint| {
+        PointResponse::new(recording, point, patch_radius, normal_at(surface, point))
+            .instantaneous_compliance(step_s)
     };
-    // Fixed nodes don't give at all: there is nothing to feel of the body.
-    let movable = places.filter(|point| recording.is_movable(point));
-    movable.map(|point| (gives(&point), point)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
+    // Fixed nodes have no compliance: they tell nothing about the body.
+    let movable = points.filter(|point| recording.is_movable(point));
+    movable
+        .map(|point| (compliance(&point), point))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, point)| point)
 }
 
-/// The least of each margin over the loops; none if one is not stable.
+/// Smallest of each margin over the loops; `None` if a loop is unstable.
 fn worst_margins(loops: &[ClosedLoop], coupling: Coupling) -> Option<Margins> {
     let mut all = loops.iter().map(|closed| closed.margins(coupling));
     let first = all.next()??;
@@ -133,15 +144,15 @@ fn worst_margins(loops: &[ClosedLoop], coupling: Coupling) -> Option<Margins> {
         let next = next?;
         Some(Margins {
             gain: least.gain.min(next.gain),
-            least_gain: least.least_gain.max(next.least_gain),
+            min_gain: least.min_gain.max(next.min_gain),
             phase_rad: least.phase_rad.min(next.phase_rad),
             delay_s: least.delay_s.min(next.delay_s),
         })
     })
 }
 
-/// Two digits are enough for gains.
-fn rounded(loops: &[ClosedLoop], found: Coupling, limit: Limit) -> Option<DefaultCoupling> {
+/// Default coupling with gains rounded to two significant digits.
+fn rounded(loops: &[ClosedLoop], found: Coupling, limit: StiffnessLimit) -> Option<DefaultCoupling> {
     let stiffness = two_digits(found.stiffness, f64::floor);
     let coupling = Coupling { stiffness, damping: two_digits(found.damping, f64::round) };
     worst_margins(loops, coupling).map(|margins| DefaultCoupling { coupling, limit, margins })
@@ -155,7 +166,7 @@ fn two_digits(value: f64, round: fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{Hand, Traits};
+    use crate::device::{DeviceSpec, Hand};
     use crate::stability::LoopTiming;
     use glam::DVec3;
 
@@ -164,13 +175,13 @@ mod tests {
         Recording::from_bytes(bytes).expect("a released recording")
     }
 
-    fn place() -> PlaceResponse {
+    fn response() -> PointResponse {
         let recording = recording();
         let (point, _) = recording.surface.nearest(DVec3::X).expect("a surface");
-        PlaceResponse::new(&recording, &point, 0.0, normal_at(&recording.surface, &point))
+        PointResponse::new(&recording, &point, 0.0, normal_at(&recording.surface, &point))
     }
 
-    /// No body that gives: the place on a wall.
+    /// Loop with a rigid wall in place of an object.
     fn wall(mass_kg: f64, damping_n_s_m: f64, step_s: f64, delay_updates: u32) -> ClosedLoop {
         let mut wall = recording();
         wall.modes.mode_shapes.fill(0.0);
@@ -178,9 +189,9 @@ mod tests {
         wall.metadata.mass.mass_kg = 1e15;
         wall.metadata.mass.inertia_kg_m2 = [[1e15, 0.0, 0.0], [0.0, 1e15, 0.0], [0.0, 0.0, 1e15]];
         let (point, _) = wall.surface.nearest(DVec3::X).expect("a surface");
-        let place = PlaceResponse::new(&wall, &point, 0.0, DVec3::X);
-        let traits = Traits { mass_kg, damping_n_s_m, ..Traits::TOUCH };
-        ClosedLoop::new(&place, traits, None, LoopTiming { step_s, delay_updates })
+        let response = PointResponse::new(&wall, &point, 0.0, DVec3::X);
+        let spec = DeviceSpec { mass_kg, damping_n_s_m, ..DeviceSpec::TOUCH };
+        ClosedLoop::new(&response, spec, None, LoopTiming { step_s, delay_updates })
     }
 
     #[test]
@@ -224,19 +235,24 @@ mod tests {
         assert!((both / 2.5 - 1.0).abs() < 1e-3, "kh/2 + b: {both}");
     }
 
-    /// A loop in time, one mass after the other: how much its size grows over the last half of so many steps.
-    fn grows(place: &PlaceResponse, hand: Hand, timing: LoopTiming, coupling: Coupling, steps: usize) -> f64 {
+    /// Growth of a loop that is simulated in time: its mean square at the end over that at the middle.
+    fn grows(
+        response: &PointResponse,
+        hand: Hand,
+        timing: LoopTiming,
+        coupling: Coupling,
+        steps: usize,
+    ) -> f64 {
         let (h, delay) = (timing.step_s, timing.delay_updates as usize);
         let rate = coupling.damping / h;
         let sum = coupling.stiffness + rate;
-        // Semi-implicit steps of a thousandth: the second route to the exact maps.
+        // Implicit midpoint rule with small steps: the second route to the exact maps.
         const PARTS: u32 = 400;
         let dt = h / f64::from(PARTS);
-        let swings: Vec<[f64; 3]> = place.swings().collect();
-        let mut modes = vec![[0.0_f64, 0.0]; swings.len()];
+        let oscillators: Vec<[f64; 3]> = response.oscillators().collect();
+        let mut modes = vec![[0.0_f64, 0.0]; oscillators.len()];
         let fly = |[mut q, mut v]: [f64; 2], omega: f64, zeta: f64, p: f64| {
             for _ in 0..PARTS {
-                // Implicit midpoint.
                 let (c, k) = (2.0 * zeta * omega, omega * omega);
                 let next = ((1.0 - 0.5 * dt * c - 0.25 * dt * dt * k) * v + dt * (p - k * q))
                     / (1.0 + 0.5 * dt * c + 0.25 * dt * dt * k);
@@ -245,20 +261,23 @@ mod tests {
             }
             [q, v]
         };
-        let traits = Traits::TOUCH;
+        let traits = DeviceSpec::TOUCH;
         let mass = traits.mass_kg + hand.mass_kg;
         let omega = (hand.stiffness_n_m / mass).sqrt();
         let zeta = 0.5 * (hand.damping_n_s_m + traits.damping_n_s_m) / (mass * omega);
         let (mut device, mut stretch) = ([1e-3_f64, 0.0], 0.0);
         let mut line = vec![0.0; delay];
-        let within = place.within_step(h);
+        let within = response.instantaneous_compliance(h);
         let (mut first, mut second) = (0.0_f64, 0.0_f64);
         for step in 0..steps {
-            let free: Vec<[f64; 2]> =
-                modes.iter().zip(&swings).map(|(m, [omega, zeta, _])| fly(*m, *omega, *zeta, 0.0)).collect();
-            let there: f64 = free.iter().zip(&swings).map(|(m, s)| m[0] * s[2].sqrt()).sum();
+            let free: Vec<[f64; 2]> = modes
+                .iter()
+                .zip(&oscillators)
+                .map(|(m, [omega, zeta, _])| fly(*m, *omega, *zeta, 0.0))
+                .collect();
+            let there: f64 = free.iter().zip(&oscillators).map(|(m, s)| m[0] * s[2].sqrt()).sum();
             let force = (device[0] - there - rate / sum * stretch) / (within + 1.0 / sum);
-            for (mode, [omega, zeta, gain]) in modes.iter_mut().zip(&swings) {
+            for (mode, [omega, zeta, gain]) in modes.iter_mut().zip(&oscillators) {
                 *mode = fly(*mode, *omega, *zeta, gain.sqrt() * force);
             }
             stretch = (force + rate * stretch) / sum;
@@ -276,18 +295,18 @@ mod tests {
 
     #[test]
     fn what_is_stable_settles_and_what_is_not_grows() {
-        let place = place();
+        let response = response();
         let hand = Hand::FINGERTIP;
         for (step_s, link) in [(1e-3, 0.0), (2e-3, 0.0), (1e-3, 0.005)] {
             let timing = LoopTiming::new(step_s, link);
-            let closed = ClosedLoop::new(&place, Traits::TOUCH, Some(hand), timing);
+            let closed = ClosedLoop::new(&response, DeviceSpec::TOUCH, Some(hand), timing);
             let damping = 0.2;
             let ranges = closed.stable_stiffness(damping, 1e6);
             let [_, most] = *ranges.last().expect("some stiffness is stable");
             for (share, stable) in [(0.9, true), (1.1, false)] {
                 let coupling = Coupling { stiffness: share * most, damping };
                 assert_eq!(closed.is_stable(coupling), stable);
-                let grows = grows(&place, hand, timing, coupling, 3000);
+                let grows = grows(&response, hand, timing, coupling, 3000);
                 assert_eq!(grows < 1.0, stable, "{step_s} {link} {share}: {grows}, {ranges:?}");
             }
         }
@@ -295,20 +314,21 @@ mod tests {
 
     #[test]
     fn default_gains_have_their_margin_and_are_softer_the_later_the_answer() {
-        let place = place();
+        let response = response();
         let mut last = f64::INFINITY;
         for link in [0.0, 0.005, 0.02, 0.05] {
             let timing = LoopTiming::new(1e-3, link);
             let hands = [None, Some(Hand::FINGERTIP), Some(Hand::LIGHT), Some(Hand::FIRM)];
-            let loops = hands.map(|hand| ClosedLoop::new(&place, Traits::TOUCH, hand, timing));
-            let found = default_coupling(&loops, place.within_step(1e-3)).expect("a soft one always is");
+            let loops = hands.map(|hand| ClosedLoop::new(&response, DeviceSpec::TOUCH, hand, timing));
+            let found = default_coupling(&loops, response.instantaneous_compliance(1e-3))
+                .expect("a soft one always is");
             assert!(
                 found.margins.gain > 1.9 && found.margins.delay_s > 0.9 * timing.age_s(),
                 "{link}: {found:?}"
             );
             assert!(
                 found.coupling.stiffness <= last
-                    && found.coupling.stiffness <= 10.0 / place.within_step(1e-3)
+                    && found.coupling.stiffness <= 10.0 / response.instantaneous_compliance(1e-3)
             );
             let twice =
                 Coupling { stiffness: 1.9 * found.coupling.stiffness, damping: 1.9 * found.coupling.damping };

@@ -10,7 +10,7 @@ type Number = extern "C" fn(usize);
 type Press = extern "C" fn(usize, u32);
 type Turn = extern "C" fn(usize, &[[f64; 3]; 3]);
 type Switch = extern "C" fn(bool);
-type Limit = extern "C" fn(f64);
+type StiffnessLimit = extern "C" fn(f64);
 type IsOpen = extern "C" fn(usize) -> bool;
 
 fn open(standin: &Standin, which: &str) -> Box<dyn Device> {
@@ -18,16 +18,16 @@ fn open(standin: &Standin, which: &str) -> Box<dyn Device> {
 }
 
 #[test]
-fn what_is_there_is_told_with_its_serial_and_force() {
+fn connected_devices_are_listed_with_serial_number_and_force() {
     let standin = Standin::new("libdhd");
     standin.function::<Number>("standin_plug")(2);
-    standin.function::<Limit>("standin_limit")(7.5);
+    standin.function::<StiffnessLimit>("standin_limit")(7.5);
     let found = Driver::Dhd.find(Some(standin.place())).expect("two devices");
     let told: Vec<String> = found.iter().map(|one| format!("{one}, {:?} N", one.force_n)).collect();
     assert_eq!(told, ["0: omega.3 (301), Some(7.5) N", "1: omega.7 (702), Some(7.5) N"]);
-    assert_eq!(open(&standin, "702").traits().force_n, 7.5, "its maker's limit");
-    standin.function::<Limit>("standin_limit")(-1.0);
-    assert_eq!(open(&standin, "0").traits().force_n, 12.0, "no limit: the data sheet's");
+    assert_eq!(open(&standin, "702").spec().force_n, 7.5, "its maker's limit");
+    standin.function::<StiffnessLimit>("standin_limit")(-1.0);
+    assert_eq!(open(&standin, "0").spec().force_n, 12.0, "no limit: the data sheet's");
     let error = Driver::Dhd.open("999", Some(standin.place())).err().expect("no such device");
     assert_eq!(error.to_string(), "dhd: there is no device \"999\", only 0: omega.3 (301), 1: omega.7 (702)");
     standin.function::<Number>("standin_plug")(0);
@@ -36,7 +36,7 @@ fn what_is_there_is_told_with_its_serial_and_force() {
 }
 
 #[test]
-fn places_forces_turns_and_buttons_are_in_our_frame() {
+fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let standin = Standin::new("libdhd");
     standin.function::<Number>("standin_plug")(2);
     let mut device = open(&standin, "1");
@@ -49,10 +49,10 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
     assert_eq!((reading.position, reading.buttons), (DVec3::new(0.02, 0.03, 0.01), 0b101));
     let turned = reading.orientation.expect("it has a wrist");
     assert!(turned.angle_between(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2)) < 1e-9, "{turned}");
-    device.push(DVec3::new(1.0, 2.0, 3.0), 0.0).expect("it pushes");
+    device.set_force(DVec3::new(1.0, 2.0, 3.0), 0.0).expect("it pushes");
     assert_eq!(standin.force(1), [3.0, 1.0, 2.0], "towards the operator, right, up");
     // What is no number goes nowhere, and what is no rotation is not told.
-    device.push(DVec3::new(1.0, f64::NAN, 0.0), 0.0).expect("it pushes");
+    device.set_force(DVec3::new(1.0, f64::NAN, 0.0), 0.0).expect("it pushes");
     assert_eq!(standin.force(1), [0.0; 3]);
     standin.function::<Turn>("standin_turn")(1, &[[f64::NAN; 3]; 3]);
     assert_eq!(device.read(0.0).expect("it reads").orientation, None);
@@ -66,7 +66,7 @@ fn a_device_is_opened_once_and_left_without_force() {
     assert_eq!(standin.force(0), [0.0; 3], "forces are on, and none is given");
     let twice = Driver::Dhd.open("0", Some(standin.place())).err().expect("it is taken");
     assert_eq!(twice.to_string(), "dhd: 0: a device can't be had: device is already in use");
-    device.push(DVec3::Y, 0.0).expect("it pushes");
+    device.set_force(DVec3::Y, 0.0).expect("it pushes");
     assert_eq!(standin.force(0), [0.0, 0.0, 1.0]);
     drop(device);
     assert_eq!(standin.force(0), [0.0; 3]);
@@ -98,7 +98,7 @@ impl Loop {
             self.tick += 1;
             let now_s = self.tick as f64 * 1e-3;
             let effort = Effort { sequence: self.tick, time_s: now_s, force: DVec3::Y, ..Effort::default() };
-            self.port.answer(effort);
+            self.port.send(effort);
             self.update.cycle(now_s);
         }
         self.standin.force(0)[2]
@@ -139,7 +139,7 @@ fn a_fault_takes_the_force_away_by_its_ramp_and_gives_it_back_by_itself() {
     assert_eq!(it.update.counts().safety.trips, 1);
     assert!(it.update.counts().failed >= 10, "{:?}", it.update.counts());
     let why = it.update.failure().expect("why").to_string();
-    assert_eq!(why, "dhd: can't tell the position: communication error");
+    assert_eq!(why, "dhd: can't read the position: communication error");
     assert!((it.run(400) - 1.0).abs() < 1e-9, "it comes back");
 }
 
@@ -162,7 +162,7 @@ fn a_device_that_is_pulled_out_is_found_again_and_gives_force_after_a_press_only
 }
 
 #[test]
-fn numbers_that_are_none_never_reach_the_hand() {
+fn numbers_that_are_not_finite_never_reach_the_hand() {
     let mut it = Loop::new();
     it.run(1);
     it.press();
@@ -179,5 +179,5 @@ fn numbers_that_are_none_never_reach_the_hand() {
         assert!((it.run(500) - 1.0).abs() < 1e-9);
     }
     let safety = it.update.counts().safety;
-    assert!(safety.not_finite > 2 && safety.too_fast > 0, "{safety:?}");
+    assert!(safety.not_finite > 2 && safety.overspeed > 0, "{safety:?}");
 }

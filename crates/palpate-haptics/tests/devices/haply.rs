@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use tungstenite::{Error, Message, WebSocket};
 
-/// What the service answers.
+/// Replies of the service.
 #[derive(Clone, Copy, PartialEq)]
 enum Mood {
     States,
@@ -20,7 +20,7 @@ enum Mood {
     NoDevice,
 }
 
-/// What the service knows, and what it was told.
+/// State of the service, and the messages that it received.
 struct World {
     mood: Mood,
     basis: &'static str,
@@ -173,18 +173,18 @@ fn open(service: &Service) -> Hand {
 /// Push until the service has the force.
 fn push(hand: &mut Hand, service: &Service, force: DVec3, theirs: [f64; 3]) {
     until("the force arrives", || {
-        hand.push(force).expect("it pushes");
+        hand.set_force(force).expect("it pushes");
         service.force() == theirs
     });
 }
 
 #[test]
-fn what_is_there_is_told() {
+fn connected_devices_are_listed() {
     let service = Service::new();
     let found = Driver::Haply.find(Some(&service.place())).expect("a device");
     assert_eq!(found.iter().map(ToString::to_string).collect::<Vec<_>>(), ["0: inverse3 (049D)"]);
     let device = Driver::Haply.open("049D", Some(&service.address.to_string())).expect("by its name").1;
-    assert_eq!((device.traits().kind, device.traits().force_n), ("haply", 10.0));
+    assert_eq!((device.spec().kind, device.spec().force_n), ("haply", 10.0));
     drop(device);
     service.set(|world| world.basis = "XZY");
     let turned = Driver::Haply.open("0", Some(&service.place())).err().expect("other axes").to_string();
@@ -213,7 +213,7 @@ fn without_a_service_it_says_where_it_was_looked_for_and_what_to_do() {
 }
 
 #[test]
-fn places_forces_turns_and_buttons_are_in_our_frame() {
+fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let service = Service::new();
     // A quarter turn about their z, which points up.
     let half = std::f64::consts::FRAC_PI_4;
@@ -239,7 +239,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
 }
 
 #[test]
-fn answers_that_tell_nothing_are_silence_until_there_are_others() {
+fn replies_without_a_reading_count_as_silence() {
     let service = Service::new();
     let mut hand = open(&service);
     hand.next();
@@ -251,7 +251,7 @@ fn answers_that_tell_nothing_are_silence_until_there_are_others() {
             why.is_some()
         });
         let why = why.expect("it was waited for");
-        assert!(why.starts_with("haply: nothing was told for 20 ms; last: "), "{why}");
+        assert!(why.starts_with("haply: no reading for 20 ms; last failure: "), "{why}");
         service.set(|world| world.mood = Mood::States);
         until("it tells again", || hand.read().is_ok());
     }

@@ -17,7 +17,7 @@ fn at(x: f64, y: f64, z: f64) -> [f64; 16] {
     [0., 1., 0., 0., -1., 0., 0., 0., 0., 0., 1., 0., x, y, z, 1.]
 }
 
-/// One library serves a process, with one scheduler: tests that share a process take turns.
+/// Lock for tests that share a process: the library has one scheduler.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn standin() -> (MutexGuard<'static, ()>, Standin) {
@@ -29,13 +29,13 @@ fn open(standin: &Standin, which: &str) -> Hand {
 }
 
 #[test]
-fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() {
+fn connected_devices_are_listed_with_serial_number_and_continuous_force() {
     let (_alone, standin) = standin();
     let found = Driver::OpenHaptics.find(Some(standin.place())).expect("a device");
     assert_eq!(format!("{}, {:?} N", found[0], found[0].force_n), "0: Touch (2016-015-00123), Some(0.88) N");
     assert!(!standin.function::<InUse>("standin_in_use")(), "it is left again");
     let hand = open(&standin, "0");
-    assert_eq!(hand.device.traits().force_n, 0.88);
+    assert_eq!(hand.device.spec().force_n, 0.88);
     drop(hand);
     standin.function::<Switch>("standin_plug")(false);
     let error = Driver::OpenHaptics.find(Some(standin.place())).expect_err("none").to_string();
@@ -43,7 +43,7 @@ fn what_is_there_is_told_with_its_serial_and_the_force_that_it_gives_for_long() 
 }
 
 #[test]
-fn places_forces_turns_and_buttons_are_in_our_frame() {
+fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let (_alone, standin) = standin();
     standin.function::<Transform>("standin_transform")(0, &at(10.0, 20.0, -30.0));
     standin.function::<Press>("standin_press")(0, 0b10);
@@ -54,7 +54,7 @@ fn places_forces_turns_and_buttons_are_in_our_frame() {
     assert!(turned.angle_between(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2)) < 1e-9, "{turned}");
     assert_eq!(reading.buttons, 0b10);
     until("the force arrives", || {
-        hand.push(DVec3::new(0.1, 0.2, 0.3)).expect("it pushes");
+        hand.set_force(DVec3::new(0.1, 0.2, 0.3)).expect("it pushes");
         standin.force(0) == [0.1, 0.2, 0.3]
     });
     // Nobody pushes any more: whoever did may have died.
@@ -77,7 +77,7 @@ fn a_device_is_opened_once_and_left_without_force() {
     );
     until("frames go on after both", || hand.read().is_ok());
     until("the force arrives", || {
-        hand.push(DVec3::X).expect("it pushes");
+        hand.set_force(DVec3::X).expect("it pushes");
         standin.force(0) == [1.0, 0.0, 0.0]
     });
     drop(hand);
@@ -93,13 +93,13 @@ fn two_devices_share_the_scheduler_and_one_goes_on_when_the_other_is_left() {
     until("frames of both", || first.read().is_ok() && second.read().is_ok());
     assert_eq!(second.next().position, DVec3::X);
     until("both push", || {
-        first.push(DVec3::X).and(second.push(DVec3::Y)).expect("they push");
+        first.set_force(DVec3::X).and(second.set_force(DVec3::Y)).expect("they push");
         standin.force(0) == [1.0, 0.0, 0.0] && standin.force(1) == [0.0, 1.0, 0.0]
     });
     drop(first);
     assert_eq!(standin.force(0), [0.0; 3]);
     until("the second goes on", || {
-        second.push(DVec3::Z).expect("it pushes");
+        second.set_force(DVec3::Z).expect("it pushes");
         second.read().is_ok() && standin.force(1) == [0.0, 0.0, 1.0]
     });
 }
@@ -112,12 +112,12 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
     hand.next();
     fault(0x0200);
     let warm = Err("openhaptics: the force was not given: Warm motors (error 0x0200)".to_string());
-    until("motors are warm", || hand.push(DVec3::X) == warm);
+    until("motors are warm", || hand.set_force(DVec3::X) == warm);
     hand.next();
     fault(0x0302);
-    let gone = "openhaptics: the device does not tell where it is: Communication error (error 0x0302)";
+    let gone = "openhaptics: the device reports no position: Communication error (error 0x0302)";
     until("it is pulled out", || hand.read() == Err(gone.to_string()));
-    assert_eq!(hand.push(DVec3::X), Ok(()));
+    assert_eq!(hand.set_force(DVec3::X), Ok(()));
     assert_eq!(standin.force(0), [0.0; 3]);
     fault(0);
     until("it is back", || hand.read().is_ok());
@@ -128,14 +128,14 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
 }
 
 #[test]
-fn numbers_that_are_none_are_told_and_never_pushed() {
+fn numbers_that_are_not_finite_are_read_and_never_commanded() {
     let (_alone, standin) = standin();
     let mut hand = open(&standin, "0");
     standin.function::<Transform>("standin_transform")(0, &[f64::NAN; 16]);
     until("garbage", || hand.next().position.is_nan());
     assert_eq!(hand.next().orientation, None);
     for _ in 0..20 {
-        hand.push(DVec3::new(f64::NAN, 1.0, 1.0)).expect("it pushes");
+        hand.set_force(DVec3::new(f64::NAN, 1.0, 1.0)).expect("it pushes");
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert!(!standin.function::<Pushed>("standin_pushed")(0));

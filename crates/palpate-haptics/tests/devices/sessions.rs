@@ -1,4 +1,4 @@
-//! From a device to an object and back: a session with a stand-in that presses a body.
+//! Session in which a device (a stand-in) presses a body.
 
 #[path = "../processes/scenes.rs"]
 #[allow(dead_code)]
@@ -29,18 +29,18 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         rate_hz: 1000.0,
         limits: SafetyLimits { ramp_up_s: 0.01, ..SafetyLimits::default() },
         passive: true,
-        by_button: false,
+        arm_by_button: false,
     };
     let floor = model.parameters().obstacles[0].pose;
     let session = Session {
         model,
         start: Instant::now(),
-        devices: vec![SessionDevice::Here(attached)],
-        movers: vec![Box::new(move |_: f64| -> Pose { floor })],
+        devices: vec![SessionDevice::Local(attached)],
+        obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
         steps: None,
-        pictures_hz: 0.0,
+        frame_rate_hz: 0.0,
         scheduling: Scheduling { priority: None, core: None },
-        patience_s: 0.5,
+        device_timeout_s: 0.5,
         state: None,
         playback: Arc::default(),
         cycles: None,
@@ -60,7 +60,7 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         (running.join().expect("no panic").expect("it runs").0, felt)
     });
     let device = report.devices[0].as_ref().expect("it was here");
-    assert_eq!(device.traits.kind, "dhd");
+    assert_eq!(device.spec.kind, "dhd");
     assert!(felt[1] > 0.01 && felt[1] > 10.0 * felt[0].hypot(felt[2]), "out of the body: {felt:?}");
     assert!(device.counts.force_max_n >= felt[1] && device.counts.failed == 0, "{:?}", device.counts);
     assert!(report.state.output().objects[0].twist.linear.x < 0.0, "and the body goes");

@@ -26,12 +26,12 @@ impl Standin {
         Self { _folder: folder, file, library }
     }
 
-    /// Its file, for the driver.
+    /// File of the library, for the driver.
     pub fn place(&self) -> &str {
         self.file.to_str().expect("a path in UTF-8")
     }
 
-    /// One of its functions for tests.
+    /// Function of the stand-in, for tests.
     pub fn function<F: Copy>(&self, name: &str) -> F {
         // SAFETY: every caller gives the type that stands in the stand-in's source.
         *unsafe { self.library.get::<F>(name.as_bytes()) }.expect("a function of the stand-in")
@@ -71,8 +71,8 @@ impl Hand {
         next.expect("it was waited for")
     }
 
-    pub fn push(&mut self, force: DVec3) -> Result<(), String> {
-        self.device.push(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
+    pub fn set_force(&mut self, force: DVec3) -> Result<(), String> {
+        self.device.set_force(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
     }
 }
 

@@ -1,8 +1,8 @@
 //! A cycle allocates nothing.
 
 use super::scenes::{STEP_S, half_width, model, path, process};
-use palpate_haptics::device::{Hand, Mount, Simulated, Traits};
-use palpate_haptics::log::{LogWriter, Names};
+use palpate_haptics::device::{DeviceSpec, Hand, Mount, SimulatedDevice};
+use palpate_haptics::log::{LogWriter, SceneNames};
 use palpate_haptics::{
     Cycle, HapticUpdate, PassivityController, Safety, SafetyLimits, Snapshot, Timing, snapshot_buffer,
 };
@@ -52,21 +52,21 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         .zip([1.0, -1.0])
         .map(|(port, side)| {
             let wanted = path(&format!("0,{},0,0\n0.5,{},0,0\n", side * 1.2 * edge, side * 0.9 * edge));
-            let device = Simulated::new(Traits::TOUCH, Hand::FIRM, wanted);
+            let device = SimulatedDevice::new(DeviceSpec::TOUCH, Hand::FIRM, wanted);
             let passivity = PassivityController::new(0.2, 55e-6, STEP_S);
             let safety = Safety::new(SafetyLimits::default());
             HapticUpdate::new(Box::new(device), port, Mount::default(), safety, Some(passivity), false)
         })
         .collect();
-    let (mut snapshot_buffer, _moments) =
+    let (mut snapshot_writer, _snapshots) =
         snapshot_buffer(&Snapshot::new(&model, force.state(), force.input()));
-    let names = Names {
+    let names = SceneNames {
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
         obstacles: vec!["floor".into()],
     };
     let start = (&*model, force.state(), force.input());
-    let (mut hand, _writer) =
+    let (mut sender, _writer) =
         LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start).expect("a log in memory");
     let mut timing = Timing::default();
     force.warm_up();
@@ -77,16 +77,16 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         updates.iter_mut().for_each(|update| update.cycle(now_s));
         force.cycle(now_s);
         if tick % 16 == 0 {
-            snapshot_buffer.show(tick, force.input(), force.state());
-            hand.take_picture(|picture| picture.take(force.input(), force.state()));
+            snapshot_writer.publish(tick, force.input(), force.state());
+            sender.record_frame(|frame| frame.capture(force.input(), force.state()));
         }
-        hand.take(|record| record.take(force.input(), force.state()));
+        sender.record_step(|record| record.capture(force.input(), force.state()));
         let late = Duration::from_nanos(tick);
-        timing.record(Cycle { late, took: 2 * late, overrun: None });
+        timing.record(Cycle { lateness: late, compute: 2 * late, overrun: None });
         pushed = pushed.max(force.state().output().devices[0].force_on_hand.length());
     }
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 1500 cycles");
-    assert!(pushed > 0.01 && hand.missed() == 0, "{pushed} N");
+    assert!(pushed > 0.01 && sender.missed() == 0, "{pushed} N");
     let probe = Box::new(0_u64);
     assert!(ALLOCATIONS.get() > before, "{probe}");
 }

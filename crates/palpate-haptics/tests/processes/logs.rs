@@ -4,64 +4,71 @@ use super::scenes::{STEP_S, half_width, model, process_from};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, State, step};
 use palpate_haptics::Motion;
-use palpate_haptics::log::{LogWriter, Names, Reader};
+use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-fn names() -> Names {
-    Names { objects: vec!["body".into()], devices: vec!["finger".into()], obstacles: vec!["floor".into()] }
+fn names() -> SceneNames {
+    SceneNames {
+        objects: vec!["body".into()],
+        devices: vec!["finger".into()],
+        obstacles: vec!["floor".into()],
+    }
 }
 
-/// A log of 400 steps of a finger that presses, and falls silent in between.
-fn log() -> Vec<u8> {
+/// Steps of the logs that are replayed.
+const STEPS: u64 = 400;
+
+/// Log of a finger that presses and falls silent in between.
+fn log(steps: u64) -> Vec<u8> {
     let model = model(1, 300.0);
-    log_from(State::new(&model), &model)
+    log_from(State::new(&model), &model, steps)
 }
 
-/// The same from a state of the model's.
-fn log_from(state: State, model: &Arc<Model>) -> Vec<u8> {
+/// Log that begins at a state of the model.
+fn log_from(state: State, model: &Arc<Model>, steps: u64) -> Vec<u8> {
     let edge = half_width(model) + 0.004;
     let (mut force, mut ports) = process_from(state, model);
     let facts = BTreeMap::from([("scene".to_string(), "a.toml".to_string())]);
     let files = [("a.toml".to_string(), b"step = 1".to_vec())];
     let start = (&**model, force.state(), force.input());
-    let (mut hand, writer) =
+    let (mut sender, writer) =
         LogWriter::new(Cursor::new(Vec::new()), names(), facts, &files, start).expect("a log in memory");
-    for tick in 1..=400_u64 {
+    for tick in 1..=steps {
         let now_s = tick as f64 * STEP_S;
         if !(200..300).contains(&tick) {
             let position = DVec3::new(edge - 0.003, 0.0005 * (now_s * 31.0).sin(), 1e-4);
-            ports[0].tell(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
+            ports[0].send(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
         }
         force.cycle(now_s);
-        hand.take(|record| {
+        sender.record_step(|record| {
             record.step = tick;
-            record.take(force.input(), force.state());
+            record.capture(force.input(), force.state());
         });
         if tick % 10 == 0 {
-            hand.take_picture(|picture| picture.take(force.input(), force.state()));
+            sender.record_frame(|frame| frame.capture(force.input(), force.state()));
         }
     }
-    let (steps, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
-    assert_eq!((steps, hand.missed()), (400, 0));
+    let (written, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
+    assert_eq!((written, sender.missed()), (steps, 0));
     out.into_inner()
 }
 
 #[test]
-fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
-    let bytes = log();
-    let reader = Reader::new(&bytes).expect("a log");
-    assert_eq!(reader.facts().expect("facts")["scene"], "a.toml");
+fn a_log_replays_bit_for_bit_and_reports_the_first_difference() {
+    let bytes = log(STEPS);
+    let reader = LogReader::new(&bytes).expect("a log");
+    assert_eq!(reader.metadata().expect("facts")["scene"], "a.toml");
     assert_eq!(reader.files().expect("files"), [("a.toml".to_string(), b"step = 1".to_vec())]);
-    assert_eq!(reader.steps(), 400);
+    assert_eq!(reader.step_count(), 400);
     let model = model(1, 300.0);
     for other in [None, Some(250)] {
         let mut state = State::new(&model);
         let mut differs = None;
         let mut away = 0;
-        for (at, logged) in reader.each_step().enumerate() {
+        for (at, logged) in reader.logged_steps().enumerate() {
             let logged = logged.expect("a step");
             assert_eq!(logged.step, at as u64 + 1);
             let mut input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
@@ -71,7 +78,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
             }
             step(&model, &mut state, &input);
             differs = differs.or_else(|| {
-                logged.difference(&names(), state.output()).map(|(what, ..)| (logged.step, what))
+                logged.first_difference(&names(), state.output()).map(|(what, ..)| (logged.step, what))
             });
         }
         match other {
@@ -83,7 +90,7 @@ fn a_log_repeats_bit_for_bit_and_tells_what_differs() {
 }
 
 #[test]
-fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
+fn a_log_of_a_resumed_scene_begins_at_its_initial_state() {
     let model = model(1, 300.0);
     let press = |number: u32| {
         let place = DVec3::new(half_width(&model) + 0.004 - 2e-5 * f64::from(number), 1e-3, 0.0);
@@ -98,34 +105,35 @@ fn a_log_of_a_scene_that_went_on_begins_where_that_was() {
     assert!(begins.output().energy.elastic > 1e-9, "{:?}", begins.output().energy);
     assert!(motions[0].angular_momentum != DVec3::ZERO && motions[0].twist.linear.x < 0.0, "{motions:?}");
 
-    let bytes = log_from(begins, &model);
-    let reader = Reader::new(&bytes).expect("a log");
+    let bytes = log_from(begins, &model, STEPS);
+    let reader = LogReader::new(&bytes).expect("a log");
     let read = reader.start(&names()).expect("readable").expect("it tells how the body begins");
     assert_eq!(read, motions, "to the last bit");
     let mut state = State::resume(&model, &read);
     let mut at_rest = State::new(&model);
     let mut differs = 0;
-    for logged in reader.each_step() {
+    for logged in reader.logged_steps() {
         let logged = logged.expect("a step");
         let input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
         step(&model, &mut state, &input);
-        assert_eq!(logged.difference(&names(), state.output()), None, "step {}", logged.step);
+        assert_eq!(logged.first_difference(&names(), state.output()), None, "step {}", logged.step);
         step(&model, &mut at_rest, &input);
-        differs += u32::from(logged.difference(&names(), at_rest.output()).is_some());
+        differs += u32::from(logged.first_difference(&names(), at_rest.output()).is_some());
     }
     assert_eq!(differs, 400, "from rest it would be another motion");
-    let unknown = Names { objects: vec!["other".into()], ..Names::default() };
+    let unknown = SceneNames { objects: vec!["other".into()], ..SceneNames::default() };
     let error = reader.start(&unknown).expect_err("there is none of that name").to_string();
-    assert_eq!(error, "the log does not tell how \"other\" begins");
+    assert_eq!(error, "the log has no initial state of \"other\"");
 }
 
 #[test]
-fn what_is_no_log_or_half_of_one_is_refused_in_words() {
-    let bytes = log();
-    let error = |bytes: &[u8]| match Reader::new(bytes) {
+fn files_that_are_no_log_or_half_of_one_are_refused() {
+    // Few steps: the file is short, and every 11th byte of it is tried.
+    let bytes = log(20);
+    let error = |bytes: &[u8]| match LogReader::new(bytes) {
         Err(error) => error.to_string(),
         Ok(reader) => {
-            let wrong = reader.each_step().find_map(Result::err).or(reader.files().err());
+            let wrong = reader.logged_steps().find_map(Result::err).or(reader.files().err());
             wrong.map_or(String::new(), |error| error.to_string())
         }
     };
@@ -136,9 +144,36 @@ fn what_is_no_log_or_half_of_one_is_refused_in_words() {
         assert!(error(bytes).starts_with("the log"), "{what}: {:?}", error(bytes));
     }
     // Whatever bytes are wrong, nothing panics.
-    for at in (0..bytes.len()).step_by(97) {
+    for at in (0..bytes.len()).step_by(11) {
         let mut wrong = bytes.clone();
         wrong[at] ^= 0x55;
         error(&wrong);
+    }
+}
+
+#[test]
+fn logs_of_every_form_open_with_their_start_and_inputs() {
+    let names = SceneNames {
+        objects: vec!["block".into()],
+        devices: vec!["left".into(), "right".into()],
+        obstacles: vec!["box".into(), "rail".into()],
+    };
+    let forms = [
+        // Form, bytes, whether it has initial states, whether it has held points.
+        ("v1", &include_bytes!("../../../../data/logs/v1/held_and_simulated.mcap")[..], false, false),
+        ("v2", &include_bytes!("../../../../data/logs/v2/held_and_simulated.mcap")[..], false, true),
+        ("v3", &include_bytes!("../../../../data/logs/v3/held_and_simulated.mcap")[..], true, true),
+    ];
+    for (form, bytes, has_start, has_held_points) in forms {
+        let reader = LogReader::new(bytes).expect("a log");
+        assert_eq!(reader.metadata().expect("metadata")["scene"], "held_and_simulated.toml", "{form}");
+        assert_eq!(reader.files().expect("files").len(), 5, "{form}");
+        assert_eq!(reader.start(&names).expect("readable").is_some(), has_start, "{form}");
+        assert_eq!(reader.step_count(), 250, "{form}");
+        let inputs = reader.logged_steps().map(|logged| {
+            logged.and_then(|logged| logged.input(&names, &[DeviceMode::Touch; 2])).expect("an input")
+        });
+        let held = |input: &Input| matches!(input.devices[0].mode, DeviceMode::Held(_));
+        assert_eq!(inputs.filter(held).count(), if has_held_points { 250 } else { 0 }, "{form}");
     }
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Step of all scenes [s].
 pub const STEP_S: f64 = 1e-3;
 
-/// How far the recorded body's surface is from its centre along x [m].
+/// Half width of the recorded body along x [m].
 pub fn half_width(model: &Model) -> f64 {
     let positions = model.recordings().next().map(|r| r.surface.positions.clone()).unwrap_or_default();
     positions.iter().map(|p| p.x).fold(0.0, f64::max)
@@ -47,18 +47,18 @@ pub fn process(model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
     process_from(State::new(model), model)
 }
 
-/// The same from a state of the model's.
+/// Force process at a state of the model, with the devices' ends of its ports.
 pub fn process_from(state: State, model: &Arc<Model>) -> (ForceProcess, Vec<DevicePort>) {
     let devices = model.parameters().devices.len();
-    let (ends, seats): (Vec<_>, Vec<_>) = (0..devices)
+    let (ends, slots): (Vec<_>, Vec<_>) = (0..devices)
         .map(|_| {
             let (device, force) = port();
             (device, (force, DeviceMode::Touch))
         })
         .unzip();
     let floor = model.parameters().obstacles[0].pose;
-    let mover: ObstacleTrajectory = Box::new(move |_| floor);
-    (ForceProcess::from_state(state, model.clone(), seats, vec![mover], 0.05), ends)
+    let trajectory: ObstacleTrajectory = Box::new(move |_| floor);
+    (ForceProcess::from_state(state, model.clone(), slots, vec![trajectory], 0.05), ends)
 }
 
 /// A path from text.

@@ -2,8 +2,8 @@
 
 use super::scenes::{half_width, model, path};
 use palpate::{DeviceMode, Input, Pose};
-use palpate_haptics::device::{Hand, Mount, Scripted, Simulated, Traits};
-use palpate_haptics::log::{LogSender, LogWriter, Names, Reader};
+use palpate_haptics::device::{DeviceSpec, Hand, Mount, PathDevice, SimulatedDevice};
+use palpate_haptics::log::{LogReader, LogSender, LogWriter, SceneNames};
 use palpate_haptics::{
     AttachedDevice, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
 };
@@ -19,30 +19,30 @@ fn session(steps: Option<u64>) -> Session {
     let attached = |side: f64| {
         let wanted = path(&format!("0,{},0,0\n0.1,{},0,0\n", side * 1.1 * edge, side * 0.9 * edge));
         let device: Box<dyn palpate_haptics::device::Device> = if side > 0.0 {
-            Box::new(Scripted::new(wanted))
+            Box::new(PathDevice::new(wanted))
         } else {
-            Box::new(Simulated::new(Traits::TOUCH, Hand::FIRM, wanted))
+            Box::new(SimulatedDevice::new(DeviceSpec::TOUCH, Hand::FIRM, wanted))
         };
-        SessionDevice::Here(AttachedDevice {
+        SessionDevice::Local(AttachedDevice {
             device,
             mode: DeviceMode::Touch,
             mount: Mount::default(),
             rate_hz: 1000.0,
             limits: SafetyLimits::default(),
             passive: true,
-            by_button: false,
+            arm_by_button: false,
         })
     };
     let floor = model.parameters().obstacles[0].pose;
     Session {
         start: Instant::now(),
         devices: vec![attached(1.0), attached(-1.0)],
-        movers: vec![Box::new(move |_: f64| -> Pose { floor })],
+        obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
         model,
         steps,
-        pictures_hz: 60.0,
+        frame_rate_hz: 60.0,
         scheduling: Scheduling { priority: None, core: None },
-        patience_s: 0.5,
+        device_timeout_s: 0.5,
         state: None,
         playback: Arc::default(),
         cycles: None,
@@ -52,7 +52,7 @@ fn session(steps: Option<u64>) -> Session {
 /// A log of a session, whose begin fits.
 fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogSender, LogWriter<W>) {
     let process = ForceProcess::new(session.model.clone(), Vec::new(), Vec::new(), 1.0);
-    let names = Names {
+    let names = SceneNames {
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
         obstacles: vec!["floor".into()],
@@ -73,24 +73,26 @@ fn a_session_keeps_count_makes_pictures_and_logs_every_step() {
     let mut frames = 0;
     let mut pictures = DeformationProcess::new(session.model.clone());
     let (report, out) = session
-        .run(Some(log), &stop, &steps, |moment| {
+        .run(Some(log), &stop, &steps, |snapshot| {
             frames += 1;
-            let frame = pictures.cycle(moment);
+            let frame = pictures.cycle(snapshot);
             let object = &frame.objects[0];
             let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-5;
             assert!(object.pose.is_some() && object.normals.iter().all(unit));
         })
         .expect("it runs");
     assert_eq!((report.steps, report.force.cycles(), steps.load(Ordering::Relaxed)), (400, 400, 400));
-    assert!(frames > 3 && report.pictures.cycles() == frames, "{frames} pictures");
+    assert!(frames > 3 && report.deformation.cycles() == frames, "{frames} pictures");
     assert!(report.wall_s > 0.35, "by the clock: {} s", report.wall_s);
     for device in report.devices.iter().flatten() {
-        assert!(device.counts.updates > 50 && device.counts.failed == 0 && device.answers.count() > 50);
+        assert!(
+            device.counts.updates > 50 && device.counts.failed == 0 && device.motion_to_force.count() > 50
+        );
     }
     let logged = report.log.expect("a log");
     assert_eq!(logged.steps + logged.missed, 400);
     let bytes = out.expect("what it was written to").expect("memory is not full").into_inner();
-    assert_eq!(Reader::new(&bytes).expect("a log").steps(), logged.steps);
+    assert_eq!(LogReader::new(&bytes).expect("a log").step_count(), logged.steps);
 }
 
 /// A disk with room for so many bytes.
@@ -115,12 +117,12 @@ impl Seek for Disk {
 
 #[test]
 fn a_disk_that_is_full_ends_the_log_and_nothing_else() {
-    let session = session(Some(400));
-    let disk = Disk(Cursor::new(Vec::new()), 20_000);
+    let session = session(Some(150));
+    let disk = Disk(Cursor::new(Vec::new()), 10_000);
     let log = log_to(disk, &session);
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let (report, out) = session.run(Some(log), &stop, &steps, |_| ()).expect("it runs");
-    assert_eq!((report.steps, report.log), (400, None));
+    assert_eq!((report.steps, report.log), (150, None));
     let error = out.expect("there was a log").err().expect("it can't be written").to_string();
     assert!(error.starts_with("cannot write the log: ") && error.contains("no room is left"), "{error}");
 }
@@ -143,7 +145,7 @@ fn a_session_without_an_end_stops_when_it_is_told() {
 #[test]
 fn what_can_not_be_in_real_time_is_refused() {
     let mut wrong = session(Some(1));
-    let SessionDevice::Here(first) = &mut wrong.devices[0] else { panic!("it is here") };
+    let SessionDevice::Local(first) = &mut wrong.devices[0] else { panic!("it is here") };
     first.rate_hz = 0.0;
     let refused = wrong.run::<Cursor<Vec<u8>>>(None, &AtomicBool::new(false), &AtomicU64::new(0), |_| ());
     let error = refused.expect_err("no rate").to_string();

@@ -1,4 +1,4 @@
-//! Devices that fall silent.
+//! Silent devices.
 
 use super::scenes::{STEP_S, half_width, model, process};
 use glam::DVec3;
@@ -6,7 +6,7 @@ use palpate::DeviceMode;
 use palpate_haptics::{Effort, Motion};
 
 #[test]
-fn a_device_that_falls_silent_is_away_and_comes_back_while_the_object_goes_on() {
+fn a_silent_device_is_inactive_and_comes_back_while_the_object_moves_on() {
     let model = model(1, 300.0);
     let edge = half_width(&model) + 0.004;
     let (mut force, mut ports) = process(&model);
@@ -24,7 +24,7 @@ fn a_device_that_falls_silent_is_away_and_comes_back_while_the_object_goes_on() 
             let position = DVec3::X * (x + edge + (0.004 - 0.06 * since).max(-0.002));
             // A number that is none is as good as silence.
             let position = if tick % 100 == 50 { position * f64::NAN } else { position };
-            port.tell(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
+            port.send(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
         }
         let output = force.cycle(now_s);
         assert!(output.devices[0].force_on_hand.is_finite() && output.energy.stored().is_finite());
@@ -45,5 +45,5 @@ fn a_device_that_falls_silent_is_away_and_comes_back_while_the_object_goes_on() 
     }
     assert_eq!(silent_force, 0.0);
     assert!(back > 0.05, "it is felt again: {back} N");
-    assert!(last.taken_j.is_finite() && last.taken_j > 0.0);
+    assert!(last.absorbed_j.is_finite() && last.absorbed_j > 0.0);
 }

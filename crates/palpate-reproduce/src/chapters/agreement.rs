@@ -11,9 +11,8 @@ use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
     ResponseForm, Sampling, State, Twist, step,
 };
-use palpate_fem::progress::Silent;
-use palpate_fem::record::Recorded;
-use palpate_fem::table::{Method, TableParameters, TableRecorder};
+use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
+use palpate_fem::{RecordedBody, SilentProgress};
 use std::sync::Arc;
 
 /// Small enough for all its modes.
@@ -24,7 +23,7 @@ const STEP_S: f64 = 1e-3;
 /// fir against modal, and time integration against the closed form of all modes.
 pub fn chapter(progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     progress.begin("agreement", 1);
-    let body = cube(CELLS, usize::MAX, &mut Silent)?;
+    let body = cube(CELLS, usize::MAX, &mut SilentProgress)?;
     let mut rows = Vec::new();
     for (number, narrow) in [("double precision", false), ("single precision", true)] {
         let error = largest_force_difference(&body, narrow)?;
@@ -41,7 +40,7 @@ pub fn chapter(progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceErr
          round-off.",
     );
 
-    let surface = body.system.discretisation.surface_nodes();
+    let surface = body.surface_nodes();
     let of = |method| TableParameters {
         step_s: 2e-3,
         samples: 100,
@@ -55,11 +54,11 @@ pub fn chapter(progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceErr
         let recorder = TableRecorder::new(&body, &parameters)?;
         Ok(recorder.columns(0..3, 3, &|_| {}).concat())
     };
-    let exact = columns(Method::ClosedForm)?;
+    let exact = columns(TableMethod::ClosedForm)?;
     let scale = exact.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     let mut points = Vec::new();
     for substeps in [1, 2, 4, 8, 16] {
-        let computed = columns(Method::Transient { substeps })?;
+        let computed = columns(TableMethod::Transient { substeps })?;
         let error = exact.iter().zip(&computed).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
         points.push((2.0 / f64::from(substeps), error / scale));
     }
@@ -89,9 +88,9 @@ pub fn chapter(progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceErr
 }
 
 /// Largest difference of forces between both forms, as a share of the largest force.
-fn largest_force_difference(body: &Recorded, narrow: bool) -> Result<f64, ReproduceError> {
+fn largest_force_difference(body: &RecordedBody, narrow: bool) -> Result<f64, ReproduceError> {
     let rounded = |value: f64| if narrow { f64::from(value as f32) } else { value };
-    let surface = body.system.discretisation.surface_nodes();
+    let surface = body.surface_nodes();
     let table = table_in_memory(body, STEP_S, SAMPLES, surface, rounded)?;
     let recording = Arc::new(body.recording.clone());
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };

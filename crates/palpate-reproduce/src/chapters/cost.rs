@@ -1,4 +1,4 @@
-//! The cost of direct convolution against what section 2.5 of the paper says of it.
+//! The cost of direct convolution, against section 2.5 of the paper.
 
 use crate::bodies::{cube, table_in_memory};
 use crate::chapter::{Chapter, csv};
@@ -13,8 +13,7 @@ use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Pose, Recording, ResponseForm, State, SurfacePoint, Twist, step,
 };
-use palpate_fem::progress::Silent;
-use palpate_fem::record::Recorded;
+use palpate_fem::{RecordedBody, SilentProgress};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -41,7 +40,7 @@ const STEP_S: f64 = 1e-3;
 const USUAL_SAMPLES: usize = 500;
 const USUAL_POINTS: usize = 2;
 
-/// Few: the numbers in the table don't change its cost.
+/// Modes of the bodies: few, for the numbers in the table do not change its cost.
 const MODES: usize = 60;
 
 /// Surface nodes spread over the body, each as a point of one of its triangles.
@@ -56,10 +55,10 @@ fn points(recording: &Recording, count: usize) -> Vec<SurfacePoint> {
     (0..count).filter_map(|k| at_node((2 * k + 1) * nodes / (2 * count))).collect()
 }
 
-/// Measure one configuration: all hands move, and the history is full.
-fn measure(body: &Recorded, held: usize, samples: usize, steps: usize) -> Result<Cost, ReproduceError> {
+/// Measures one configuration, with all devices in motion and a full history.
+fn measure(body: &RecordedBody, held: usize, samples: usize, steps: usize) -> Result<Cost, ReproduceError> {
     let recording = Arc::new(body.recording.clone());
-    let surface_nodes = body.system.discretisation.surface_nodes();
+    let surface_nodes = body.surface_nodes();
     let held = points(&recording, held);
     let mut touchable: Vec<u32> = held
         .iter()
@@ -150,7 +149,7 @@ pub fn chapter(effort: Effort, progress: &mut dyn StageProgress) -> Result<Chapt
     let (contacts, windows) = ([1, 2, 4, 8, 16], [125, 250, 500, 1000, 2000]);
     progress.begin("cost of direct convolution", (cells.len() + contacts.len() + windows.len()) as u64);
     let mut all = Vec::new();
-    let mut over = |body: &Recorded, points: usize, samples: usize| -> Result<Cost, ReproduceError> {
+    let mut over = |body: &RecordedBody, points: usize, samples: usize| -> Result<Cost, ReproduceError> {
         let cost = measure(body, points, samples, effort.steps)?;
         progress.advance(1);
         all.push(cost);
@@ -158,9 +157,9 @@ pub fn chapter(effort: Effort, progress: &mut dyn StageProgress) -> Result<Chapt
     };
     let mut by_nodes = Vec::new();
     for cells in cells {
-        by_nodes.push(over(&cube(cells, MODES, &mut Silent)?, USUAL_POINTS, USUAL_SAMPLES)?);
+        by_nodes.push(over(&cube(cells, MODES, &mut SilentProgress)?, USUAL_POINTS, USUAL_SAMPLES)?);
     }
-    let usual = cube(8, MODES, &mut Silent)?;
+    let usual = cube(8, MODES, &mut SilentProgress)?;
     let by_contacts = contacts.map(|points| over(&usual, points, USUAL_SAMPLES));
     let by_samples = windows.map(|samples| over(&usual, USUAL_POINTS, samples));
     let by_contacts: Vec<Cost> = by_contacts.into_iter().collect::<Result<_, _>>()?;

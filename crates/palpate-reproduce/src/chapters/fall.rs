@@ -2,7 +2,7 @@
 
 use crate::bodies::damped_cube;
 use crate::chapter::{Chapter, csv};
-use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::image_series::{ImageRenderer, ImageSeries};
@@ -34,12 +34,14 @@ const HALF_M: f64 = 0.05;
 const DAMPING: Damping = Damping::Rayleigh { alpha: 0.0, beta: 1e-4 };
 
 const SECONDS: f64 = 5.0;
-/// It lies still when the force of the floor stays so near to the weight, as a share of it, for so long [s].
+/// Largest deviation of the floor's force from its mean, as a share of it, of a cube that lies still.
 const STILL: f64 = 0.1;
+
+/// Time for which the deviation is looked at [s].
 const STILL_S: f64 = 0.2;
-/// What curves show.
+/// Time that the curves show [s].
 const DRAWN_S: f64 = 1.0;
-/// A jump begins this high above the floor [m].
+/// Height above the floor at which a jump begins [m].
 const JUMP_M: f64 = 1e-3;
 
 const CAMERA: CameraView = CameraView { from: [0.14, 0.15, 0.40], to: [0.0, 0.068, 0.0] };
@@ -82,7 +84,7 @@ impl Story {
         Some(Self { touch, deepest, leaves, top, second: lowest(down, up_again)? })
     }
 
-    /// Steps since the start, and what is to be seen.
+    /// Steps since the start, with captions.
     fn instants(&self, steps: &[LoggedStep]) -> Vec<(u64, String)> {
         let bends = (self.touch..=self.deepest)
             .find(|&at| height(&steps[at]) < 0.5 * height(&steps[self.deepest]))
@@ -117,7 +119,7 @@ fn lies_still(steps: &[LoggedStep]) -> bool {
     late.iter().all(|logged| (logged.support.y - mean).abs() <= STILL * mean)
 }
 
-/// The same scene with every node of the face instead of few places: the rebound [m].
+/// Rebound [m] of the scene with contact samples at all nodes.
 fn rebound_of_every_node(options: &Options) -> Result<f64, ReproduceError> {
     let scene = read_scene(&options.scenes().join(SCENE_NAME), RunMode::Offline)?;
     let mut state = State::new(&scene.model);
@@ -300,8 +302,9 @@ fn heights(steps: &[LoggedStep], is_papers: bool) -> Chart {
     let mut reference_lines = Vec::new();
     if is_papers {
         series.push(unreduced(|row| 1e3 * row.height_m));
-        reference_lines.push(ReferenceLine::Horizontal {
-            y: 1e3 * UNREDUCED_REBOUND_M,
+        reference_lines.push(ReferenceLine {
+            axis: AxisName::Y,
+            value: 1e3 * UNREDUCED_REBOUND_M,
             label: format!("{:.1} mm", 1e3 * UNREDUCED_REBOUND_M),
         });
     }
@@ -319,7 +322,7 @@ fn forces(steps: &[LoggedStep], is_papers: bool, weight: f64) -> Chart {
         series.push(unreduced(|row| row.force_n));
     }
     let reference_lines =
-        vec![ReferenceLine::Horizontal { y: weight, label: format!("weight: {weight:.2} N") }];
+        vec![ReferenceLine { axis: AxisName::Y, value: weight, label: format!("weight: {weight:.2} N") }];
     chart("Force of the floor", "upward [N]", series, reference_lines)
 }
 

@@ -1,19 +1,18 @@
 //! Figures 2 and 3: an impulse by a point and by a plane on the top face, and how the wave arrives.
 
 use crate::chapter::{Chapter, DataFile, csv};
-use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::page::{Section, figure, gallery, paragraph};
 use crate::progress::StageProgress;
 use crate::surface_picture::{Frame, Picture, View, colour_bar};
-use faer::Mat;
 use glam::{DMat3, DVec3};
 use palpate::Sampling;
-use palpate_fem::record::Recorded;
-use palpate_fem::table::{Method, TableParameters, TableRecorder};
+use palpate_fem::RecordedBody;
+use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 
-/// Steps of the integration [s]; the force is held for `HELD` of them, the paper's step of 2 ms.
+/// Step of the integration [s]; the force is held for `HELD` of them, the paper's step of 2 ms.
 const STEP_S: f64 = 0.5e-3;
 const HELD: usize = 4;
 const SAMPLES: usize = 160;
@@ -81,30 +80,28 @@ impl Wave {
 }
 
 /// The two figures and the arrival curve.
-pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
-    let discretisation = &body.system.discretisation;
-    let surface = discretisation.surface_nodes();
+pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
+    let surface = body.surface_nodes();
     let top = |p: &DVec3| p.y > 0.05 - 1e-9;
-    let centre = discretisation.node_at(DVec3::new(0.0, 0.05, 0.0));
-    let on_top: Vec<usize> =
-        (0..discretisation.nodes.len()).filter(|&node| top(&discretisation.nodes[node])).collect();
+    let centre = body.nearest_node(DVec3::new(0.0, 0.05, 0.0));
+    let on_top: Vec<usize> = (0..body.nodes().len()).filter(|&node| top(&body.nodes()[node])).collect();
     // Downward: 1 N on the middle node; 1 N over the whole face, the same on each of its nodes.
-    let mut loads = Mat::zeros(discretisation.dofs(), 2);
-    loads[(3 * centre + 1, 0)] = -1.0;
+    let mut loads = vec![vec![0.0; body.dofs()]; 2];
+    loads[0][3 * centre + 1] = -1.0;
     for &node in &on_top {
-        loads[(3 * node + 1, 1)] = -1.0 / on_top.len() as f64;
+        loads[1][3 * node + 1] = -1.0 / on_top.len() as f64;
     }
     let parameters = TableParameters {
         step_s: STEP_S,
         samples: SAMPLES,
         sampling: Sampling::End,
-        method: Method::Transient { substeps: 1 },
+        method: TableMethod::Transient { substeps: 1 },
         touchable_nodes: surface.clone(),
         observed_nodes: surface.clone(),
     };
     progress.begin("impulses (figures 2 and 3)", 1);
     let recorder = TableRecorder::new(body, &parameters)?;
-    let responses = recorder.responses(loads);
+    let responses = recorder.responses(&loads);
     progress.finish();
     let waves: Vec<Wave> = responses.iter().map(|column| Wave::new(column, surface.len())).collect();
 
@@ -121,14 +118,14 @@ pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chap
     ];
     for (wave, (label, by, file, what)) in waves.iter().zip(names) {
         html += &pictures(body, &surface, wave, &format!("{label}: {what} (by {by})."));
-        data.push(frames_csv(&format!("{file}.csv"), discretisation, &surface, wave));
+        data.push(frames_csv(&format!("{file}.csv"), body, &surface, wave));
     }
     // What moves as a whole counts, too: seen from the body's own frame, far nodes move at once, backwards.
-    let rest: Vec<DVec3> = surface.iter().map(|&node| discretisation.nodes[node as usize]).collect();
+    let rest: Vec<DVec3> = surface.iter().map(|&node| body.nodes()[node as usize]).collect();
     let share = DVec3::NEG_Y / on_top.len() as f64;
     let forces = [
-        vec![(discretisation.nodes[centre], DVec3::NEG_Y)],
-        on_top.iter().map(|&node| (discretisation.nodes[node], share)).collect(),
+        vec![(body.nodes()[centre], DVec3::NEG_Y)],
+        on_top.iter().map(|&node| (body.nodes()[node], share)).collect(),
     ];
     let (mass, inertia) = (body.recording.mass(), body.recording.inertia());
     let waves: Vec<Wave> = waves
@@ -161,12 +158,13 @@ pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chap
             },
         ],
         reference_lines: vec![
-            ReferenceLine::Horizontal { y: 16.0, label: "paper: 16 ms".into() },
-            ReferenceLine::Horizontal {
-                y: pressure_ms,
+            ReferenceLine { axis: AxisName::Y, value: 16.0, label: "paper: 16 ms".into() },
+            ReferenceLine {
+                axis: AxisName::Y,
+                value: pressure_ms,
                 label: format!("pressure wave: {pressure_ms:.1} ms"),
             },
-            ReferenceLine::Vertical { x: 1.0, label: "1 %".into() },
+            ReferenceLine { axis: AxisName::X, value: 1.0, label: "1 %".into() },
         ],
     };
     let at = |points: &[(f64, f64)], percent: f64| {
@@ -205,13 +203,12 @@ pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chap
 }
 
 /// The deformed surface at some moments, exaggerated, coloured by displacement.
-fn pictures(body: &Recorded, surface: &[u32], wave: &Wave, caption: &str) -> String {
-    let discretisation = &body.system.discretisation;
-    let mut number = vec![0_u32; discretisation.nodes.len()];
+fn pictures(body: &RecordedBody, surface: &[u32], wave: &Wave, caption: &str) -> String {
+    let mut number = vec![0_u32; body.nodes().len()];
     surface.iter().enumerate().for_each(|(at, &node)| number[node as usize] = at as u32);
     let triangles: Vec<[u32; 3]> =
-        discretisation.triangles.iter().map(|t| t.map(|node| number[node as usize])).collect();
-    let rest: Vec<DVec3> = surface.iter().map(|&node| discretisation.nodes[node as usize]).collect();
+        body.surface_triangles().iter().map(|t| t.map(|node| number[node as usize])).collect();
+    let rest: Vec<DVec3> = surface.iter().map(|&node| body.nodes()[node as usize]).collect();
     let frames: Vec<(f64, &Vec<DVec3>)> = SHOWN_MS
         .iter()
         .filter_map(|&ms| Some((ms, wave.frames.get((ms * 1e-3 / STEP_S).round() as usize - 1)?)))
@@ -244,16 +241,11 @@ fn pictures(body: &Recorded, surface: &[u32], wave: &Wave, caption: &str) -> Str
 }
 
 /// Every shown moment and node: where it is at rest and how far it has moved.
-fn frames_csv(
-    name: &str,
-    discretisation: &palpate_fem::discretisation::Discretisation,
-    surface: &[u32],
-    wave: &Wave,
-) -> DataFile {
+fn frames_csv(name: &str, body: &RecordedBody, surface: &[u32], wave: &Wave) -> DataFile {
     let rows = SHOWN_MS.iter().flat_map(|&ms| {
         let frame = &wave.frames[(ms * 1e-3 / STEP_S).round() as usize - 1];
         surface.iter().zip(frame).map(move |(&node, u)| {
-            let p = discretisation.nodes[node as usize];
+            let p = body.nodes()[node as usize];
             vec![ms, f64::from(node), p.x, p.y, p.z, u.x, u.y, u.z]
         })
     });

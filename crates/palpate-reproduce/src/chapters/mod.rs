@@ -16,7 +16,7 @@ use crate::image_series::ImageRenderer;
 use crate::options::{Options, Part};
 use crate::progress::StageProgress;
 use palpate_export::write_atomically;
-use palpate_fem::record::Recorded;
+use palpate_fem::RecordedBody;
 use palpate_scene::WithoutRemarks;
 
 /// Modes of the recorded cube.
@@ -46,7 +46,7 @@ pub fn chapters(options: &Options, progress: &mut dyn StageProgress) -> Result<V
 }
 
 /// Writes the recording into the folder of the scenes.
-fn write_recording(options: &Options, body: &Recorded) -> Result<(), ReproduceError> {
+fn write_recording(options: &Options, body: &RecordedBody) -> Result<(), ReproduceError> {
     let folder = options.scenes();
     std::fs::create_dir_all(&folder).map_err(|e| ReproduceError::folder(&folder, e))?;
     Ok(write_atomically(&folder.join("cube.palp"), &body.recording.to_bytes()?)?)

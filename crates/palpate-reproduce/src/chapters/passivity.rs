@@ -1,4 +1,4 @@
-//! The discrete passivity test: which ways of sampling keep a port from giving energy away.
+//! The discrete passivity test of ways of sampling: whether a port generates energy.
 //!
 //! The work at a port in a step is f[t]·(u[t] − u[t−1]). With u = Σ R[s]·f[t−s] it is never negative in sum exactly if
 //!
@@ -9,23 +9,22 @@
 //! Where Re Y is negative the discrete port generates energy; its least value is given as a share of the largest.
 
 use crate::chapter::{Chapter, csv};
-use crate::chart::{Axis, Chart, ReferenceLine, Scale, Series, Style};
+use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::page::{Section, figure, paragraph, table};
 use crate::progress::StageProgress;
-use faer::Mat;
 use glam::DVec3;
 use palpate::{Damping, OscillatorState, SampledOscillator};
-use palpate_fem::record::Recorded;
-use palpate_fem::reference::{LoadedMode, Reference};
+use palpate_fem::reference::LoadedMode;
+use palpate_fem::{RecordedBody, SilentProgress};
 use std::f64::consts::TAU;
 
 /// The paper's step, and its window of 1 s.
 const STEP_S: f64 = 2e-3;
 const WINDOW: usize = 500;
 
-/// Long enough for all but the last 1e-9 of a mode that decays with α/2 = 1/s.
+/// Samples after which a mode that decays with α/2 = 1/s has lost all but 1e-9 of its amplitude.
 const LONG: usize = 10_000;
 
 /// Krylov blocks for what 200 modes leave out, as in the certificate.
@@ -73,17 +72,17 @@ impl Port {
 }
 
 /// The port of one node and direction: the kept modes and what stands for the others.
-fn port(body: &Recorded, node: usize, axis: usize, damping: Damping) -> Result<Port, ReproduceError> {
+fn port(body: &RecordedBody, node: usize, axis: usize, damping: Damping) -> Result<Port, ReproduceError> {
     let failed = |e: &dyn std::fmt::Display| ReproduceError::Measurement(format!("passivity: {e}"));
-    let mut loads = Mat::zeros(body.system.discretisation.dofs(), 3);
-    (0..3).for_each(|a| loads[(3 * node + a, a)] = 1.0);
-    let mut silent = palpate_fem::progress::Silent;
-    let reference = Reference::new(&body.system, &body.modes, loads, STEP_S, BLOCKS, &mut silent)
+    let unreduced = body.unreduced();
+    let truncated = unreduced
+        .truncated_response(&[node], STEP_S, BLOCKS, &mut SilentProgress)
+        .and_then(|response| response.modes(0, BLOCKS))
         .map_err(|e| failed(&e))?;
-    let left_out = reference.left_out(&body.system, 0, BLOCKS).map_err(|e| failed(&e))?;
-    let kept = body.modes.squares.iter().enumerate();
-    let kept = kept.map(|(i, &square)| (square, body.modes.shapes[(3 * node + axis, i)]));
-    let others = left_out.iter().map(|LoadedMode { square, gain }| (*square, gain[axis]));
+    let modes = unreduced.kept_modes();
+    let kept = modes.squared_frequencies().iter().enumerate();
+    let kept = kept.map(|(i, &square)| (square, modes.shape(i)[3 * node + axis]));
+    let others = truncated.iter().map(|LoadedMode { square, gain }| (*square, gain[axis]));
     let mode = |(square, gain): (f64, f64)| (square, gain * gain, damping.ratio(square.sqrt()));
     Ok(Port(kept.chain(others).map(mode).collect()))
 }
@@ -140,7 +139,7 @@ fn recipes(of: impl Fn(f64) -> Port, cut: &Port) -> Vec<Recipe> {
     ]
 }
 
-/// What is found for one recipe: largest generation of energy as a share of the largest Re Y, and where [Hz].
+/// Result of a recipe: largest generation of energy as a share of the largest Re Y, and its frequency [Hz].
 struct Tested {
     share: f64,
     hertz: f64,
@@ -163,11 +162,11 @@ impl Tested {
 }
 
 /// The test over single modes, and over the middle of the top face.
-pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
+pub fn chapter(body: &RecordedBody, progress: &mut dyn StageProgress) -> Result<Chapter, ReproduceError> {
     progress.begin("passivity", 1);
     let light = Damping::Rayleigh { alpha: 2.0, beta: 0.0 };
     let usual = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
-    let node = body.system.discretisation.node_at(DVec3::new(0.0, 0.05, 0.0));
+    let node = body.nearest_node(DVec3::new(0.0, 0.05, 0.0));
     let whole = port(body, node, 1, light)?;
     let of_modes = recipes(|hertz| single(hertz, light), &single(11.65, usual));
     let of_cube = recipes(|_| whole.clone(), &whole);
@@ -192,7 +191,7 @@ pub fn chapter(body: &Recorded, progress: &mut dyn StageProgress) -> Result<Chap
         x: Axis { label: "frequency [Hz]".into(), scale: Scale::Linear },
         y: Axis { label: "Re Y [% of its largest]".into(), scale: Scale::Linear },
         series,
-        reference_lines: vec![ReferenceLine::Horizontal { y: 0.0, label: "passive above".into() }],
+        reference_lines: vec![ReferenceLine { axis: AxisName::Y, value: 0.0, label: "passive above".into() }],
     };
     let html = table(
         "Largest generation of energy by ways of sampling, as a share of the largest Re Y; step 2 ms",

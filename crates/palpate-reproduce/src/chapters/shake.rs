@@ -15,7 +15,7 @@ use std::fmt::Write;
 use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
 
-/// How the cube is shaken.
+/// Frequency of the shaking [Hz].
 pub const SHAKES_HZ: f64 = 2.0;
 const SWAY_M: f64 = 0.02;
 /// The devices come before they shake, and shake until the end.
@@ -23,7 +23,7 @@ const SETTLING_S: f64 = 1.0;
 const SECONDS: f64 = 10.0;
 pub const SIDES: [(&str, f64); 2] = [("left", -0.05), ("right", 0.05)];
 
-/// What the paper says of its force process, and ours at its rate and at twice that.
+/// Steps of the runs [s]: the paper's and half of it.
 const STEPS_S: [f64; 2] = [2e-3, 1e-3];
 
 /// The log of the run at the faster rate.
@@ -94,7 +94,7 @@ fn finding(what: &str, place: &'static str, paper: &str, ours: String) -> Findin
     Finding { what: what.into(), place, paper: paper.into(), ours, section: "shake" }
 }
 
-/// What the paper says of its force process, of ours.
+/// Findings on the force process.
 fn found(step_s: f64, ran: &Ran) -> Result<Vec<Finding>, ReproduceError> {
     let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
     let hertz = 1.0 / step_s;
@@ -130,7 +130,7 @@ fn scene_name(step_s: f64) -> String {
     format!("shake-{:.0}-hz.toml", 1.0 / step_s)
 }
 
-/// Where a hand goes: t,x,y,z.
+/// Path of a device as CSV: t,x,y,z.
 fn path(side: f64) -> String {
     let mut text = "t,x,y,z\n".to_string();
     for tick in 0..=((SECONDS * 1e3) as u32) {

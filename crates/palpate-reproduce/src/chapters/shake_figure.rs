@@ -21,7 +21,7 @@ const LEAVING_S: f64 = 1.5;
 
 const CAMERA: CameraView = CameraView { from: [0.09, 0.11, 0.33], to: [0.0, -0.008, 0.0] };
 
-/// What the chapter takes from here.
+/// The figure as the chapter uses it.
 pub struct Figure {
     /// Pictures and curves.
     pub html: String,
@@ -31,14 +31,13 @@ pub struct Figure {
     pub data: DataFile,
 }
 
-/// How far the hands have gone to the right, in the mean [m].
+/// Mean displacement of the hands to the right [m].
 fn sway(logged: &LoggedStep) -> f64 {
     let hands = logged.hands.iter().zip(SIDES);
     hands.map(|((place, _), (_, side))| place.x - side).sum::<f64>() / logged.hands.len().max(1) as f64
 }
 
-/// Where a period of the shaking begins, on the way to the right through the middle: the last one that is whole before a
-/// time [s].
+/// Start of the last period of the shaking that is whole before a time [s]: an upward zero of the sway.
 fn last_period(steps: &[LoggedStep], before_s: f64) -> Option<usize> {
     let period_s = 1.0 / SHAKES_HZ;
     (1..steps.len())
@@ -47,7 +46,7 @@ fn last_period(steps: &[LoggedStep], before_s: f64) -> Option<usize> {
         .find(|&at| sway(&steps[at - 1]) < 0.0 && sway(&steps[at]) >= 0.0)
 }
 
-/// Steps since the start over one period, and what is to be seen.
+/// Steps since the start over one period, with captions.
 fn instants(steps: &[LoggedStep], begin: usize) -> Vec<(u64, String)> {
     let of = |k: usize| {
         let after_s = k as f64 / PICTURES as f64 / SHAKES_HZ;
@@ -65,7 +64,7 @@ fn instants(steps: &[LoggedStep], begin: usize) -> Vec<(u64, String)> {
     (0..PICTURES).map(of).collect()
 }
 
-/// From the log in the folder of the report.
+/// The figure from the log in the folder of the report.
 pub fn figure(
     options: &Options,
     renderer: &ImageRenderer,

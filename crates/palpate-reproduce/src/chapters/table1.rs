@@ -7,8 +7,8 @@ use crate::options::Effort;
 use crate::page::{Section, code, paragraph, table};
 use crate::progress::StageProgress;
 use palpate::Sampling;
-use palpate_fem::record::Recorded;
-use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
+use palpate_fem::RecordedBody;
+use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use std::time::Instant;
 
 /// The paper's sampling: 500 samples in 1 s; a tenth of them is timed, since every sample costs the same.
@@ -18,16 +18,15 @@ const STEP_S: f64 = 2e-3;
 
 /// Table 1 with our figures beside the paper's.
 pub fn chapter(
-    body: &Recorded,
+    body: &RecordedBody,
     effort: Effort,
     progress: &mut dyn StageProgress,
 ) -> Result<Chapter, ReproduceError> {
-    let discretisation = &body.system.discretisation;
-    let surface = discretisation.surface_nodes();
+    let surface = body.surface_nodes();
     let ways = [
-        ("closed form, 200 modes and residual", Method::ClosedForm, Sampling::End),
-        ("time integration, the paper's sampling", Method::Transient { substeps: 1 }, Sampling::Mean),
-        ("time integration, end of step", Method::Transient { substeps: 1 }, Sampling::End),
+        ("closed form, 200 modes and residual", TableMethod::ClosedForm, Sampling::End),
+        ("time integration, the paper's sampling", TableMethod::Transient { substeps: 1 }, Sampling::Mean),
+        ("time integration, end of step", TableMethod::Transient { substeps: 1 }, Sampling::End),
     ];
     let mut seconds = Vec::new();
     for (_, method, sampling) in ways {
@@ -44,7 +43,7 @@ pub fn chapter(
         progress.begin("timing a column", columns as u64);
         let counter = progress.counter();
         let before = Instant::now();
-        let made = recorder.columns(0..columns, BLOCK, &|done| counter(done));
+        let made = recorder.columns(0..columns, COLUMN_BLOCK, &|done| counter(done));
         seconds.push(before.elapsed().as_secs_f64() / made.len() as f64 * (SAMPLES / TIMED) as f64);
     }
     progress.finish();
@@ -55,9 +54,9 @@ pub fn chapter(
     let row = |what: &str, paper: &str, ours: String| vec![what.into(), paper.into(), ours];
     let mut rows = vec![
         row("free nodes on the surface", "866", count(surface.len())),
-        row("surface triangles", "1728", count(discretisation.triangles.len())),
-        row("entire nodes", "2197", count(discretisation.nodes.len())),
-        row("tetrahedral elements", "8640", count(discretisation.element_nodes().len())),
+        row("surface triangles", "1728", count(body.surface_triangles().len())),
+        row("entire nodes", "2197", count(body.nodes().len())),
+        row("tetrahedral elements", "8640", count(body.element_count())),
         row("data per d.o.f., double precision [MB]", "9.9", format!("{:.1}", mebibytes(8))),
         row("data per d.o.f., single precision [MB]", "", format!("{:.1}", mebibytes(4))),
     ];
@@ -96,12 +95,7 @@ pub fn chapter(
         finding(
             "nodes of the cube: all, on the surface; tetrahedra",
             "2197, 866; 8640",
-            format!(
-                "{}, {}; {}",
-                discretisation.nodes.len(),
-                surface.len(),
-                discretisation.element_nodes().len()
-            ),
+            format!("{}, {}; {}", body.nodes().len(), surface.len(), body.element_count()),
         ),
         finding(
             "recording one degree of freedom",

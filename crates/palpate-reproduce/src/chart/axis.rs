@@ -8,9 +8,6 @@ const LARGEST: f64 = 1e140;
 /// Relative difference below which two values are one.
 const SAME: f64 = 1e-9;
 
-/// Decades up to which a logarithmic axis has evenly spaced ticks.
-const EVEN_DECADES: f64 = 0.7;
-
 /// Decades up to which 2 and 5 are labelled as well.
 const DETAILED_DECADES: f64 = 1.8;
 
@@ -98,9 +95,6 @@ impl Range {
     pub fn ticks(&self, intervals: usize) -> Vec<Tick> {
         let values = match self.scale {
             Scale::Linear => even_ticks(self.low, self.high, intervals),
-            Scale::Log if self.high - self.low < EVEN_DECADES => {
-                even_ticks(10_f64.powf(self.low), 10_f64.powf(self.high), intervals)
-            }
             Scale::Log => self.decade_ticks(intervals),
         };
         let slack = SAME * self.low.abs().max(self.high.abs());
@@ -190,7 +184,6 @@ mod tests {
         assert_eq!(labels(1e-6, 1e-4, Scale::Log, 6), ["10⁻⁶", "10⁻⁵", "10⁻⁴"]);
         assert_eq!(labels(1e-15, 1.0, Scale::Log, 6), ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
         assert_eq!(labels(2.0, 30.0, Scale::Log, 6), ["2", "5", "10", "20"]);
-        assert_eq!(labels(20.0, 60.0, Scale::Log, 5), ["20", "30", "40", "50", "60"]);
         let minor = Range::of([1.0, 100.0].into_iter(), Scale::Log).ticks(6);
         assert_eq!(minor.iter().filter(|tick| tick.label.is_none()).count(), 16);
     }

@@ -59,41 +59,25 @@ pub enum Style {
     Dashed,
 }
 
-/// A thin line across the chart with its label at the edge.
+/// A thin line at one value of an axis, across the chart.
 #[derive(Clone, Debug)]
-pub enum ReferenceLine {
-    /// At one value of the vertical axis.
-    Horizontal {
-        /// Value in the axis' unit.
-        y: f64,
-        /// Label right of the frame: "paper: 16 ms".
-        label: String,
-    },
-    /// At one value of the horizontal axis.
-    Vertical {
-        /// Value in the axis' unit.
-        x: f64,
-        /// Label above the frame: "1 %".
-        label: String,
-    },
+pub struct ReferenceLine {
+    /// The axis that has the value: the line of a y is horizontal.
+    pub axis: AxisName,
+    /// Value in the axis' unit.
+    pub value: f64,
+    /// Label beside the frame, for an x above it: "paper: 16 ms".
+    pub label: String,
 }
 
-/// Style sheet of charts.
-pub const CHART_STYLE: &str = "\
-.chart{display:block;width:100%;max-width:44rem;height:auto;overflow:visible}
-.chart text{font-size:13px;fill:var(--soft)}
-.chart .title{font-size:15px;font-weight:600;fill:var(--ink)}
-.chart .label{fill:var(--ink)}
-.chart path{fill:none;stroke-linecap:round;stroke-linejoin:round}
-.chart .grid{stroke:var(--grid)}
-.chart .axis{stroke:var(--soft)}
-.chart .reference{stroke:var(--ink);stroke-width:1;stroke-opacity:.65}
-.chart .line{stroke:currentColor;stroke-width:2.2}
-.chart .thin{stroke:currentColor;stroke-width:1.5}
-.chart path.markers{fill:currentColor}
-.chart .s1{color:var(--series-1)}.chart .s2{color:var(--series-2)}.chart .s3{color:var(--series-3)}
-.chart .s4{color:var(--series-4)}.chart .s5{color:var(--series-5)}.chart .s6{color:var(--series-6)}
-";
+/// One of the two axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisName {
+    /// The horizontal one.
+    X,
+    /// The vertical one.
+    Y,
+}
 
 /// Width of the picture, and height of the frame of the data in it.
 const WIDTH: f64 = 700.0;
@@ -134,29 +118,13 @@ impl Frame {
     }
 }
 
-impl ReferenceLine {
-    fn horizontal(&self) -> Option<(f64, &str)> {
-        match self {
-            Self::Horizontal { y, label } => Some((*y, label)),
-            Self::Vertical { .. } => None,
-        }
-    }
-
-    fn vertical(&self) -> Option<(f64, &str)> {
-        match self {
-            Self::Vertical { x, label } => Some((*x, label)),
-            Self::Horizontal { .. } => None,
-        }
-    }
-}
-
 impl Chart {
-    /// The chart as an `<svg>` element; needs [`CHART_STYLE`] in the page.
+    /// The chart as an `<svg>` element; needs the page's style sheet.
     pub fn svg(&self) -> String {
         let frame = self.frame();
         let mut body = format!("<title>{}</title>\n", escape(&self.title));
-        body += &text("title", "", (0.0, 16.0), &self.title);
-        body += &text("label", "", (0.0, 36.0), &self.y.label);
+        body += &text("title", "start", (0.0, 16.0), &self.title);
+        body += &text("label", "start", (0.0, 36.0), &self.y.label);
         self.draw_axes(&frame, &mut body);
         self.draw_reference_lines(&frame, &mut body);
         self.draw_series(&frame, &mut body);
@@ -171,11 +139,10 @@ impl Chart {
             points()
                 .filter(|(x, y)| self.x.scale.transform(*x).is_some() && self.y.scale.transform(*y).is_some())
         };
-        let vertical = self.reference_lines.iter().filter_map(ReferenceLine::vertical);
-        let horizontal = || self.reference_lines.iter().filter_map(ReferenceLine::horizontal);
+        let (vertical, horizontal) = (|| self.lines_at(AxisName::X), || self.lines_at(AxisName::Y));
         // Markers stay clear of the ends.
         let markers = self.series.iter().any(|series| series.style == Style::LineAndMarkers);
-        let x = Range::of(placed().map(|(x, _)| *x).chain(vertical.clone().map(|(x, _)| x)), self.x.scale)
+        let x = Range::of(placed().map(|(x, _)| *x).chain(vertical().map(|(x, _)| x)), self.x.scale)
             .padded(if markers { 0.03 } else { 0.0 });
         let y = Range::of(placed().map(|(_, y)| *y).chain(horizontal().map(|(y, _)| y)), self.y.scale);
         let y = match self.y.scale {
@@ -185,8 +152,14 @@ impl Chart {
         let numbers = y.ticks(self.y_intervals()).into_iter().filter_map(|tick| tick.label);
         let left = numbers.map(|label| width(&label)).fold(34.0, f64::max) + 10.0;
         let beside = horizontal().map(|(_, label)| width(label) + 14.0).fold(32.0, f64::max);
-        let top = 48.0 + if vertical.count() > 0 { LINE } else { 0.0 };
+        let top = 48.0 + if vertical().count() > 0 { LINE } else { 0.0 };
         Frame { left, right: WIDTH - beside, top, bottom: top + FRAME_HEIGHT, x, y }
+    }
+
+    /// Values and labels of the reference lines at one axis.
+    fn lines_at(&self, axis: AxisName) -> impl Iterator<Item = (f64, &str)> {
+        let lines = self.reference_lines.iter().filter(move |line| line.axis == axis);
+        lines.map(|line| (line.value, line.label.as_str()))
     }
 
     fn y_intervals(&self) -> usize {
@@ -203,7 +176,7 @@ impl Chart {
             axes += &format!("M{} {bottom}v{}", short(at), if tick.label.is_some() { 6 } else { 3 });
             if let Some(label) = tick.label {
                 grid += &format!("M{} {bottom}V{top}", short(at));
-                numbers += &text("", "middle", (at, frame.bottom + LINE), &label);
+                numbers += &text("number", "middle", (at, frame.bottom + LINE), &label);
             }
         }
         for tick in frame.y.ticks(self.y_intervals()) {
@@ -211,7 +184,7 @@ impl Chart {
             axes += &format!("M{left} {}h-{}", short(at), if tick.label.is_some() { 6 } else { 3 });
             if let Some(label) = tick.label {
                 grid += &format!("M{left} {}H{right}", short(at));
-                numbers += &text("", "end", (frame.left - 9.0, at + 4.5), &label);
+                numbers += &text("number", "end", (frame.left - 9.0, at + 4.5), &label);
             }
         }
         *body +=
@@ -223,12 +196,12 @@ impl Chart {
     /// Reference lines; labels beside the frame move down from one another.
     fn draw_reference_lines(&self, frame: &Frame, body: &mut String) {
         let (mut lines, mut labels) = (String::new(), String::new());
-        for (x, label) in self.reference_lines.iter().filter_map(ReferenceLine::vertical) {
+        for (x, label) in self.lines_at(AxisName::X) {
             let Some(at) = frame.x_at(x) else { continue };
             lines += &format!("M{} {}V{}", short(at), short(frame.bottom), short(frame.top - LINE + 2.0));
-            labels += &text("label", "", (at + 5.0, frame.top - 5.0), label);
+            labels += &text("label", "start", (at + 5.0, frame.top - 5.0), label);
         }
-        let horizontal = self.reference_lines.iter().filter_map(ReferenceLine::horizontal);
+        let horizontal = self.lines_at(AxisName::Y);
         let mut placed: Vec<(f64, &str)> =
             horizontal.filter_map(|(y, label)| Some((frame.y_at(y)?, label))).collect();
         placed.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -238,7 +211,7 @@ impl Chart {
             free = middle + LINE;
             let (left, right, end) = (short(frame.left), short(frame.right), short(frame.right + 9.0));
             lines += &format!("M{left} {}H{right}L{end} {}", short(at), short(middle));
-            labels += &text("label", "", (frame.right + 12.0, middle + 4.5), label);
+            labels += &text("label", "start", (frame.right + 12.0, middle + 4.5), label);
         }
         if !lines.is_empty() {
             *body += &format!("<path class=\"reference\" d=\"{lines}\"/>\n{labels}");
@@ -259,7 +232,7 @@ impl Chart {
         }
         if is_empty {
             let middle = ((frame.left + frame.right) / 2.0, (frame.top + frame.bottom) / 2.0);
-            *body += &text("", "middle", middle, "no data");
+            *body += &text("number", "middle", middle, "no data");
         }
     }
 
@@ -273,21 +246,17 @@ impl Chart {
             }
             let middle = baseline - 4.5;
             *body += &look.sample(DVec2::new(x + 2.0, middle), DVec2::new(x + SAMPLE - 10.0, middle));
-            *body += &text("label", "", (x + SAMPLE, baseline), &series.label);
+            *body += &text("label", "start", (x + SAMPLE, baseline), &series.label);
             x += length + GAP;
         }
         (baseline + 9.0).ceil()
     }
 }
 
-/// A `<text>` element at a point of its baseline; `anchor` is empty for the left end.
+/// A `<text>` element of a class at a point of its baseline; the anchor is start, middle or end.
 fn text(class: &str, anchor: &str, (x, baseline): (f64, f64), content: &str) -> String {
-    let attribute = |name: &str, value: &str| match value {
-        "" => String::new(),
-        value => format!(" {name}=\"{value}\""),
-    };
-    let (class, anchor) = (attribute("class", class), attribute("text-anchor", anchor));
-    format!("<text{class}{anchor} x=\"{}\" y=\"{}\">{}</text>\n", short(x), short(baseline), escape(content))
+    let (x, y, content) = (short(x), short(baseline), escape(content));
+    format!("<text class=\"{class}\" text-anchor=\"{anchor}\" x=\"{x}\" y=\"{y}\">{content}</text>\n")
 }
 
 /// Estimated width of a text.
@@ -303,6 +272,7 @@ fn short(length: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::AxisName::{X, Y};
     use super::*;
     use crate::page::tests::assert_well_formed;
 
@@ -336,24 +306,15 @@ mod tests {
 
     #[test]
     fn everything_stays_within_the_view_box_whatever_the_data() {
-        let wild = vec![
-            (1e-9, -1e300),
-            (f64::NAN, 1.0),
-            (3.0, f64::INFINITY),
-            (1e12, 4.0),
-            (0.0, 0.0),
-            (2.0, 1e-200),
-        ];
+        let wild = vec![(1e-9, -1e300), (f64::NAN, 1.0), (1e12, f64::INFINITY), (3.0, 4.0), (0.0, 1e-200)];
         for style in [Style::Line, Style::LineAndMarkers, Style::Dashed] {
-            for (x, y) in [(Scale::Linear, Scale::Log), (Scale::Log, Scale::Linear), (Scale::Log, Scale::Log)]
-            {
+            for (x, y) in [(Scale::Linear, Scale::Log), (Scale::Log, Scale::Linear)] {
                 for points in [wild.clone(), vec![(1.0, 1.0); 3], vec![(5.0, 2.0)], Vec::new()] {
                     let mut chart = chart(x, y, vec![series(points, style); 9]);
-                    for at in [0.0, 1.0, f64::NAN] {
-                        chart.reference_lines.push(ReferenceLine::Vertical { x: at, label: "a & b".into() });
-                        chart
-                            .reference_lines
-                            .push(ReferenceLine::Horizontal { y: at, label: "a < b".into() });
+                    for (axis, value) in
+                        [X, Y].into_iter().flat_map(|axis| [0.0, 1.0, f64::NAN].map(|v| (axis, v)))
+                    {
+                        chart.reference_lines.push(ReferenceLine { axis, value, label: "a & b".into() });
                     }
                     let svg = chart.svg();
                     let size: Vec<f64> = attributes(&svg, "viewBox")[0]
@@ -381,11 +342,7 @@ mod tests {
         let points = vec![(1.0, 1.0), (2.0, 0.0), (3.0, -1.0), (4.0, 100.0)];
         let svg = chart(Scale::Log, Scale::Log, vec![series(points, Style::LineAndMarkers)]).svg();
         assert_eq!(attributes(&svg, "d")[3].matches('z').count(), 2);
-    }
-
-    #[test]
-    fn a_chart_without_points_says_so() {
-        let svg = chart(Scale::Linear, Scale::Log, vec![series(vec![(f64::NAN, 1.0)], Style::Line)]).svg();
+        let svg = chart(Scale::Linear, Scale::Log, vec![series(vec![(nowhere, 1.0)], Style::Line)]).svg();
         assert!(svg.contains(">no data<"));
     }
 
@@ -393,7 +350,7 @@ mod tests {
     fn labels_of_reference_lines_do_not_meet() {
         let mut chart =
             chart(Scale::Linear, Scale::Linear, vec![series(vec![(0.0, 0.0), (1.0, 9.0)], Style::Line)]);
-        let line = |y: f64| ReferenceLine::Horizontal { y, label: format!("reference {y}") };
+        let line = |value: f64| ReferenceLine { axis: Y, value, label: format!("reference {value}") };
         chart.reference_lines = [4.0, 4.1, 4.2].map(line).to_vec();
         let svg = chart.svg();
         let baseline = |label: &str| -> f64 {

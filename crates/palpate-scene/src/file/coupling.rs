@@ -7,9 +7,9 @@ use crate::devices::ANY_HAND;
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::{Coupling, DeviceParameters, ModelObject};
-use palpate_haptics::device::{Hand, Traits};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::stability::{
-    ClosedLoop, LoopTiming, PlaceResponse, default_coupling, normal_at, stiffest_place,
+    ClosedLoop, LoopTiming, PointResponse, default_coupling, normal_at, stiffest_point,
 };
 use toml::Spanned;
 
@@ -68,7 +68,7 @@ pub(super) fn choose_default(
         // Any grip; the lightest device where the driver has no traits.
         None => {
             let real = read_real(source, device)?;
-            let traits = real.map_or(Traits::TOUCH, |real| real.driver.usual_traits());
+            let traits = real.map_or(DeviceSpec::TOUCH, |real| real.driver.typical_spec());
             (traits, ANY_HAND.map(|(_, hand): (_, Option<Hand>)| hand).to_vec())
         }
     };
@@ -77,17 +77,17 @@ pub(super) fn choose_default(
     let held = device.attach.as_ref().map(|attach| attach.get_ref());
     let touched = objects.iter().zip(object_names);
     let touched = touched.filter(|(_, name)| held.is_none_or(|attach| *name == attach.object.get_ref()));
-    let places = touched.filter_map(|(object, _)| {
+    let points = touched.filter_map(|(object, _)| {
         let recording = &*object.recording;
         let point = match held {
             Some(attach) => recording.surface.nearest(DVec3::from_array(attach.point.get_ref().0))?.0,
-            None => stiffest_place(recording, parameters.patch_radius, step_s)?,
+            None => stiffest_point(recording, parameters.patch_radius, step_s)?,
         };
         let normal = normal_at(&recording.surface, &point);
-        Some(PlaceResponse::new(recording, &point, parameters.patch_radius, normal))
+        Some(PointResponse::new(recording, &point, parameters.patch_radius, normal))
     });
-    let gives = |place: &PlaceResponse| place.within_step(step_s);
-    let Some(place) = places.min_by(|a, b| gives(a).total_cmp(&gives(b))) else { return Ok(None) };
+    let gives = |place: &PointResponse| place.instantaneous_compliance(step_s);
+    let Some(place) = points.min_by(|a, b| gives(a).total_cmp(&gives(b))) else { return Ok(None) };
     let one = |hand: &Option<Hand>| ClosedLoop::new(&place, traits, *hand, timing);
     let loops: Vec<ClosedLoop> = hands.iter().map(one).collect();
     let Some(found) = default_coupling(&loops, gives(&place)) else {

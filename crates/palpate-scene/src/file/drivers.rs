@@ -6,8 +6,8 @@ use crate::devices::{MAX_FORCE_N, RealDevice, find_device_traits, find_driver, f
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::Pose;
-use palpate_haptics::device::{Hand, Mount, Traits};
-use palpate_haptics::orientation;
+use palpate_haptics::device::{DeviceSpec, Hand, Mount};
+use palpate_haptics::unit_quaternion;
 
 /// Real device of an entry, if it has one.
 pub(super) fn read_real(source: &Source, device: &DeviceEntry) -> Result<Option<RealDevice>, SceneError> {
@@ -54,7 +54,7 @@ fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> 
     let mut pose = Pose { position: DVec3::from_array(entry.position.0), ..Pose::IDENTITY };
     if let Some(given) = &entry.orientation {
         let [w, x, y, z] = given.get_ref().0;
-        pose.orientation = orientation(w, x, y, z)
+        pose.orientation = unit_quaternion(w, x, y, z)
             .or_else(|what| source.fail(given.span(), SceneErrorKind::OutOfRange, "orientation", what))?;
     }
     let scale = Quantity { key: "scale", unit: "", below: LARGEST };
@@ -63,7 +63,10 @@ fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> 
 }
 
 /// Simulated device and hand of an entry.
-pub(super) fn read_simulated(source: &Source, entry: &SimulatedEntry) -> Result<(Traits, Hand), SceneError> {
+pub(super) fn read_simulated(
+    source: &Source,
+    entry: &SimulatedEntry,
+) -> Result<(DeviceSpec, Hand), SceneError> {
     let traits = find_device_traits(entry.device.get_ref());
     let traits = traits
         .or_else(|what| source.fail(entry.device.span(), SceneErrorKind::UnknownValue, "device", what))?;

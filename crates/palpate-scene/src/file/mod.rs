@@ -50,17 +50,17 @@ pub fn read_scene(path: &Path, mode: RunMode) -> Result<Scene, SceneError> {
 /// # Errors
 /// As [`read_scene`].
 pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -> Result<Scene, SceneError> {
-    let place = relocated.get(path).map_or(path, PathBuf::as_path);
-    let text = read_text(path, place)?;
+    let stored = relocated.get(path).map_or(path, PathBuf::as_path);
+    let text = read_text(path, stored)?;
     let source = Source { path, text: &text, relocated };
     let file = parse(&source)?;
     let objects = read_objects(&source, &file)?;
     assemble(&source, &file, objects, mode)
 }
 
-/// Reads the text of a scene file that is stored at `place`.
-pub(crate) fn read_text(path: &Path, place: &Path) -> Result<String, SceneError> {
-    let bytes = std::fs::read(place).map_err(|error| SceneError::io("read the scene", path, &error))?;
+/// Reads the text of a scene file that is stored at `stored`.
+pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError> {
+    let bytes = std::fs::read(stored).map_err(|error| SceneError::io("read the scene", path, &error))?;
     String::from_utf8(bytes).map_err(|_| {
         let message = "it is not a text file; a scene is TOML (docs/scene.md)";
         SceneError::of_file(SceneErrorKind::Syntax, path, message)
@@ -172,8 +172,8 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
     let own = |name: &Spanned<String>| (name.get_ref().clone(), name.span());
     // Without a name: the line of its table.
     let or = |name: &Option<Spanned<String>>, kind: &str, number: usize, entry: Range<usize>| {
-        let place = name.as_ref().map_or(entry, Spanned::span);
-        (obstacles::name_or(name.as_ref(), kind, number), place)
+        let span = name.as_ref().map_or(entry, Spanned::span);
+        (obstacles::name_or(name.as_ref(), kind, number), span)
     };
     let objects = file.object.iter().map(|entry| own(&entry.name));
     let devices = file.device.iter().map(|entry| own(&entry.name));
@@ -182,11 +182,11 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
     let others = file.obstacle.iter().enumerate();
     let others = others.map(|(number, entry)| or(&entry.get_ref().name, "obstacle", number, entry.span()));
     let mut seen = HashSet::new();
-    for (name, place) in objects.chain(devices).chain(planes).chain(others) {
+    for (name, span) in objects.chain(devices).chain(planes).chain(others) {
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(plain) {
             return source.fail(
-                place,
+                span,
                 SceneErrorKind::Name,
                 "name",
                 format!("name is {name:?}, expected letters, digits, - and _"),
@@ -194,7 +194,7 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
         }
         if name == "energy" || name == "t" || !seen.insert(name.clone()) {
             return source.fail(
-                place,
+                span,
                 SceneErrorKind::Name,
                 "name",
                 format!("the name {name:?} is taken already"),

@@ -6,7 +6,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::recording_file::read_recording;
 use glam::{DQuat, DVec3};
 use palpate::{ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
-use palpate_fem::certificate::DOUBTFUL;
+use palpate_fem::FORCE_ERROR_WARNING;
 use palpate_store::{Location, TableStore};
 use std::sync::Arc;
 
@@ -33,13 +33,13 @@ fn read_responses(
     object: &ObjectEntry,
 ) -> Result<(Arc<Recording>, ResponseForm), SceneError> {
     let path = source.stored_path(object.recording.get_ref());
-    let place = object.recording.span();
+    let span = object.recording.span();
     let form = object.response.as_ref().map(|form| (form.get_ref().as_str(), form.span()));
     let fir = match form {
         None => path.is_dir(),
         Some(("modal", _)) if path.is_dir() => {
             return source.fail(
-                place,
+                span,
                 SceneErrorKind::Recording,
                 "response",
                 "response = \"modal\" needs a recording file (.palp); this is a store of impulse responses",
@@ -58,17 +58,17 @@ fn read_responses(
     }
     if !fir {
         let recording = read_recording(&path)
-            .or_else(|error| source.fail(place, SceneErrorKind::Recording, "recording", error))?;
+            .or_else(|error| source.fail(span, SceneErrorKind::Recording, "recording", error))?;
         return Ok((Arc::new(recording), ResponseForm::Modal));
     }
-    let (table, table_place) = match &object.table {
+    let (table, table_span) = match &object.table {
         Some(table) => (source.stored_path(table.get_ref()), table.span()),
-        None if path.is_dir() => (path.clone(), place.clone()),
-        None => (path.with_extension("zarr"), place.clone()),
+        None if path.is_dir() => (path.clone(), span.clone()),
+        None => (path.with_extension("zarr"), span.clone()),
     };
     if !table.exists() {
         return source.fail(
-            table_place,
+            table_span,
             SceneErrorKind::Table,
             "table",
             format!(
@@ -80,15 +80,15 @@ fn read_responses(
     }
     let loaded = TableStore::open(&Location::Folder(table)).and_then(TableStore::load);
     let (body, table) =
-        loaded.or_else(|error| source.fail(table_place.clone(), SceneErrorKind::Table, "table", error))?;
+        loaded.or_else(|error| source.fail(table_span.clone(), SceneErrorKind::Table, "table", error))?;
     let recording = if path.is_dir() {
         body
     } else {
         let recording = read_recording(&path)
-            .or_else(|error| source.fail(place, SceneErrorKind::Recording, "recording", error))?;
+            .or_else(|error| source.fail(span, SceneErrorKind::Recording, "recording", error))?;
         if recording.metadata.provenance.mesh_hash != body.metadata.provenance.mesh_hash {
             return source.fail(
-                table_place,
+                table_span,
                 SceneErrorKind::Table,
                 "table",
                 format!(
@@ -110,7 +110,7 @@ pub(super) fn doubtful_recordings<'a>(
     objects.iter().zip(names).filter_map(move |(object, name)| {
         let certificate = object.recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
-        (error > DOUBTFUL).then(|| {
+        (error > FORCE_ERROR_WARNING).then(|| {
             format!(
                 "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
                  recording): record it with more modes",

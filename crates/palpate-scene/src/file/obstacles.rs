@@ -7,7 +7,7 @@ use crate::mesh_source;
 use crate::scene::SceneObstacle;
 use glam::{DQuat, DVec3};
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
-use palpate_haptics::{Columns, orientation};
+use palpate_haptics::{Columns, unit_quaternion};
 use std::sync::Arc;
 use toml::Spanned;
 
@@ -52,13 +52,13 @@ pub(super) fn read_obstacle(
     }
     if let Some(given) = &obstacle.orientation {
         let [w, x, y, z] = given.get_ref().0;
-        start.orientation = orientation(w, x, y, z)
+        start.orientation = unit_quaternion(w, x, y, z)
             .or_else(|what| source.fail(given.span(), SceneErrorKind::OutOfRange, "orientation", what))?;
     }
     let mut path = None;
     if let Some(entry) = &obstacle.path {
         let read = source.motion_path(entry, Columns::Pose)?;
-        if let (Some(orientation), true) = (&obstacle.orientation, read.turns()) {
+        if let (Some(orientation), true) = (&obstacle.orientation, read.has_orientations()) {
             let message = "the orientation is in the path: leave one of the two out";
             return source.fail(orientation.span(), SceneErrorKind::Conflict, "orientation", message);
         }
@@ -121,21 +121,21 @@ fn read_mesh(
     name: &str,
     remarks: &mut Vec<String>,
 ) -> Result<ObstacleMesh, SceneError> {
-    let place = entry.file.span();
+    let span = entry.file.span();
     let path = source.stored_path(entry.file.get_ref());
     let scale = Quantity { key: "scale", unit: "", below: LARGEST };
     let scale = entry.scale.as_ref().map_or(Ok(1.0), |number| source.positive(number, scale))?;
     let mut mesh = mesh_source::read_surface(&path)
-        .or_else(|error| source.fail(place.clone(), SceneErrorKind::Mesh, "mesh", error))?;
+        .or_else(|error| source.fail(span.clone(), SceneErrorKind::Mesh, "mesh", error))?;
     mesh.positions.iter_mut().for_each(|position| *position *= scale);
     if mesh.volume() < 0.0 {
         remarks.push(format!(
             "the triangles of obstacle {name:?} face inwards ({}): they are turned over",
             path.display()
         ));
-        mesh.turn_over();
+        mesh.flip_orientation();
     }
     ObstacleMesh::new(mesh.positions, mesh.triangles).or_else(|error| {
-        source.fail(place, SceneErrorKind::Mesh, "mesh", format!("{}: {error}", path.display()))
+        source.fail(span, SceneErrorKind::Mesh, "mesh", format!("{}: {error}", path.display()))
     })
 }

@@ -48,7 +48,7 @@ impl Source<'_> {
         1 + self.text[..span.start.min(self.text.len())].matches('\n').count()
     }
 
-    /// Error of a key at a place.
+    /// Error of a key, with its line.
     pub fn fail<T>(
         &self,
         span: Range<usize>,

@@ -2,7 +2,7 @@
 
 use crate::recipe::RecordingRecipe;
 use palpate::{Damping, Material};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use std::f64::consts::TAU;
 
 /// Built-in scene.
@@ -197,7 +197,7 @@ pub fn paper_cube() -> RecordingRecipe {
         source: "box:0.1x0.1x0.1/12x12x12".into(),
         scale: 1.0,
         material: material(2000.0, 0.49, 110.0),
-        order: Order::Linear,
+        order: ElementOrder::Linear,
         modes: 200,
         damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
     }

@@ -13,7 +13,7 @@ use crate::recording_file::read_recording;
 use crate::scene::{Scene, SceneDevice};
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube};
 use palpate::{Coupling, Damping, Material};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -94,18 +94,16 @@ impl Current {
     fn add_recipes(&mut self, scene: &Scene) -> Vec<bool> {
         let objects = self.text.get("object").and_then(Value::as_array).cloned().unwrap_or_default();
         let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
-        let files = objects
-            .iter()
-            .map(|object| folder.join(object.get("recording").and_then(Value::as_str).unwrap_or_default()));
-        let mut files = files.fuse();
-        let mut has_recipe = |recording| {
-            let Some(file) = files.next() else { return false };
+        let file =
+            |object: &Value| folder.join(object.get("recording").and_then(Value::as_str).unwrap_or_default());
+        let recordings = scene.model.recordings().zip(objects.iter().map(file));
+        let has_recipe = recordings.map(|(recording, file)| {
             if let Some(recipe) = RecordingRecipe::of(recording) {
                 self.recipes.entry(file.clone()).or_insert(recipe);
             }
             self.recipes.contains_key(&file)
-        };
-        scene.model.recordings().map(|recording| has_recipe(recording)).collect()
+        });
+        has_recipe.collect()
     }
 }
 
@@ -316,7 +314,7 @@ impl SceneLibrary {
             source: source.display().to_string(),
             scale,
             material,
-            order: Order::Quadratic,
+            order: ElementOrder::Quadratic,
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
         };
@@ -327,7 +325,8 @@ impl SceneLibrary {
         };
         let path = recipe.record_cached(&folder, progress).map_err(without_folder)?;
         let recording = read_recording(&path)?;
-        let lowest = recording.surface.positions.iter().map(|place| place.y).fold(f64::INFINITY, f64::min);
+        let lowest =
+            recording.surface.positions.iter().map(|position| position.y).fold(f64::INFINITY, f64::min);
         let height = recording.surface.diagonal() * 0.1 - lowest;
         let text = format!(
             "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"object\"\nrecording = {:?}\nposition = [0.0, {height:?}, 0.0]\n\

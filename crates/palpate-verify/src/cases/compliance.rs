@@ -5,11 +5,8 @@ use crate::error::{VerifyError, numerics};
 use faer::Mat;
 use glam::DVec3;
 use palpate::SampledOscillator;
-use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
-use palpate_fem::modes::{all_modes, orthonormality_error};
-use palpate_fem::progress::Silent;
-use palpate_fem::reference::Reference;
+use palpate_fem::{ElementOrder, SilentProgress};
 use palpate_testkit::{paper_cube_parameters, recorded, undamped};
 
 /// Vertical compliance of three points of the paper's cube, elastic part: static, and at the end of a step of 1 ms.
@@ -25,27 +22,26 @@ pub fn points() -> Result<Vec<Check>, VerifyError> {
     const STEP_S: f64 = 1e-3;
     /// Undamped, the fastest modes turn by a radian or more in a step: that needs a larger space than a certificate's.
     const BLOCKS: usize = 40;
-    let parameters = undamped(2000.0, 0.49, 110.0, Order::Linear, 100);
+    let parameters = undamped(2000.0, 0.49, 110.0, ElementOrder::Linear, 100);
     let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
-    let dofs = body.system.discretisation.dofs();
-    let nodes =
-        TABLE.map(|(_, position, ..)| body.system.discretisation.node_at(DVec3::from_array(position)));
-    let mut loads = Mat::<f64>::zeros(dofs, 9);
+    let unreduced = body.unreduced();
+    let nodes = TABLE.map(|(_, position, ..)| body.nearest_node(DVec3::from_array(position)));
+    let mut loads = vec![vec![0.0; body.dofs()]; 9];
     for (place, axis) in (0..3).flat_map(|place| (0..3).map(move |axis| (place, axis))) {
-        loads[(3 * nodes[place] + axis, 3 * place + axis)] = 1.0;
+        loads[3 * place + axis][3 * nodes[place] + axis] = 1.0;
     }
-    let displacements = body.system.elastic_compliance(loads.clone());
-    let reference =
-        Reference::new(&body.system, &body.modes, loads, STEP_S, BLOCKS, &mut Silent).map_err(numerics)?;
+    let displacements = unreduced.static_displacements(&loads);
+    let truncated =
+        unreduced.truncated_response(&nodes, STEP_S, BLOCKS, &mut SilentProgress).map_err(numerics)?;
     let mut checks = Vec::new();
     for (place, (name, _, static_m_n, instantaneous_m_n)) in TABLE.into_iter().enumerate() {
         let row = 3 * nodes[place] + 1;
-        let compliance = displacements[(row, 3 * place + 1)];
+        let compliance = displacements[3 * place + 1][row];
         checks.push(Check::new(format!("static, {name} [m/N]"), compliance, static_m_n, HALF_DIGIT));
-        let left_out = reference.left_out(&body.system, place, BLOCKS).map_err(numerics)?;
-        let kept =
-            (0..body.modes.squares.len()).map(|i| (body.modes.squares[i], body.modes.shapes[(row, i)]));
-        let all = kept.chain(left_out.iter().map(|mode| (mode.square, mode.gain.y)));
+        let truncated = truncated.modes(place, BLOCKS).map_err(numerics)?;
+        let modes = unreduced.kept_modes();
+        let kept = (0..modes.count()).map(|i| (modes.squared_frequencies()[i], modes.shape(i)[row]));
+        let all = kept.chain(truncated.iter().map(|mode| (mode.square, mode.gain.y)));
         let response = all.map(|(square, gain)| {
             gain * gain * SampledOscillator::new(square.sqrt(), 0.0, STEP_S).instantaneous_compliance()
         });
@@ -64,16 +60,17 @@ pub fn identities() -> Result<Vec<Check>, VerifyError> {
     /// Rounding of an eigenvalue of a matrix of 654 rows: 1e-15 of the largest each.
     const NEGATIVE: f64 = 1e-12;
     let body = recorded(box_mesh([0.1; 3], [6; 3])?, &paper_cube_parameters(6, 60))?;
-    let system = &body.system;
+    let unreduced = body.unreduced();
     let mut checks = vec![Check::new(
         "largest entry of |ΦᵀMΦ − I|",
-        orthonormality_error(system, body.modes.shapes.as_ref()),
+        unreduced.orthonormality_error(unreduced.kept_modes()),
         0.0,
         ORTHONORMAL,
     )];
 
-    let all = all_modes(system, 60, &mut Silent).map_err(numerics)?;
-    let apart = body.modes.squares.iter().zip(&all.squares).map(|(a, b)| (a / b - 1.0).abs());
+    let all = unreduced.dense_modes(60, &mut SilentProgress).map_err(numerics)?;
+    let kept = unreduced.kept_modes().squared_frequencies();
+    let apart = kept.iter().zip(all.squared_frequencies()).map(|(a, b)| (a / b - 1.0).abs());
     checks.push(Check::new(
         "ω², block Krylov against dense, largest share",
         apart.fold(0.0, f64::max),
@@ -81,21 +78,21 @@ pub fn identities() -> Result<Vec<Check>, VerifyError> {
         SOLVED,
     ));
 
-    let dofs = system.discretisation.dofs();
+    let dofs = body.dofs();
     let picked: Vec<usize> = (0..dofs).step_by(37).collect();
-    let mut loads = Mat::zeros(dofs, picked.len());
-    picked.iter().enumerate().for_each(|(column, &row)| loads[(row, column)] = 1.0);
-    let response = system.elastic_compliance(loads);
-    let entry = |i: usize, j: usize| response[(picked[i], j)];
+    let mut loads = vec![vec![0.0; dofs]; picked.len()];
+    picked.iter().enumerate().for_each(|(column, &row)| loads[column][row] = 1.0);
+    let response = unreduced.static_displacements(&loads);
+    let entry = |i: usize, j: usize| response[j][picked[i]];
     let pairs = || (0..picked.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let largest = (0..picked.len()).map(|i| entry(i, i)).fold(0.0, f64::max);
     let apart = pairs().map(|(i, j)| (entry(i, j) - entry(j, i)).abs() / largest).fold(0.0, f64::max);
     checks.push(Check::new("reciprocity |G_ij − G_ji|, share of the largest", apart, 0.0, SOLVED));
 
     // A relieved body keeps no rigid part: Φrᵀ·M·u = 0 shows as no net momentum.
-    let momentum = system.mass_times(response.as_ref());
+    let momentum = unreduced.mass_times(&response);
     let net = (0..picked.len()).flat_map(|j| (0..3).map(move |axis| (j, axis))).map(|(j, axis)| {
-        (0..dofs / 3).map(|node| momentum[(3 * node + axis, j)]).sum::<f64>().abs() / system.mass.mass_kg
+        (0..dofs / 3).map(|node| momentum[j][3 * node + axis]).sum::<f64>().abs() / body.recording.mass()
     });
     checks.push(Check::new(
         "rigid part of G, share of the largest",

@@ -9,7 +9,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, State, step};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, floor, object_at, scene};
 
@@ -37,7 +37,7 @@ struct Fall {
 fn fall(cells: u32, invariants: &mut RunInvariants) -> Result<Fall, VerifyError> {
     let c = (BAR.young_pa / BAR.density_kg_m3).sqrt();
     let half = 6 * (cells as usize + 1) - 3;
-    let body = BAR.free_body(box_mesh([WIDTH, LENGTH, WIDTH], [1, cells, 1])?, Order::Linear, half)?;
+    let body = BAR.free_body(box_mesh([WIDTH, LENGTH, WIDTH], [1, cells, 1])?, ElementOrder::Linear, half)?;
     let step_s = 0.5 * LENGTH / c / f64::from(cells);
     // The block meets the plane at the end of the first step.
     let start = DVec3::Y * (0.5 * LENGTH + SPEED * step_s);

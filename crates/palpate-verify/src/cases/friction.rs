@@ -5,7 +5,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
 use palpate::{Input, ModelObject, Pose, Recording, State, step};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, scene};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ const RUBBER: ElasticMaterial =
     ElasticMaterial { young_pa: 2e6, poisson: 0.3, density_kg_m3: 1000.0, stiffness_damping_s: 3e-4 };
 
 fn block() -> Result<Arc<Recording>, VerifyError> {
-    Ok(RUBBER.free_body(box_mesh(SIZE, [6, 2, 6])?, Order::Linear, 40)?)
+    Ok(RUBBER.free_body(box_mesh(SIZE, [6, 2, 6])?, ElementOrder::Linear, 40)?)
 }
 
 /// A plane through the origin that falls towards +x by an angle.

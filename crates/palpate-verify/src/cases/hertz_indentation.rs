@@ -16,7 +16,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, Obstacle, Pose, Recording, Shape, State, step};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{Mesh, box_mesh};
 use palpate_testkit::{ElasticMaterial, object_at, scene, smoothstep};
 use std::f64::consts::PI;
@@ -84,7 +84,8 @@ pub fn indentation() -> Result<Vec<Check>, VerifyError> {
     const CELLS: u32 = 12;
     /// Discretisation with three to six edges per contact radius, and the inward motion that Hertz leaves out.
     const HERTZ: f64 = 0.05;
-    let body = GEL.fixed_body(graded(CELLS)?, Order::Quadratic, 60, |node| node.y < -0.499 * SIZE[1])?;
+    let body =
+        GEL.fixed_body(graded(CELLS)?, ElementOrder::Quadratic, 60, |node| node.y < -0.499 * SIZE[1])?;
     let (mut checks, mut invariants) = (Vec::new(), RunInvariants::default());
     for depth in [0.15e-3, 0.3e-3, 0.6e-3] {
         let (force, points) = pressed(&body, depth, &mut invariants)?;

@@ -5,7 +5,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Collider, Coupling, DeviceInput, DeviceParameters, Input, Output, State, step};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_testkit::{
     ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at, paper_cube_mesh, scene, smoothstep,
 };
@@ -66,7 +66,7 @@ fn slip(output: &Output) -> f64 {
 
 /// Without and with virtual couplings.
 pub fn pinch_lift() -> Result<Vec<Check>, VerifyError> {
-    let cube = JELLY.free_body(paper_cube_mesh(12)?, Order::Linear, 100)?;
+    let cube = JELLY.free_body(paper_cube_mesh(12)?, ElementOrder::Linear, 100)?;
     let mut checks = Vec::new();
     for (name, coupling) in [("rigid", None), ("coupled", Some(Coupling { stiffness: 500.0, damping: 1.0 }))]
     {

@@ -7,13 +7,10 @@
 use crate::check::Check;
 use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
-use faer::Mat;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Input, Recording, State, step};
-use palpate_fem::element::Order;
 use palpate_fem::mesh::box_mesh;
-use palpate_fem::record::{Extent, RecordParameters};
-use palpate_fem::system::System;
+use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, RecordedBody};
 use palpate_testkit::{ElasticMaterial, PAPER_MATERIAL, object_at, recorded, scene, smoothstep};
 use std::sync::Arc;
 
@@ -36,19 +33,19 @@ fn place([x, z]: [f64; 2]) -> DVec3 {
     DVec3::new(x, 0.5 * SIZE[1], z)
 }
 
-fn standing(cells: u32, order: Order) -> Result<Arc<Recording>, VerifyError> {
+fn standing(cells: u32, order: ElementOrder) -> Result<Arc<Recording>, VerifyError> {
     let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
     Ok(CALM.fixed_body(mesh, order, 60, |node| node.y < -0.499 * SIZE[1])?)
 }
 
 /// Weights of the kernel about a point of the upper face, at the nodes of quadratic elements: each face's integral by
 /// the middles of 256 parts. Four triangles stand for a face, at its corners and in the middle.
-fn kernel(system: &System, centre: DVec3) -> Vec<(usize, f64)> {
+fn kernel(body: &RecordedBody, centre: DVec3) -> Vec<(usize, f64)> {
     const PARTS: u32 = 16;
     let mut weights = Vec::new();
-    for face in system.discretisation.triangles.chunks_exact(4) {
+    for face in body.surface_triangles().chunks_exact(4) {
         let (corners, middles) = ([face[0][0], face[1][1], face[2][2]], [face[0][1], face[1][2], face[2][0]]);
-        let places = corners.map(|node| system.discretisation.nodes[node as usize]);
+        let places = corners.map(|node| body.nodes()[node as usize]);
         if places.iter().any(|p| p.y < 0.499 * SIZE[1]) {
             continue;
         }
@@ -82,17 +79,20 @@ fn stiffness(cells: u32) -> Result<Vec<f64>, VerifyError> {
     let mesh = box_mesh(SIZE, [cells, cells / 2, cells])?;
     let fixed = (0..mesh.nodes.len()).filter(|&node| mesh.nodes[node].y < -0.499 * SIZE[1]);
     let fixed_nodes = fixed.map(|node| node as u32).collect();
-    let parameters =
-        RecordParameters { fixed_nodes, extent: Extent::Body, ..CALM.parameters(Order::Quadratic, 1) };
-    let system = recorded(mesh, &parameters)?.system;
-    let kernels = PLACES.map(|at| kernel(&system, place(at)));
-    let mut loads = Mat::zeros(system.discretisation.dofs(), PLACES.len());
+    let parameters = RecordParameters {
+        fixed_nodes,
+        extent: RecordExtent::NoModes,
+        ..CALM.parameters(ElementOrder::Quadratic, 1)
+    };
+    let body = recorded(mesh, &parameters)?;
+    let kernels = PLACES.map(|at| kernel(&body, place(at)));
+    let mut loads = vec![vec![0.0; body.dofs()]; PLACES.len()];
     for (column, weights) in kernels.iter().enumerate() {
-        weights.iter().for_each(|&(node, w)| loads[(3 * node + 1, column)] += w);
+        weights.iter().for_each(|&(node, w)| loads[column][3 * node + 1] += w);
     }
-    let moved = system.elastic_compliance(loads);
+    let moved = body.unreduced().static_displacements(&loads);
     let average = |(column, weights): (usize, &Vec<(usize, f64)>)| {
-        1.0 / weights.iter().map(|&(node, w)| w * moved[(3 * node + 1, column)]).sum::<f64>()
+        1.0 / weights.iter().map(|&(node, w)| w * moved[column][3 * node + 1]).sum::<f64>()
     };
     Ok(kernels.iter().enumerate().map(average).collect())
 }
@@ -138,7 +138,7 @@ pub fn press() -> Result<Vec<Check>, VerifyError> {
     let mut checks =
         vec![Check::new("expected stiffness, 16 cells against 20 [N/m]", coarser[0], exact[0], REFERENCE)];
     for cells in [8, 10, 12] {
-        let body = standing(cells, Order::Quadratic)?;
+        let body = standing(cells, ElementOrder::Quadratic)?;
         let mut invariants = RunInvariants::default();
         let mut ratios = Vec::new();
         for (number, at_place) in PLACES.into_iter().enumerate() {

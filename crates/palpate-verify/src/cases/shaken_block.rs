@@ -7,7 +7,7 @@ use palpate::{
     DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
     ObjectStart, Pose, State, SurfacePoint, Twist, step,
 };
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{recorded, undamped};
 use std::f64::consts::{PI, TAU};
@@ -41,7 +41,7 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, VerifyError> {
     const START_PERIODS: f64 = 12.0;
     const PERIODS: f64 = 20.0;
     let mesh = box_mesh([LENGTH, WIDTH, WIDTH], [cells, cells / 4, cells / 4])?;
-    let body = recorded(mesh, &undamped(YOUNG, 0.0, DENSITY, Order::Linear, 60))?;
+    let body = recorded(mesh, &undamped(YOUNG, 0.0, DENSITY, ElementOrder::Linear, 60))?;
     let surface = &body.recording.surface;
     let mut grasps = Vec::new();
     for (node, position) in surface.positions.iter().enumerate() {

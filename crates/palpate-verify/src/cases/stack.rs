@@ -5,7 +5,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
 use palpate::{Collider, Input, Output, State, step};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, scene};
 
@@ -33,7 +33,7 @@ pub fn stack() -> Result<Vec<Check>, VerifyError> {
     const STILL: f64 = 1e-5;
     /// The cubes are at rest after a minute, but for the solver's tolerance.
     const WEIGHT: f64 = 1e-6;
-    let cube = JELLY.free_body(box_mesh([SIDE; 3], [3; 3])?, Order::Linear, 60)?;
+    let cube = JELLY.free_body(box_mesh([SIDE; 3], [3; 3])?, ElementOrder::Linear, 60)?;
     let lower = object_at(&cube, DVec3::Y * (0.5 * SIDE + 1e-4), DVec3::ZERO);
     let mut upper = object_at(&cube, DVec3::new(0.013, 1.5 * SIDE + 2e-4, 0.007), DVec3::ZERO);
     upper.start.pose.orientation = DQuat::from_rotation_y(0.2);

@@ -1,13 +1,13 @@
-//! Who gets in.
+//! Access control.
 //!
-//! A server on loopback can be reached by every page that this machine's browser opens. So it answers only what was asked of it
-//! by its own name (a stranger's name that leads here is a rebound one), and lets only its own pages open sessions
-//! and send anything. Beyond loopback, whoever comes must know the token.
+//! Every page that a browser on this machine opens can reach a server on loopback. Therefore the server checks the host
+//! name (against DNS rebinding) and the origin (only its own pages may open sessions or send data). Beyond loopback
+//! every request needs the token.
 
 use axum::extract::Request;
 use axum::http::{HeaderMap, Method, Uri, header};
 
-/// What is asked of everyone.
+/// Access rules.
 #[derive(Debug, Clone)]
 pub(super) struct Guard {
     loopback: bool,
@@ -15,29 +15,30 @@ pub(super) struct Guard {
 }
 
 impl Guard {
+    /// Rules for a server, on loopback or not.
     pub fn new(loopback: bool, token: Option<String>) -> Self {
         Self { loopback, token }
     }
 
-    /// Why a request gets no answer, if so.
-    pub fn refuses(&self, request: &Request) -> Option<&'static str> {
+    /// Reason to reject a request, if any.
+    pub fn rejection(&self, request: &Request) -> Option<&'static str> {
         let (headers, uri) = (request.headers(), request.uri());
         let host = host(headers, uri).unwrap_or_default();
         if self.loopback && !is_loopback(&host) {
             return Some("this server answers to localhost only");
         }
-        // Files of the page bring no token: they tell nothing.
+        // Files of the page are public.
         let page = request.method() == Method::GET && is_page(uri.path());
         if let (Some(token), false) = (&self.token, page)
-            && !token_of(uri).is_some_and(|given| same(&given, token))
+            && !token_of(uri).is_some_and(|given| tokens_match(&given, token))
         {
             return Some("the token is missing or wrong: open the address that palpate has printed");
         }
-        let changes = request.method() != Method::GET || headers.contains_key(header::UPGRADE);
+        let has_effect = request.method() != Method::GET || headers.contains_key(header::UPGRADE);
         let origin = headers.get(header::ORIGIN).and_then(|origin| origin.to_str().ok());
         match origin {
-            Some(origin) if changes && !comes_from(origin, &host) => {
-                Some("this request is of a page from elsewhere")
+            Some(origin) if has_effect && !is_same_origin(origin, &host) => {
+                Some("this request comes from a page of another origin")
             }
             _ => None,
         }
@@ -58,10 +59,10 @@ fn is_loopback(host: &str) -> bool {
 }
 
 fn is_page(path: &str) -> bool {
-    !["/session", "/scene/", "/log/", "/record", "/picture/"].iter().any(|own| path.starts_with(own))
+    !["/session", "/scene/", "/log/", "/record", "/image/"].iter().any(|own| path.starts_with(own))
 }
 
-fn comes_from(origin: &str, host: &str) -> bool {
+fn is_same_origin(origin: &str, host: &str) -> bool {
     let stated = origin.split_once("://").map(|(_, rest)| rest.to_lowercase());
     stated.is_some_and(|stated| stated == host)
 }
@@ -71,8 +72,8 @@ fn token_of(uri: &Uri) -> Option<String> {
     pairs.find(|(key, _)| *key == "token").map(|(_, value)| value.to_string())
 }
 
-/// In a time that does not tell how much of it is right.
-fn same(given: &str, token: &str) -> bool {
+/// Comparison in constant time.
+fn tokens_match(given: &str, token: &str) -> bool {
     blake3::hash(given.as_bytes()) == blake3::hash(token.as_bytes())
 }
 
@@ -90,10 +91,11 @@ mod tests {
     }
 
     #[test]
-    fn rebound_names_and_pages_from_elsewhere_are_refused() {
+    fn rebound_names_and_foreign_origins_are_refused() {
         let guard = Guard::new(true, None);
-        let passes =
-            |method, path, headers: &[(&str, &str)]| guard.refuses(&request(method, path, headers)).is_none();
+        let passes = |method, path, headers: &[(&str, &str)]| {
+            guard.rejection(&request(method, path, headers)).is_none()
+        };
         for host in ["localhost:7400", "127.0.0.1:7400", "[::1]:7400", "LOCALHOST:1"] {
             assert!(passes("GET", "/", &[("host", host)]), "{host}");
         }
@@ -104,7 +106,7 @@ mod tests {
         let own = ("host", "localhost:7400");
         let upgrade = ("upgrade", "websocket");
         assert!(passes("GET", "/session", &[own, upgrade, ("origin", "http://localhost:7400")]));
-        assert!(passes("GET", "/session", &[own, upgrade]), "what is no browser says no origin");
+        assert!(passes("GET", "/session", &[own, upgrade]), "clients other than browsers send no origin");
         for origin in ["http://evil.example", "http://localhost:7401", "null", "http://localhost:7400.evil"] {
             assert!(!passes("GET", "/session", &[own, upgrade, ("origin", origin)]), "{origin}");
             assert!(!passes("POST", "/record", &[own, ("origin", origin)]), "{origin}");
@@ -112,17 +114,17 @@ mod tests {
     }
 
     #[test]
-    fn beyond_loopback_a_token_is_asked_for() {
+    fn beyond_loopback_a_token_is_required() {
         let guard = Guard::new(false, Some("12345678".into()));
         let passes =
-            |path: &str| guard.refuses(&request("GET", path, &[("host", "10.0.0.1:7400")])).is_none();
+            |path: &str| guard.rejection(&request("GET", path, &[("host", "10.0.0.1:7400")])).is_none();
         assert!(passes("/") && passes("/assets/page.js"));
         assert!(passes("/session?token=12345678") && passes("/log/0/frames?from=0&token=12345678"));
         for path in [
             "/session",
             "/session?token=1234567",
             "/session?token=",
-            "/scene/1/object/0/shapes",
+            "/scene/1/object/0/mode_shapes",
             "/log/0/series?t",
         ] {
             assert!(!passes(path), "{path}");

@@ -1,4 +1,4 @@
-//! A page without a browser, and something to look at.
+//! Test client that acts as a page, and a test scene.
 
 use glam::DVec3;
 use palpate::{
@@ -8,7 +8,8 @@ use palpate::{
 use palpate_haptics::Scheduling;
 use palpate_viewer::{
     Live, MaterialDescription, ObjectDescription, PhysicsSettings, ProgressCallback, SceneDescription,
-    SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice, ViewerScene,
+    SceneError, SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice,
+    ViewerScene,
 };
 use serde_json::Value;
 use std::io::{Read, Write};
@@ -25,8 +26,8 @@ pub fn recording() -> Arc<Recording> {
     Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
 }
 
-/// A body that floats above a floor, with two pointers.
-pub fn stage(gravity: DVec3, step_s: f64) -> ViewerScene {
+/// Scene: a body above a floor, with two pointers.
+pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
     let recording = recording();
     let radius = recording.surface.radius();
     let finger = DeviceParameters {
@@ -58,7 +59,7 @@ pub fn stage(gravity: DVec3, step_s: f64) -> ViewerScene {
         description,
         model,
         devices: vec![ViewerDevice::Pointer; 2],
-        movers: vec![Arc::new(move |_: f64| floor)],
+        obstacle_trajectories: vec![Arc::new(move |_: f64| floor)],
         log: None,
     }
 }
@@ -66,18 +67,22 @@ pub fn stage(gravity: DVec3, step_s: f64) -> ViewerScene {
 struct OneScene;
 
 impl SceneProvider for OneScene {
-    fn titles(&self) -> Vec<SceneSummary> {
+    fn scenes(&self) -> Vec<SceneSummary> {
         vec![SceneSummary { id: "float".into(), title: "A body".into(), about: "It floats.".into() }]
     }
 
-    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, String> {
-        tell("looking", Some(0.5));
-        if id == "float" { Ok(stage(DVec3::ZERO, 1e-3)) } else { Err(format!("there is no scene {id:?}")) }
+    fn open(&self, id: &str, progress: ProgressCallback) -> Result<ViewerScene, SceneError> {
+        progress("loading", Some(0.5));
+        if id == "float" {
+            Ok(scene(DVec3::ZERO, 1e-3))
+        } else {
+            Err(format!("there is no scene {id:?}").into())
+        }
     }
 
-    fn change(&self, rules: &PhysicsSettings) -> Result<ViewerScene, String> {
-        let gravity = rules.gravity.map_or(DVec3::ZERO, DVec3::from_array);
-        Ok(stage(gravity, rules.step.unwrap_or(1e-3)))
+    fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, SceneError> {
+        let gravity = settings.gravity.map_or(DVec3::ZERO, DVec3::from_array);
+        Ok(scene(gravity, settings.step.unwrap_or(1e-3)))
     }
 
     fn change_material(
@@ -85,39 +90,39 @@ impl SceneProvider for OneScene {
         _: usize,
         material: MaterialDescription,
         _: ProgressCallback,
-    ) -> Result<ViewerScene, String> {
-        Err(format!("E = {}", material.young))
+    ) -> Result<ViewerScene, SceneError> {
+        Err(format!("E = {}", material.young).into())
     }
 
-    fn record(&self, upload: Upload, _: ProgressCallback) -> Result<ViewerScene, String> {
+    fn record(&self, upload: Upload, _: ProgressCallback) -> Result<ViewerScene, SceneError> {
         if upload.name == "slow.msh" {
             std::thread::sleep(Duration::from_secs(2));
         }
-        Err(format!("{} bytes of {}", upload.bytes.len(), upload.name))
+        Err(format!("{} bytes of {}", upload.bytes.len(), upload.name).into())
     }
 }
 
-/// A server on a free port, until it is dropped.
-pub struct Served {
+/// Server on a free port that stops when dropped.
+pub struct TestServer {
     pub address: SocketAddr,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Served {
+impl TestServer {
     pub fn live() -> Self {
         let scheduling = Scheduling { priority: None, core: None };
-        let first = stage(DVec3::ZERO, 1e-3);
-        Self::new(ServedContent::Live(Box::new(Live { workshop: Arc::new(OneScene), first, scheduling })))
+        let first = scene(DVec3::ZERO, 1e-3);
+        Self::new(ServedContent::Live(Box::new(Live { provider: Arc::new(OneScene), first, scheduling })))
     }
 
-    pub fn new(exhibit: ServedContent) -> Self {
+    pub fn new(content: ServedContent) -> Self {
         let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
         let server = Server::bind(&settings).expect("a free port");
         let address = server.address().expect("an address");
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
-        let thread = Some(std::thread::spawn(move || server.run(exhibit, &stopped).expect("it runs")));
+        let thread = Some(std::thread::spawn(move || server.run(content, &stopped).expect("it runs")));
         Self { address, stop, thread }
     }
 
@@ -130,7 +135,7 @@ impl Served {
         Page { socket }
     }
 
-    /// Status and body.
+    /// HTTP status and body.
     pub fn request(&self, head: &str, body: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
@@ -152,7 +157,7 @@ impl Served {
     }
 }
 
-impl Drop for Served {
+impl Drop for TestServer {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
@@ -161,36 +166,36 @@ impl Drop for Served {
     }
 }
 
-/// What a picture of the scene above says.
+/// Decoded frame of the test scene.
 #[derive(Debug, Clone)]
-pub struct Picture {
-    pub form: u32,
+pub struct Frame {
+    pub format: u32,
     pub generation: u32,
     pub step: u32,
     pub time_s: f64,
     pub position: DVec3,
-    /// Places of the surface nodes [m, body].
-    pub places: Vec<DVec3>,
-    /// What each device does, where it is, and the force on it.
+    /// Positions of the surface nodes [m, body].
+    pub positions: Vec<DVec3>,
+    /// Mode, position [m] and force on the hand [N] of each device.
     pub devices: Vec<(u32, DVec3, DVec3)>,
     pub bytes: usize,
 }
 
-/// Reads little-endian numbers one after the other.
+/// Little-endian reader.
 struct Cursor<'a>(&'a [u8]);
 
 impl Cursor<'_> {
     fn take<const N: usize>(&mut self) -> [u8; N] {
         let (now, later) = self.0.split_at(N);
         self.0 = later;
-        now.try_into().expect("so many bytes")
+        now.try_into().expect("enough bytes")
     }
 
     fn u32(&mut self) -> u32 {
         u32::from_le_bytes(self.take())
     }
 
-    /// So many numbers of four bytes.
+    /// Skips `count` numbers of four bytes.
     fn skip(&mut self, count: usize) {
         self.0 = &self.0[4 * count..];
     }
@@ -204,8 +209,8 @@ impl Cursor<'_> {
     }
 }
 
-/// Mode shapes as they are sent.
-pub fn shapes(bytes: &[u8]) -> Vec<Vec<DVec3>> {
+/// Decoded mode shapes.
+pub fn mode_shapes(bytes: &[u8]) -> Vec<Vec<DVec3>> {
     let mut cursor = Cursor(bytes);
     let (n, m) = (cursor.u32() as usize, cursor.u32() as usize);
     cursor.0 = &cursor.0[4 * m..];
@@ -222,10 +227,10 @@ pub fn shapes(bytes: &[u8]) -> Vec<Vec<DVec3>> {
     (0..m).map(|_| (0..n).map(|_| node(&mut cursor)).collect()).collect()
 }
 
-pub fn read_picture(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Picture {
+pub fn decode_frame(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Frame {
     let mut cursor = Cursor(bytes);
     assert_eq!(&cursor.take(), b"PLPF");
-    let (form, generation, step) = (cursor.u32(), cursor.u32(), cursor.u32());
+    let (format, generation, step) = (cursor.u32(), cursor.u32(), cursor.u32());
     let time_s = f64::from_le_bytes(cursor.take());
     cursor.skip(10);
     let counts: [u32; 4] = std::array::from_fn(|_| cursor.u32());
@@ -233,38 +238,38 @@ pub fn read_picture(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Picture {
     cursor.skip(2);
     let position = cursor.vector();
     cursor.skip(4);
-    let mut places = recording().surface.positions.clone();
+    let mut positions = recording().surface.positions.clone();
     let count = cursor.u32() as usize;
-    if form == 1 {
+    if format == 1 {
         for shape in &shapes[..count] {
             let q = cursor.f32();
-            places.iter_mut().zip(shape).for_each(|(place, shape)| *place += *shape * q);
+            positions.iter_mut().zip(shape).for_each(|(node, shape)| *node += *shape * q);
         }
         let (k, unit) = (cursor.u32() as usize, cursor.f32());
-        let (steps, rest) = cursor.0.split_at((2 * k).next_multiple_of(4));
+        let (differences, rest) = cursor.0.split_at((2 * k).next_multiple_of(4));
         let (values, rest) = rest.split_at((3 * k).next_multiple_of(4));
         let mut node = 0;
         for at in 0..k {
-            node += usize::from(u16::from_le_bytes([steps[2 * at], steps[2 * at + 1]]));
+            node += usize::from(u16::from_le_bytes([differences[2 * at], differences[2 * at + 1]]));
             let axis = |axis: usize| f64::from(values[3 * at + axis] as i8) * unit;
-            places[node] += DVec3::new(axis(0), axis(1), axis(2));
+            positions[node] += DVec3::new(axis(0), axis(1), axis(2));
         }
         cursor.0 = rest;
     } else {
-        places.iter_mut().take(count).for_each(|place| *place = cursor.vector());
+        positions.iter_mut().take(count).for_each(|node| *node = cursor.vector());
     }
     cursor.skip(7);
     let device = |cursor: &mut Cursor| {
-        let (doing, position) = (cursor.u32(), cursor.vector());
+        let (mode, position) = (cursor.u32(), cursor.vector());
         cursor.vector();
-        (doing, position, cursor.vector())
+        (mode, position, cursor.vector())
     };
     let devices = (0..2).map(|_| device(&mut cursor)).collect();
     assert_eq!(cursor.0.len(), counts[3] as usize * 32, "contacts");
-    Picture { form, generation, step, time_s, position, places, devices, bytes: bytes.len() }
+    Frame { format, generation, step, time_s, position, positions, devices, bytes: bytes.len() }
 }
 
-/// A session.
+/// WebSocket session.
 pub struct Page {
     pub socket: WebSocket<MaybeTlsStream<TcpStream>>,
 }
@@ -274,7 +279,7 @@ impl Page {
         let _ = self.socket.send(Message::text(text.to_string()));
     }
 
-    /// The next message of a type.
+    /// Next message of a type.
     pub fn wait(&mut self, kind: &str) -> Value {
         let until = Instant::now() + Duration::from_secs(20);
         while Instant::now() < until {
@@ -288,17 +293,17 @@ impl Page {
         panic!("no {kind} within 20 s");
     }
 
-    /// The next picture that is so.
-    pub fn picture(&mut self, shapes: &[Vec<DVec3>], mut is: impl FnMut(&Picture) -> bool) -> Picture {
+    /// Next frame that satisfies a condition.
+    pub fn frame(&mut self, shapes: &[Vec<DVec3>], mut condition: impl FnMut(&Frame) -> bool) -> Frame {
         let until = Instant::now() + Duration::from_secs(20);
         while Instant::now() < until {
             if let Message::Binary(bytes) = self.socket.read().expect("a message") {
-                let picture = read_picture(&bytes, shapes);
-                if is(&picture) {
-                    return picture;
+                let frame = decode_frame(&bytes, shapes);
+                if condition(&frame) {
+                    return frame;
                 }
             }
         }
-        panic!("no such picture within 20 s");
+        panic!("no such frame within 20 s");
     }
 }

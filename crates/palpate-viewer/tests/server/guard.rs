@@ -1,19 +1,19 @@
-//! Strangers, and pages that do harm.
+//! Access control and hostile pages.
 
-use super::client::{Served, shapes};
-use palpate_viewer::{Server, Settings};
+use super::client::{TestServer, mode_shapes};
+use palpate_viewer::{Server, ServerError, Settings};
 use tungstenite::Message;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::protocol::frame::coding::CloseCode;
 
 #[test]
-fn other_hosts_other_origins_and_paths_out_of_the_page_get_nothing() {
-    let served = Served::live();
+fn foreign_hosts_foreign_origins_and_path_traversal_are_refused() {
+    let served = TestServer::live();
     assert_eq!(served.request("GET / HTTP/1.1\r\nHost: evil.example\r\nX-A: b\r\nX-B:", b"").0, 403);
     let mut request = format!("ws://{}/session", served.address).into_client_request().expect("a request");
     request.headers_mut().insert("Origin", HeaderValue::from_static("http://evil.example"));
-    assert!(tungstenite::connect(request).is_err(), "a page from elsewhere");
+    assert!(tungstenite::connect(request).is_err(), "a page of another origin");
     let mut request = format!("ws://{}/session", served.address).into_client_request().expect("a request");
     let own = HeaderValue::from_str(&format!("http://{}", served.address)).expect("an origin");
     request.headers_mut().insert("Origin", own);
@@ -34,39 +34,47 @@ fn other_hosts_other_origins_and_paths_out_of_the_page_get_nothing() {
     }
     assert_eq!(served.request("POST /record?name=a", b"x").0, 400);
     assert_eq!(served.request("POST /record?name=a&young=NaN&poisson=0&density=1", b"x").0, 400);
-    assert_eq!(served.request("POST /picture/0", b"x").0, 404);
+    assert_eq!(served.request("POST /image/0", b"x").0, 404);
     let large = vec![0; (64 << 20) + 1];
     assert_eq!(served.request("POST /record?name=a.msh&young=1&poisson=0&density=1", &large).0, 413);
 }
 
 #[test]
-fn beyond_loopback_nothing_is_served_without_a_token() {
+fn beyond_loopback_a_token_is_required() {
     let listen = ([0, 0, 0, 0], 0).into();
     let refused = Server::bind(&Settings { listen, token: None }).expect_err("no token");
-    assert!(refused.contains("give a token"), "{refused}");
+    assert!(matches!(refused, ServerError::MissingToken(address) if address == listen), "{refused}");
+    assert_eq!(
+        refused.to_string(),
+        "0.0.0.0:0 can be reached from other machines: give a token of 8 characters or more (--token), without which \
+         nobody gets in"
+    );
     assert!(Server::bind(&Settings { listen, token: Some("short".into()) }).is_err());
     assert!(Server::bind(&Settings { listen, token: Some("long enough".into()) }).is_ok());
-    let served = Served::live();
+    let served = TestServer::live();
     let taken = Server::bind(&Settings { listen: served.address, token: None }).expect_err("taken");
-    assert!(taken.contains("listens at"), "{taken}");
+    assert!(matches!(taken, ServerError::AddressInUse(address) if address == served.address), "{taken}");
+    let text =
+        format!("something listens at {} already: stop it, or take another port (--listen)", served.address);
+    assert_eq!(taken.to_string(), text);
 }
 
 #[test]
-fn a_page_that_floods_is_sent_away_and_garbage_does_not_stop_the_scene() {
-    let served = Served::live();
+fn a_flooding_page_is_disconnected_and_garbage_does_not_stop_the_scene() {
+    let served = TestServer::live();
     let mut good = served.page();
     let generation = good.wait("scene")["generation"].as_u64().expect("a generation");
-    let shapes = shapes(&served.get(&format!("/scene/{generation}/object/0/shapes")).1);
-    let before = good.picture(&shapes, |_| true).step;
+    let shapes = mode_shapes(&served.get(&format!("/scene/{generation}/object/0/mode_shapes")).1);
+    let before = good.frame(&shapes, |_| true).step;
     let mut bad = served.page();
     for garbage in [
         "",
         "{",
         r#"{"type":"move","pointers":[{"pointer":1,"position":[1e999,0,0]}]}"#,
         r#"{"type":"press","pointer":1,"mode":"touch","position":[1e300,0,0]}"#,
-        r#"{"type":"material","object":99,"young":-1,"poisson":9,"density":0}"#,
-        r#"{"type":"slow","slowness":4294967295}"#,
-        r#"{"type":"slow","slowness":1}"#,
+        r#"{"type":"set_material","object":99,"young":-1,"poisson":9,"density":0}"#,
+        r#"{"type":"slow_motion","slowdown":4294967295}"#,
+        r#"{"type":"slow_motion","slowdown":1}"#,
     ] {
         bad.send(garbage);
     }
@@ -88,6 +96,6 @@ fn a_page_that_floods_is_sent_away_and_garbage_does_not_stop_the_scene() {
     huge.send(&"x".repeat(70_000));
     let ended = std::iter::from_fn(|| huge.socket.read().ok()).take(10_000).count();
     assert!(ended < 10_000, "a message that is too large ends the session");
-    let after = good.picture(&shapes, |picture| picture.step > before + 100);
+    let after = good.frame(&shapes, |frame| frame.step > before + 100);
     assert!(after.time_s > 0.0);
 }

@@ -1,4 +1,4 @@
-//! A server on loopback, spoken to as a page does, and as a hostile one does.
+//! Server on loopback, with well-behaved and hostile clients.
 
 mod client;
 mod guard;

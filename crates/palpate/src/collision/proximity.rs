@@ -23,18 +23,11 @@ pub(super) const SAME_FACE: f64 = 0.85;
 pub(crate) struct ProximityQuery {
     /// Projections of the query point, the nearest first.
     pub(crate) found: Vec<TriangleProjection>,
-    /// Whether a triangle cache was rebuilt at once in this step.
-    pub(super) rebuilt_cache: bool,
 }
 
 impl ProximityQuery {
     pub(crate) fn new() -> Self {
-        Self { found: Vec::with_capacity(MAX_TRIANGLES), rebuilt_cache: false }
-    }
-
-    /// Begin a step.
-    pub(crate) fn begin_step(&mut self) {
-        self.rebuilt_cache = false;
+        Self { found: Vec::with_capacity(MAX_TRIANGLES) }
     }
 
     /// Find the triangles within a reach [m] of a body point.

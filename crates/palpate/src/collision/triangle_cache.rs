@@ -17,18 +17,9 @@ const SKIN_EDGE: f64 = 0.8;
 const SKIN_EDGE_SEEDED: f64 = 0.15;
 const SKIN_REACH: f64 = 0.25;
 
-/// An incremental rebuild takes this share of the steps in which the skin is used up, between these limits [steps], and
-/// visits so many spheres and triangles a step at least.
-const REBUILD_SHARE: f64 = 0.2;
-const MIN_REBUILD_STEPS: f64 = 3.0;
-const MAX_REBUILD_STEPS: f64 = 8.0;
-const MIN_VISITS_PER_STEP: usize = 24;
-
-/// A list that has to be rebuilt at once is rebuilt with this share of its skin left, if no other one is in this step.
-const EARLY_REBUILD_SHARE: f64 = 0.4;
-
-/// Weight of the latest step in the smoothed speed.
-const SPEED_SMOOTHING: f64 = 0.1;
+/// A rebuild begins when this share of the skin is left, and visits so many spheres and triangles per step.
+const REBUILD_AT: f64 = 0.5;
+const VISITS_PER_STEP: usize = 96;
 
 /// Of more triangles than this only seeds are kept: the local minima of the distance, so many at most, from which a descent
 /// of so many steps leads to the present minimum.
@@ -75,15 +66,10 @@ impl TriangleList {
 #[derive(Debug, Clone)]
 pub(crate) struct TriangleCache {
     current: TriangleList,
-    /// List that is being built, its triangles so far, its traversal, and the number of visits: so far, and per step.
+    /// List that is being built, its triangles so far, and its traversal.
     next: TriangleList,
     found: Vec<TriangleProjection>,
     traversal: Traversal,
-    visited: usize,
-    visits_per_step: usize,
-    /// Displacement since the build in the last step [m], if the same list was used, and its smoothed growth per step [m].
-    displacement: Option<f64>,
-    speed: f64,
     seed_above: usize,
 }
 
@@ -94,10 +80,6 @@ impl TriangleCache {
             next: TriangleList::new(modes),
             found: Vec::with_capacity(MAX_TRIANGLES),
             traversal: Traversal::FINISHED,
-            visited: 0,
-            visits_per_step: MIN_VISITS_PER_STEP,
-            displacement: None,
-            speed: 0.0,
             seed_above: SEED_ABOVE,
         }
     }
@@ -105,7 +87,7 @@ impl TriangleCache {
     /// Find the triangles within a reach [m] of a body point, or some more; of many only the local minima.
     ///
     /// # Real time
-    /// Costs the listed triangles; a full rebuild where point or surface is fast, or comes anew.
+    /// Costs the listed triangles; a full rebuild where the skin is used up before the next list is built.
     pub(crate) fn find(
         &mut self,
         query: &mut ProximityQuery,
@@ -116,26 +98,14 @@ impl TriangleCache {
         let displacement = self.current.displacement_since_build(surface, p);
         let skin = self.current.reach - reach;
         let left = skin - displacement;
-        if let Some(before) = self.displacement.replace(displacement) {
-            self.speed += SPEED_SMOOTHING * ((displacement - before).max(0.0) - self.speed);
-        }
-        let steps = REBUILD_SHARE * skin / self.speed;
-        let is_early = self.traversal.is_finished()
-            && steps < MIN_REBUILD_STEPS
-            && left < EARLY_REBUILD_SHARE * skin
-            && !query.rebuilt_cache;
-        if left <= 0.0 || self.current.reach == 0.0 || is_early {
-            query.rebuilt_cache = true;
+        if left <= 0.0 || self.current.reach == 0.0 {
             self.begin_rebuild(surface, p, reach);
             self.resume_rebuild(surface, usize::MAX);
             self.finish_rebuild(surface.body);
             query.found.clone_from(&self.found);
             return;
         }
-        let steps = steps.min(MAX_REBUILD_STEPS);
-        let begins = steps >= MIN_REBUILD_STEPS && left < self.speed * 2.0 * steps;
-        if self.traversal.is_finished() && begins {
-            self.visits_per_step = MIN_VISITS_PER_STEP.max((self.visited as f64 / steps) as usize + 1);
+        if self.traversal.is_finished() && left < REBUILD_AT * skin {
             self.begin_rebuild(surface, p, reach);
         }
         let found = &mut query.found;
@@ -161,7 +131,7 @@ impl TriangleCache {
     /// # Real time
     /// Costs a part of a rebuild.
     pub(crate) fn continue_rebuild(&mut self, surface: &mut DeformedSurface) {
-        self.resume_rebuild(surface, self.visits_per_step);
+        self.resume_rebuild(surface, VISITS_PER_STEP);
     }
 
     /// Return the coordinates; a finished list becomes the current one.
@@ -178,7 +148,7 @@ impl TriangleCache {
         next.q[..surface.q.len()].copy_from_slice(surface.q);
         (next.point, next.residual) = (p, [surface.max_residual(); 2]);
         next.reach = reach + skin * surface.body.edge + SKIN_REACH * reach;
-        (self.traversal, self.visited) = (Traversal::START, 0);
+        self.traversal = Traversal::START;
         self.found.clear();
     }
 
@@ -187,7 +157,7 @@ impl TriangleCache {
         let Self { next, found, traversal, .. } = self;
         let (p, reach, residual) = (next.point, next.reach, surface.max_residual());
         next.residual = [next.residual[0].min(residual), next.residual[1].max(residual)];
-        self.visited += collect_within(surface, (traversal, visits), p, reach, found);
+        collect_within(surface, (traversal, visits), p, reach, found);
     }
 
     /// Make the next list the current one.
@@ -206,7 +176,6 @@ impl TriangleCache {
             next.seeds.extend(found.iter().map(|found| found.triangle));
         }
         core::mem::swap(current, next);
-        self.displacement = None;
     }
 }
 

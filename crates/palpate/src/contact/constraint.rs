@@ -1,4 +1,4 @@
-//! Constraint of a contact within one step: its data in the contact problem, and its scratch in the solver.
+//! Constraint of a contact within one step.
 
 use crate::collision::Contact;
 use glam::{DMat3, DVec3};
@@ -15,9 +15,6 @@ pub(crate) struct Constraint {
     pub(super) axes: DMat3,
     pub(super) compliance: DMat3,
     pub(super) stiffness: DMat3,
-    /// Force before a sweep [N], and search direction of the conjugate gradients (see `solver`).
-    pub(super) before: DVec3,
-    pub(super) direction: DVec3,
 }
 
 impl Constraint {

@@ -1,7 +1,6 @@
 //! Contact problem and its solver: the forces of all contacts that obey their laws at the end of the step.
 
 mod bilateral;
-mod conjugate_gradients;
 mod constraint;
 mod coulomb;
 mod islands;

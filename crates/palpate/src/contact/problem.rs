@@ -144,7 +144,7 @@ impl ContactProblem<'_> {
     /// Release all forces of an island: the step without contact.
     pub(super) fn release_forces(&mut self, bodies: &[u32], members: &[u32]) {
         for at in members.iter().map(|&member| member as usize) {
-            (self.contacts[at].force, self.constraints[at].direction) = (DVec3::ZERO, DVec3::ZERO);
+            self.contacts[at].force = DVec3::ZERO;
             if let OtherSide::Device(device) = self.contacts[at].other {
                 self.devices[device].force = DVec3::ZERO;
             }
@@ -250,16 +250,6 @@ impl ContactProblem<'_> {
         let constraint = &mut self.constraints[at];
         (constraint.axes, constraint.compliance) = (axes, compliance);
         constraint.stiffness = compliance.inverse();
-    }
-
-    /// Drop the extrapolation of a warm start that moves the sides by less than `enough` [m]: noise.
-    pub(super) fn drop_warm_start_noise(&mut self, at: usize, enough: f64) {
-        let (contact, constraint) = (&mut self.contacts[at], &self.constraints[at]);
-        let w = constraint.compliance * constraint.axes.transpose();
-        let is_noise = |last: &DVec3| (w * (contact.force - *last)).length() < enough;
-        if let Some(last) = contact.last_force.filter(is_noise) {
-            contact.force = last;
-        }
     }
 
     /// Solve one contact's law with the others as they are, unless that moves its sides by no more than `enough` [m].

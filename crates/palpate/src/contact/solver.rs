@@ -7,12 +7,10 @@
 //! ```
 //!
 //! Projected block Gauss-Seidel: a sweep solves each contact's law with the other forces as they are (see `coulomb`); the
-//! held points of an island are one block, solved by Cholesky factors. Sweeps are accelerated by conjugate gradients.
-//! Between sweeps everything is evaluated exactly with the rotation that the forces cause, so that in the end the equations
-//! of motion are met, not their linearisation.
+//! held points of an island are one block, solved by Cholesky factors. Between sweeps everything is evaluated exactly with
+//! the rotation that the forces cause, so that in the end the equations of motion are met, not their linearisation.
 
 use super::bilateral::BilateralSystem;
-use super::conjugate_gradients::ConjugateGradients;
 use super::islands::Islands;
 use super::problem::{ContactProblem, ROUND_OFF, larger};
 use crate::collision::{ContactLaw, OtherSide};
@@ -26,28 +24,31 @@ const MAX_ITERATIONS: u32 = 40;
 const MAX_FINAL_EVALUATIONS: u32 = 6;
 
 /// Upper limit of sweeps over all evaluations together.
-const MAX_SWEEPS: u32 = 300;
+const MAX_SWEEPS: u32 = 120;
 
-/// Residual beyond which held points count as unsolved, as a share of the reach.
+/// Residual of held points, as a multiple of round-off: the goal; and beyond which they count as unsolved, as a share of the
+/// reach.
+const HELD_ROUNDINGS: f64 = 8.0;
 const UNSOLVED: f64 = 1e-9;
 
-/// Islands of at most so many contacts are solved to round-off. Larger ones have a tolerance that grows with the number of
-/// contact visits [1]: [`CLOSE`], then [`LOOSE`], then [`ROUGH`], as shares of the object's size.
-const FEW: usize = 24;
-const VISITS: u32 = 600;
-/// Visits after which a scene with contact samples, which are no more exact than that, is solved to [`LOOSE`].
-const VISITS_WITH_SAMPLES: u32 = 60;
-const MANY_VISITS: u32 = 20_000;
-const MAX_VISITS: u32 = 40_000;
-const CLOSE: f64 = 1e-8;
+/// Tolerances of a contact's residual, as shares of the object's size: the goal; what is accepted beyond the budget of contact
+/// visits; and what is used, and reported as unsolved, at the limit of sweeps.
+const TOLERANCE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
 const ROUGH: f64 = 1e-4;
 
+/// Contact visits that the goal is worth: contact samples, which stand for many nodes, are no more exact than [`LOOSE`].
+const VISITS: u32 = 600;
+const VISITS_WITH_SAMPLES: u32 = 60;
+
+/// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at.
+const SKIP: f64 = 0.1;
+
+/// Change of force that is not propagated, by the displacement of its own point, as a share of the object's size.
+const MIN_DISPLACEMENT: f64 = 3e-10;
+
 /// Rotation within an evaluation [rad] from which contacts are linearised again.
 const RELINEARISE: f64 = 0.01;
-
-/// Rotation over a step [rad, Cayley vector] that counts as divergence.
-const DIVERGENCE: f64 = 4.0;
 
 /// Scaled fallback: forces after so many sweeps, scaled to rotate a body by at most this [rad] and deform it by this share of
 /// its radius; so many scales are tried, with so many evaluations each.
@@ -75,7 +76,6 @@ pub(crate) struct Solver {
     /// Contact visits after which the tolerance is [`LOOSE`].
     visits_until_loose: u32,
     islands: Islands,
-    gradients: ConjugateGradients,
     system: BilateralSystem,
     held: Vec<u32>,
     /// Objects and contacts of the island that is being solved.
@@ -89,7 +89,6 @@ impl Solver {
         Self {
             visits_until_loose: if uses_samples { VISITS_WITH_SAMPLES } else { VISITS },
             islands: Islands::new(objects),
-            gradients: ConjugateGradients::new(objects),
             system: BilateralSystem::new(devices),
             held: Vec::with_capacity(devices),
             bodies: Vec::with_capacity(objects),
@@ -126,82 +125,59 @@ impl Solver {
     fn start(&mut self, problem: &mut ContactProblem) {
         for at in self.bodies.iter().map(|&at| at as usize) {
             problem.start(at);
-            self.gradients.start_object(at);
         }
     }
 
     fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
+        let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
         let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
-        let is_large = self.members.len() > FEW;
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
-            problem.states[at].points.least_move = if is_large { 0.03 * CLOSE * radius } else { 0.0 };
+            problem.states[at].points.least_move = if touches { MIN_DISPLACEMENT * radius } else { 0.0 };
+            reach = reach.max(problem.states[at].reach(&problem.objects[at]));
+            size = size.min(radius);
         }
         self.start(problem);
-        for at in self.bodies.iter().map(|&at| at as usize) {
-            reach = reach.max(problem.states[at].reach(&problem.objects[at]));
-            size = size.min(problem.objects[at].radius);
-        }
         self.linearise(problem);
         for at in self.members.iter().map(|&member| member as usize) {
-            if !problem.contacts[at].is_held() {
-                problem.drop_warm_start_noise(at, self.tolerance(0, size));
-            }
             let contact = problem.contacts[at];
             problem.apply(&contact, contact.force);
         }
         let dependent = self.factorise_held(problem);
         report.dependent_rows += dependent as u32;
 
-        let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
         let round_off = ROUND_OFF * reach;
-        let (mut least, mut first_residual) = (f64::INFINITY, f64::INFINITY);
+        let mut first_residual = f64::INFINITY;
         let (mut iterations, mut visits, mut sweeps) = (0, 0, 0);
-        let mut is_rough = false;
-        let is_solved = loop {
+        let count = self.members.len() as u32;
+        let (is_solved, last_residual) = loop {
             let rotation = self.evaluate(problem);
             if rotation > RELINEARISE * size {
                 self.linearise(problem);
             }
             iterations += 1;
-            let enough = 0.1 * self.tolerance(visits, size).min(LOOSE * size);
-            let residual = larger(rotation, self.sweep(problem, enough));
-            visits += self.members.len() as u32;
+            let residual = larger(rotation, self.sweep(problem, SKIP * self.tolerance(visits) * size));
+            visits += count;
             if iterations == 1 {
                 first_residual = residual;
             }
-            // Converged: to round-off, or near it without further gain, or to the tolerance.
-            let stalls = residual > 0.5 * least && residual < 1e3 * round_off;
-            let is_within = touches && residual < self.tolerance(visits, size);
-            let is_exhausted = sweeps >= MAX_SWEEPS || visits >= MAX_VISITS;
-            let gives_up = touches && (is_exhausted || self.diverges(problem));
-            let is_last = iterations == MAX_ITERATIONS || gives_up;
-            if residual <= round_off || stalls || is_within || is_last || !residual.is_finite() {
+            let tolerance = if touches { self.tolerance(visits) * size } else { HELD_ROUNDINGS * round_off };
+            let is_last = iterations == MAX_ITERATIONS || sweeps >= MAX_SWEEPS || !residual.is_finite();
+            if residual <= tolerance || is_last {
                 report.iterations = report.iterations.max(iterations);
+                report.residual_m = report.residual_m.max(if residual.is_finite() { residual } else { reach });
+                let allowed = if touches { ROUGH * size } else { UNSOLVED * reach };
                 // Dependent held points can't be met where their devices differ, and need not be.
-                let loosest = self.tolerance(visits, size).max(LOOSE * size);
-                let allowed = if touches { loosest } else { UNSOLVED * reach };
-                if residual <= allowed || dependent > 0 && residual <= first_residual {
-                    report.residual_m = report.residual_m.max(residual);
-                    // A rough solution is used, and reported as unsolved.
-                    is_rough = touches && (loosest > LOOSE * size || residual > LOOSE * size);
-                    break true;
-                }
-                let finite = if residual.is_finite() { residual } else { reach };
-                report.residual_m = report.residual_m.max(finite);
-                break false;
+                let is_solved = residual <= allowed || dependent > 0 && residual <= first_residual;
+                break (is_solved, residual);
             }
-            least = least.min(residual);
-            let goal = round_off.max(0.02 * residual);
-            self.gradients.restart();
             // Held points alone are solved by one sweep.
-            while touches && sweeps < MAX_SWEEPS && visits < MAX_VISITS {
+            let goal = round_off.max(0.02 * residual);
+            while touches && sweeps < MAX_SWEEPS {
                 sweeps += 1;
-                self.gradients.remember(problem, &self.bodies, &self.members);
-                let moved = self.sweep(problem, 0.1 * goal);
-                self.gradients.accelerate(problem, &self.bodies, &self.members);
-                visits += self.members.len() as u32;
-                if moved <= goal.max(0.3 * self.tolerance(visits, size)) || !moved.is_finite() {
+                let moved = self.sweep(problem, SKIP * goal);
+                visits += count;
+                if moved <= goal.max(0.3 * self.tolerance(visits) * size) || !moved.is_finite() {
                     break;
                 }
             }
@@ -220,14 +196,9 @@ impl Solver {
             problem.finish(object as usize);
         }
         problem.write_ends(&self.members);
-        // The last sweep's movement adds to the residual that it saw.
-        is_rough |= is_solved && touches && problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
-        report.unsolved_islands += u32::from(is_rough);
-    }
-
-    /// Whether forces rotate a body so far that its linearisation is of no use.
-    fn diverges(&self, problem: &ContactProblem) -> bool {
-        self.bodies.iter().any(|&at| problem.states[at as usize].end.turn.length() > DIVERGENCE)
+        // A rough solution is used, and reported as unsolved: by its residual, or by what the last sweep moved.
+        let is_rough = last_residual > LOOSE * size || problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
+        report.unsolved_islands += u32::from(is_solved && touches && is_rough);
     }
 
     /// Scaled fallback solution: the forces that the linearisation about the free motion gives, scaled down until the
@@ -236,11 +207,8 @@ impl Solver {
         problem.release_forces(&self.bodies, &self.members);
         self.start(problem);
         self.linearise(problem);
-        self.gradients.restart();
         for _ in 0..FALLBACK_SWEEPS {
-            self.gradients.remember(problem, &self.bodies, &self.members);
             let moved = self.sweep(problem, 0.0);
-            self.gradients.accelerate(problem, &self.bodies, &self.members);
             if moved <= round_off {
                 break;
             }
@@ -259,15 +227,9 @@ impl Solver {
         false
     }
 
-    /// Tolerance [m] after so many contact visits.
-    fn tolerance(&self, visits: u32, size: f64) -> f64 {
-        let is_small = self.members.len() <= FEW;
-        size * match visits {
-            visits if visits > MANY_VISITS && !is_small => ROUGH,
-            visits if visits > self.visits_until_loose => LOOSE,
-            _ if is_small => 0.0,
-            _ => CLOSE,
-        }
+    /// Tolerance after so many contact visits, as a share of the size.
+    fn tolerance(&self, visits: u32) -> f64 {
+        if visits > self.visits_until_loose { LOOSE } else { TOLERANCE }
     }
 
     /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].

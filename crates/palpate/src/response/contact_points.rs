@@ -51,9 +51,6 @@ pub(crate) struct ContactPoints {
     /// Forces g [N, body] and displacements C·g [m, body], three numbers per point.
     forces: Vec<f64>,
     moved: Vec<f64>,
-    /// The same before a sweep, and along the direction of search (see `solver`).
-    before: [Vec<f64>; 2],
-    along: [Vec<f64>; 2],
     /// Changes of force that move their point by less than this [m] wait until they have added up.
     pub(crate) least_move: f64,
     unused: Vec<usize>,
@@ -70,8 +67,6 @@ impl ContactPoints {
             stride,
             forces: vec![0.0; stride],
             moved: vec![0.0; stride],
-            before: [vec![0.0; stride], vec![0.0; stride]],
-            along: [vec![0.0; stride], vec![0.0; stride]],
             least_move: 0.0,
             unused: (0..capacity).rev().collect(),
             at: vec![0; capacity],
@@ -206,10 +201,8 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn release_forces(&mut self) {
         let n = 3 * self.points.len();
-        let [along_forces, along_moved] = &mut self.along;
-        for buffer in [&mut self.forces, &mut self.moved, along_forces, along_moved] {
-            buffer[..n].fill(0.0);
-        }
+        self.forces[..n].fill(0.0);
+        self.moved[..n].fill(0.0);
         for point in &mut self.points {
             (point.force, point.force_in_body) = (DVec3::ZERO, DVec3::ZERO);
         }
@@ -227,44 +220,16 @@ impl ContactPoints {
         self.points[at].free + DVec3::from_slice(&self.moved[3 * at..])
     }
 
-    /// Keep forces and displacements for [`Self::accelerate`].
+    /// Sum C·g of one point again, in turn, so that round-off does not grow.
     ///
     /// # Real time
-    pub(crate) fn remember(&mut self) {
-        let n = 3 * self.points.len();
-        self.before[0][..n].copy_from_slice(&self.forces[..n]);
-        self.before[1][..n].copy_from_slice(&self.moved[..n]);
-    }
-
-    /// Go on by β times the last direction, and renew it: d ← β·d + (now − before).
-    ///
-    /// # Real time
-    pub(crate) fn accelerate(&mut self, beta: f64) {
-        let n = 3 * self.points.len();
-        let [forces, moved] = &mut self.along;
-        for (now, before, along) in
-            [(&mut self.forces, &self.before[0], forces), (&mut self.moved, &self.before[1], moved)]
-        {
-            for ((now, before), along) in now[..n].iter_mut().zip(before).zip(along) {
-                let change = *now - before;
-                *now += beta * *along;
-                *along = beta * *along + change;
-            }
-        }
-        for (point, force) in self.points.iter_mut().zip(self.forces.chunks_exact(3)) {
-            point.force_in_body = DVec3::from_slice(force);
-        }
-    }
-
-    /// Sum part number `part` of so many of C·g up anew, so that roundings don't add up.
-    ///
-    /// # Real time
-    /// Costs the square of the number of points, over the parts.
-    pub(crate) fn resum(&mut self, part: u64, of: u64) {
-        let n = 3 * self.points.len();
-        let from = |part: u64| n * part as usize / of as usize;
-        for row in from(part)..from(part + 1) {
-            self.moved[row] = dot(&self.compliance[row * self.stride..][..n], &self.forces[..n]);
+    /// Costs the number of points.
+    pub(crate) fn resum_next(&mut self, step: u64) {
+        let count = self.points.len() as u64;
+        let Some(at) = step.checked_rem(count).map(|at| at as usize) else { return };
+        for row in 3 * at..3 * at + 3 {
+            let length = 3 * self.points.len();
+            self.moved[row] = dot(&self.compliance[row * self.stride..][..length], &self.forces[..length]);
         }
     }
 

@@ -40,11 +40,6 @@ const UNSOLVED: f64 = 1e-9;
 /// Share of a penetration that is pushed out per step, as far as earlier losses pay for the work.
 const RECOVERY: f64 = 0.1;
 
-/// C·f, which is updated from step to step, is summed again over so many steps, a share of its rows in each, so that round-off
-/// does not grow; all rows in every step for few contact points.
-const RESUM_STEPS: u64 = 64;
-const FEW_POINTS: usize = 16;
-
 impl Model {
     /// Rules of a step.
     fn step_rules(&self) -> StepRules {
@@ -122,7 +117,6 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
-    collision.query.begin_step();
     let step = *steps;
     let scene = model.collision_scene();
     let mut context =
@@ -181,10 +175,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         let orientation = own.rigid.pose.orientation;
         let mut view = object.view(model.parameters.gravity, &own.rigid, &mut own.response);
         own.points.predict_new(&mut view);
-        match own.points.points.len() {
-            0..=FEW_POINTS => own.points.resum(0, 1),
-            _ => own.points.resum(*steps % RESUM_STEPS, RESUM_STEPS),
-        }
+        own.points.resum_next(*steps);
         for point in &mut own.points.points {
             point.start_arm = orientation * (point.rest + point.state.displacement);
         }

@@ -1,6 +1,6 @@
 //! `palpate bench`: percentiles of step times.
 
-mod pictures;
+mod frames;
 mod touch;
 
 use crate::commands::demo::cached_cube;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor; and pictures
+/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor; and the encoding of frames
 ///
 /// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
 /// for another machine. Recording the largest cube takes about a minute the first time.

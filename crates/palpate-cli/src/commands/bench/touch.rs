@@ -1,6 +1,6 @@
 //! Steps with contacts: fingers on meshes of different resolution, a cube on a floor.
 
-use super::{Case, pictures, timed_step};
+use super::{Case, frames, timed_step};
 use crate::failure::Failure;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, Recording, State};
@@ -8,19 +8,17 @@ use palpate_testkit::{GRAVITY_M_S2, finger, floor, start_at, subdivided_near_fie
 use palpate_viewer::FrameFormat;
 use std::sync::Arc;
 
-/// Fingers like these are on every haptic workbench.
+/// Typical finger.
 pub const FINGER: DeviceParameters = finger(0.005, 0.004, 0.6);
 
 /// Half the side of the cubes [m].
 pub const HALF: f64 = 0.05;
 
-/// Contact samples at all nodes.
+/// Contact samples: at all nodes, or few.
 const ALL: usize = usize::MAX;
+const FEW: usize = 48;
 
-/// Contact samples of a run in real time.
-const SAMPLES: usize = 48;
-
-/// Subdivisions of the recorded cube's surface on the finest one.
+/// Refinements of the recorded surface, each of which splits every triangle in four.
 const REFINEMENTS: usize = 3;
 
 /// Cases with the paper's cube and a finer one.
@@ -42,18 +40,18 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         fingers(recording.clone(), false);
     }
     for form in [FrameFormat::Modal, FrameFormat::Vertices] {
-        cases.push(pictures::case(recording.clone(), form, false));
-        cases.push(pictures::case(cube.clone(), form, true));
+        cases.push(frames::case(recording.clone(), form, false));
+        cases.push(frames::case(cube.clone(), form, true));
     }
     let floors = [
         (0.0, 1, ALL, "lies on a floor"),
-        (0.0, 1, SAMPLES, "lies on a floor, 48 contact samples"),
+        (0.0, 1, FEW, "lies on a floor, 48 contact samples"),
         (0.05, 1, ALL, "falls on a floor from 5 cm, contact steps"),
-        (0.05, 1, SAMPLES, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
+        (0.05, 1, FEW, "falls on a floor from 5 cm, contact steps, 48 contact samples"),
         (0.0, 2, ALL, "one on another on a floor"),
-        (0.0, 2, SAMPLES, "one on another on a floor, 48 contact samples"),
+        (0.0, 2, FEW, "one on another on a floor, 48 contact samples"),
         (0.001, 2, ALL, "one on another, falls on a floor, contact steps"),
-        (0.001, 2, SAMPLES, "one on another, falls on a floor, contact steps, 48 contact samples"),
+        (0.001, 2, FEW, "one on another, falls on a floor, contact steps, 48 contact samples"),
     ];
     // Damping lets resting cubes come to rest.
     let damped_cube = Arc::new(damped(&cube));
@@ -71,10 +69,6 @@ pub fn cases(cube: Arc<Recording>, finer: Arc<Recording>) -> impl Iterator<Item 
         cases.push((label, Box::new(move |steps| moving_steps(&recording, max_contact_samples, steps))));
     }
     cases.into_iter()
-}
-
-fn at_height(y: f64) -> ObjectStart {
-    ObjectStart { pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY }, twist: Twist::ZERO }
 }
 
 /// Compute times of steps in which two fingers pinch the cube by 4 mm and shake it at 2 Hz, or slide over it [ns].
@@ -186,77 +180,4 @@ fn damped(cube: &Recording) -> Recording {
     let modes = &mut cube.modes;
     modes.damping_ratios = modes.angular_frequencies.iter().map(|omega| 0.5 * 2e-3 * omega).collect();
     cube
-}
-
-/// Copy with every surface triangle split in four: modes and residual compliance are interpolated linearly, for fine surfaces
-/// without finite elements.
-fn refined(coarse: &Recording) -> Recording {
-    let surface = &coarse.surface;
-    let m = coarse.modes.len();
-    // Nodes at the ends of the edge that a new node halves.
-    let mut parents: Vec<[u32; 2]> = (0..surface.positions.len() as u32).map(|n| [n, n]).collect();
-    let mut middles = HashMap::new();
-    let mut triangles = Vec::with_capacity(4 * surface.triangles.len());
-    for &[a, b, c] in &surface.triangles {
-        let mut middle = |i: u32, j: u32| {
-            *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                parents.push([i, j]);
-                parents.len() as u32 - 1
-            })
-        };
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-        triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-    }
-    let mean =
-        |of: &[u32; 2], value: &dyn Fn(usize) -> DVec3| (value(of[0] as usize) + value(of[1] as usize)) * 0.5;
-    let positions: Vec<DVec3> = parents.iter().map(|of| mean(of, &|n| surface.positions[n])).collect();
-    let mut mode_shapes = Vec::with_capacity(3 * positions.len() * m);
-    for [a, b] in &parents {
-        for axis in 0..3 {
-            let (a, b) = (coarse.modes.row(*a as usize, axis), coarse.modes.row(*b as usize, axis));
-            mode_shapes.extend(a.iter().zip(b).map(|(x, y)| 0.5 * (x + y)));
-        }
-    }
-    let source_nodes = (0..positions.len() as u32).collect();
-    let surface = Surface { positions, triangles, source_nodes };
-    let residual = near_field(&surface, &parents, &coarse.residual);
-    let modes = ModalBasis { mode_shapes, ..coarse.modes.clone() };
-    Recording { metadata: coarse.metadata.clone(), surface, modes, residual, gravity: None }
-}
-
-/// Residual compliance between the new nodes, within a few edges.
-fn near_field(surface: &Surface, parents: &[[u32; 2]], coarse: &ResidualCompliance) -> ResidualCompliance {
-    let radius = 3.0 * surface.mean_edge();
-    let cell = |p: DVec3| (p / radius).floor().to_array().map(|x| x as i64);
-    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    for (node, p) in surface.positions.iter().enumerate() {
-        cells.entry(cell(*p)).or_default().push(node as u32);
-    }
-    let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
-    for (i, p) in surface.positions.iter().enumerate() {
-        let [x, y, z] = cell(*p);
-        let around =
-            (-1..=1).flat_map(|dx| (-1..=1).flat_map(move |dy| (-1..=1).map(move |dz| [dx, dy, dz])));
-        let mut others: Vec<u32> = around
-            .filter_map(|[dx, dy, dz]| cells.get(&[x + dx, y + dy, z + dz]))
-            .flatten()
-            .copied()
-            .filter(|&j| (surface.positions[j as usize] - *p).length() < radius)
-            .collect();
-        others.sort_unstable();
-        for j in others {
-            let mut block = DMat3::ZERO;
-            for a in parents[i] {
-                for b in parents[j as usize] {
-                    block += coarse.block(a as usize, b as usize) * 0.25;
-                }
-            }
-            let distance = (surface.positions[j as usize] - *p).length();
-            block *= NearField::taper(distance / radius);
-            near.nodes.push(j);
-            near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
-        }
-        near.offsets.push(near.nodes.len() as u32);
-    }
-    ResidualCompliance::NearField(near)
 }

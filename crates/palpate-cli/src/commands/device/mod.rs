@@ -8,9 +8,11 @@ use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json};
 use clap::Args;
 use palpate::DeviceMode;
-use palpate_haptics::device::{Hand, Traits};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::link::{LinkClient, LinkState};
-use palpate_haptics::{AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_update};
+use palpate_haptics::{
+    AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_haptic_update,
+};
 use palpate_scene::{attach_path, attach_real, find_device_traits, find_grip, read_path};
 use real::RealArguments;
 use serde_json::json;
@@ -78,7 +80,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Source of motion.
 enum Source {
-    Path(MotionPath, Option<(Traits, Hand)>),
+    Path(MotionPath, Option<(DeviceSpec, Hand)>),
     Real(Box<AttachedDevice>),
 }
 
@@ -109,14 +111,16 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     // The path begins with the connection.
     let found = start.elapsed().as_secs_f64();
     let attached = match source {
-        Source::Path(path, simulated) => attach_path(path.later(found), simulated, mode, rate, passivity),
+        Source::Path(path, simulated) => {
+            attach_path(path.delayed_by(found), simulated, mode, rate, passivity)
+        }
         Source::Real(attached) => *attached,
     };
     let update = attached.update(port);
     let (clock, ended) = (Clock::new(start, 1.0 / arguments.rate), AtomicBool::new(false));
     let scheduling = Scheduling { priority: Some(PRIORITY), core: None };
     let (report, linked) = std::thread::scope(|scope| {
-        let updating = scope.spawn(|| run_update(update, &clock, scheduling, &ended));
+        let updating = scope.spawn(|| run_haptic_update(update, &clock, scheduling, &ended));
         let linked = watch(&client, arguments, found + duration, start, stop);
         ended.store(true, Ordering::Relaxed);
         let report = updating.join().map_err(|_| Failure("the haptic update has ended by a bug".to_string()));
@@ -145,7 +149,7 @@ fn duration(arguments: &Arguments, source: &Source) -> Result<f64, Failure> {
 }
 
 /// Simulated device and hand, if given.
-fn simulated(arguments: &Arguments) -> Result<Option<(Traits, Hand)>, Failure> {
+fn simulated(arguments: &Arguments) -> Result<Option<(DeviceSpec, Hand)>, Failure> {
     let hand = arguments.grip.as_deref().map_or(Ok(Hand::FIRM), find_grip).map_err(Failure)?;
     let traits = arguments.simulated.as_deref().map(find_device_traits).transpose().map_err(Failure)?;
     Ok(traits.map(|traits| (traits, hand)))
@@ -161,12 +165,12 @@ fn connect(
     let Arguments { connect, name, wait, .. } = arguments;
     loop {
         let why = match client.state() {
-            LinkState::Linked => {
+            LinkState::Connected => {
                 notify(&format!("linked to {connect} as {name}"));
                 return Ok(());
             }
             LinkState::Refused(why) => return Err(Failure(why)),
-            LinkState::Seeking(why) => why,
+            LinkState::Connecting(why) => why,
         };
         if start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || stop.load(Ordering::Relaxed) {
             return Err(Failure(format!(
@@ -186,17 +190,17 @@ fn watch(
     start: Instant,
     stop: &AtomicBool,
 ) -> Result<f64, Failure> {
-    let (mut last, mut linked) = (LinkState::Linked, 0.0);
+    let (mut last, mut linked) = (LinkState::Connected, 0.0);
     while start.elapsed().as_secs_f64() < end_s && !stop.load(Ordering::Relaxed) {
         let state = client.state();
         match &state {
-            LinkState::Linked => linked += POLL_INTERVAL.as_secs_f64(),
+            LinkState::Connected => linked += POLL_INTERVAL.as_secs_f64(),
             LinkState::Refused(why) => return Err(Failure(why.clone())),
-            LinkState::Seeking(_) => {}
+            LinkState::Connecting(_) => {}
         }
         if last != state {
             notify(&match &state {
-                LinkState::Seeking(why) => format!("looking for {}: {why}", arguments.connect),
+                LinkState::Connecting(why) => format!("looking for {}: {why}", arguments.connect),
                 _ => format!("linked to {} again", arguments.connect),
             });
         }
@@ -209,21 +213,21 @@ fn watch(
 fn json(arguments: &Arguments, report: &DeviceReport, linked_s: f64) -> serde_json::Value {
     json!({
         "name": arguments.name,
-        "kind": report.traits.kind,
+        "kind": report.spec.kind,
         "linked_s": linked_s,
         "updates": report.counts.updates,
         "force_max_n": report.counts.force_max_n,
-        "given_j": report.counts.given_j,
+        "given_j": report.counts.work_on_hand_j,
         "failed": report.counts.failed,
         "failure": report.failure.as_ref().map(ToString::to_string),
         "granted": report.granted.to_string(),
         "timing": timing(&report.timing),
-        "answer_us": percentiles(report.answers.percentiles_us()),
+        "answer_us": percentiles(report.motion_to_force.percentiles_us()),
     })
 }
 
 fn text_of(arguments: &Arguments, report: &DeviceReport) -> String {
-    let answers = report.answers.percentiles_us();
+    let answers = report.motion_to_force.percentiles_us();
     format!(
         "{} updates at {:.0} Hz; {}\n  {:<12} {}\n  motion to force {:.0} µs median; 99 % below {:.0}, 99.9 % below {:.0}, all \
          below {:.0}\n",

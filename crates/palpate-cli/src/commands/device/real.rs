@@ -5,7 +5,7 @@ use clap::Args;
 use glam::DVec3;
 use palpate::Pose;
 use palpate_haptics::device::Mount;
-use palpate_haptics::orientation;
+use palpate_haptics::unit_quaternion;
 use palpate_scene::{MAX_FORCE_N, RealDevice, find_driver};
 
 /// Real device, instead of a path.
@@ -78,7 +78,7 @@ impl RealArguments {
         match mount_orientation[..] {
             [] => {}
             [w, x, y, z] => {
-                let turned = orientation(w, x, y, z);
+                let turned = unit_quaternion(w, x, y, z);
                 pose.orientation = turned.map_err(|what| Failure(format!("--mount-orientation: {what}")))?;
             }
             _ => {

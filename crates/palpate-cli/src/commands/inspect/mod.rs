@@ -7,7 +7,7 @@ use crate::progress::Bars;
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
 use palpate::{Damping, Material, Recording, ResidualCompliance, Support};
-use palpate_fem::progress::Progress;
+use palpate_fem::Progress;
 use palpate_scene::{certificate_table, read_recording};
 use palpate_store::{Location, TableStore};
 use serde_json::{Value, json};

@@ -5,10 +5,10 @@ use crate::terminal::{print, print_json};
 use clap::Args;
 use glam::DVec3;
 use palpate::{Coupling, Recording, SurfacePoint};
-use palpate_haptics::device::{Hand, Traits};
+use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::stability::{
-    ClosedLoop, DefaultCoupling, Limit, LoopTiming, PlaceResponse, default_coupling, normal_at,
-    stable_damping, stiffest_place, unstable_from,
+    ClosedLoop, DefaultCoupling, LoopTiming, PointResponse, StiffnessLimit, critical_stiffness,
+    default_coupling, normal_at, stable_damping, stiffest_point,
 };
 use palpate_scene::{ANY_HAND, find_device_traits, find_grip};
 use serde_json::json;
@@ -52,10 +52,10 @@ const STIFFEST: f64 = 1e6;
 
 /// Result of the analysis.
 struct Analysis {
-    traits: Traits,
+    traits: DeviceSpec,
     hands: Vec<&'static str>,
     timing: LoopTiming,
-    place: DVec3,
+    position: DVec3,
     normal: DVec3,
     within_step: f64,
     at_rest: f64,
@@ -79,7 +79,7 @@ impl StabilityArguments {
         Ok(true)
     }
 
-    fn find(&self, recording: &Recording, traits: Traits) -> Result<Analysis, Failure> {
+    fn find(&self, recording: &Recording, traits: DeviceSpec) -> Result<Analysis, Failure> {
         let fail = |what: String| Err(Failure(what));
         let Self { rate, delay, patch, .. } = *self;
         if !(50.0..=10_000.0).contains(&rate) {
@@ -99,33 +99,33 @@ impl StabilityArguments {
                 ANY_HAND.into_iter().filter(|(_, known)| *known == Some(hand)).collect()
             }
         };
-        let point = self.place(recording, timing.step_s)?;
+        let point = self.contact_point(recording, timing.step_s)?;
         let normal = normal_at(&recording.surface, &point);
-        let place = PlaceResponse::new(recording, &point, patch, normal);
+        let place = PointResponse::new(recording, &point, patch, normal);
         let one = |(_, hand): &(&str, Option<Hand>)| ClosedLoop::new(&place, traits, *hand, timing);
         let loops: Vec<ClosedLoop> = hands.iter().map(one).collect();
-        let within_step = place.within_step(timing.step_s);
+        let within_step = place.instantaneous_compliance(timing.step_s);
         let default = default_coupling(&loops, within_step);
         let needs = |found: &DefaultCoupling| loops[0].damping_for_passivity(found.coupling);
         Ok(Analysis {
             traits,
             hands: hands.iter().map(|(name, _)| *name).collect(),
             timing,
-            place: recording.surface.rest_position(&point),
+            position: recording.surface.rest_position(&point),
             normal,
             within_step,
-            at_rest: place.at_rest(),
+            at_rest: place.static_compliance(),
             table: TABLE.into_iter().map(|k| (k, stable_damping(&loops, k))).collect(),
-            unstable_from: unstable_from(&loops, STIFFEST),
+            unstable_from: critical_stiffness(&loops, STIFFEST),
             passive: default.as_ref().map(needs),
             default,
         })
     }
 
-    fn place(&self, recording: &Recording, step_s: f64) -> Result<SurfacePoint, Failure> {
+    fn contact_point(&self, recording: &Recording, step_s: f64) -> Result<SurfacePoint, Failure> {
         let nowhere = || Failure("the recording has no surface that can be touched".to_string());
         let Some(text) = &self.point else {
-            return stiffest_place(recording, self.patch, step_s).ok_or_else(nowhere);
+            return stiffest_point(recording, self.patch, step_s).ok_or_else(nowhere);
         };
         let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
         let wanted = match numbers.as_deref() {
@@ -146,7 +146,7 @@ impl Analysis {
     fn text(&self) -> Result<String, std::fmt::Error> {
         let mut out = String::new();
         let LoopTiming { step_s, delay_updates } = self.timing;
-        let [p, n] = [self.place, self.normal].map(|v| format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z));
+        let [p, n] = [self.position, self.normal].map(|v| format!("({:.4}, {:.4}, {:.4})", v.x, v.y, v.z));
         writeln!(out, "{} at {p}, pressed along {n}", self.traits.kind)?;
         writeln!(
             out,
@@ -192,8 +192,10 @@ impl Analysis {
             margins.phase_rad.to_degrees()
         )?;
         let why = match limit {
-            Limit::Object => "the object: stiffer would not be felt, it is 10/R[0]",
-            Limit::Loop => "rate, delay, device and hand: twice the gains, and twice as late, must be stable",
+            StiffnessLimit::Object => "the object: stiffer would not be felt, it is 10/R[0]",
+            StiffnessLimit::Loop => {
+                "rate, delay, device and hand: twice the gains, and twice as late, must be stable"
+            }
         };
         writeln!(out, "  limited by   {why}")?;
         let (needs, has) = (self.passive.unwrap_or(0.0), self.traits.damping_n_s_m);
@@ -213,7 +215,7 @@ impl Analysis {
             "hands": self.hands,
             "rate_hz": 1.0 / self.timing.step_s,
             "delay_updates": self.timing.delay_updates,
-            "point_m": self.place.to_array(),
+            "point_m": self.position.to_array(),
             "normal": self.normal.to_array(),
             "compliance_within_step_m_per_n": self.within_step,
             "compliance_at_rest_m_per_n": self.at_rest,
@@ -225,7 +227,7 @@ impl Analysis {
             "default": self.default.map(|found| json!({
                 "stiffness_n_per_m": found.coupling.stiffness,
                 "damping_n_s_per_m": found.coupling.damping,
-                "limited_by": match found.limit { Limit::Object => "object", Limit::Loop => "loop" },
+                "limited_by": match found.limit { StiffnessLimit::Object => "object", StiffnessLimit::Loop => "loop" },
                 "gain_margin": found.margins.gain,
                 "delay_margin_s": found.margins.delay_s.is_finite().then_some(found.margins.delay_s),
                 "phase_margin_rad": found.margins.phase_rad,

@@ -10,12 +10,10 @@ use clap::Args;
 use node_selection::select;
 use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
-use palpate_fem::element::Order;
-use palpate_fem::material::materials_from_toml;
-use palpate_fem::mesh::{Mesh, merge_nodes};
-use palpate_fem::progress::Progress;
-use palpate_fem::record::{Extent, RecordParameters, record as record_mesh};
-use palpate_fem::residual::ResidualChoice;
+use palpate_fem::mesh::Mesh;
+use palpate_fem::{
+    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, materials_from_toml,
+};
 use palpate_scene::{read_mesh, source_name};
 use std::path::{Path, PathBuf};
 use table::{TableArguments, TableCommand};
@@ -118,13 +116,13 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     let mut mesh = read_mesh(&arguments.source)?;
     mesh.scale(arguments.scale)?;
     if arguments.merge_nodes {
-        let merged = merge_nodes(&mut mesh);
-        progress.remark(&format!("{merged} nodes lay on others and were merged"));
+        let merged = mesh.merge_coincident_nodes();
+        progress.warn(&format!("{merged} nodes lay on others and were merged"));
     }
     let table = TableCommand::new(&arguments.dense, &mesh)?;
-    let extent = table.as_ref().map_or(Extent::Whole, |table| table.extent(arguments.output.is_some()));
+    let extent = table.as_ref().map_or(RecordExtent::Full, |table| table.extent(arguments.output.is_some()));
     let parameters = parameters(arguments, extent, &mesh)?;
-    let recorded = record_mesh(mesh, &parameters, &mut progress)
+    let recorded = RecordedBody::new(mesh, &parameters, &mut progress)
         .map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
     let mut written = None;
     if let Some(output) = &arguments.output {
@@ -147,7 +145,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn parameters(arguments: &Arguments, extent: Extent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
+fn parameters(arguments: &Arguments, extent: RecordExtent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
     let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
         (Some(path), ..) => {
             let text =
@@ -175,7 +173,7 @@ fn parameters(arguments: &Arguments, extent: Extent, mesh: &Mesh) -> Result<Reco
     }
     Ok(RecordParameters {
         materials,
-        order: if arguments.order == 1 { Order::Linear } else { Order::Quadratic },
+        order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
         modes: arguments.modes,
         damping,
         residual: arguments.residual,

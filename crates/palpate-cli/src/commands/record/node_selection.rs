@@ -4,9 +4,8 @@
 //! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold.
 
 use crate::failure::Failure;
-use palpate_fem::discretisation::Discretisation;
-use palpate_fem::material::region_text;
-use palpate_fem::mesh::{Mesh, boundary};
+use palpate_fem::RecordedBody;
+use palpate_fem::mesh::{Mesh, Region};
 
 /// Nodes of a mesh, selected by a text.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +38,12 @@ pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failur
 }
 
 /// Nodes of a discretisation in the union of selections, ascending.
-pub fn union(discretisation: &Discretisation, selections: &[Selection]) -> Vec<u32> {
-    let mut chosen = vec![false; discretisation.nodes.len()];
-    let mut on_surface = vec![false; discretisation.nodes.len()];
-    discretisation.surface_nodes().iter().for_each(|&node| on_surface[node as usize] = true);
+pub fn union(body: &RecordedBody, selections: &[Selection]) -> Vec<u32> {
+    let mut chosen = vec![false; body.nodes().len()];
+    let mut on_surface = vec![false; body.nodes().len()];
+    body.surface_nodes().iter().for_each(|&node| on_surface[node as usize] = true);
     for selection in selections {
-        let among = discretisation.among(&selection.mesh_nodes);
+        let among = body.nodes_in_set(&selection.mesh_nodes);
         for (node, chosen) in chosen.iter_mut().enumerate() {
             *chosen |= among[node] && (!selection.surface || on_surface[node]);
         }
@@ -60,16 +59,16 @@ fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
     } else if part == "all" {
         holds.fill(true);
     } else if part == "surface" {
-        boundary(&mesh.tets).iter().flatten().for_each(|&node| holds[node as usize] = true);
+        mesh.boundary().iter().flatten().for_each(|&node| holds[node as usize] = true);
     } else if let Some(name) = part.strip_prefix("region:") {
         let named = |at: u32| {
             let region = &mesh.regions[at as usize];
-            region_text(region) == name || region.tag.to_string() == name
+            region.label() == name || region.tag.to_string() == name
         };
         let tets = mesh.tets.iter().zip(&mesh.tet_regions).filter(|(_, region)| named(**region));
         tets.flat_map(|(tet, _)| tet).for_each(|&node| holds[node as usize] = true);
         if !holds.contains(&true) {
-            let regions: Vec<String> = mesh.regions.iter().map(region_text).collect();
+            let regions: Vec<String> = mesh.regions.iter().map(Region::label).collect();
             return Err(Failure(format!("the mesh has no region {name:?}; it has {}", regions.join(", "))));
         }
     } else if let Some(list) = part.strip_prefix("nodes:") {
@@ -140,8 +139,9 @@ impl Condition {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_fem::element::Order;
+    use palpate::{Damping, Material};
     use palpate_fem::mesh::{NodeGroup, box_mesh};
+    use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, ResidualChoice, SilentProgress};
 
     fn chosen(mesh: &Mesh, text: &str) -> usize {
         select(mesh, "--fix", text).map_or(0, |selection| selection.mesh_nodes.len())
@@ -179,8 +179,23 @@ mod tests {
     #[test]
     fn the_surface_of_quadratic_elements_has_no_node_inside() {
         let mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
-        let discretisation = Discretisation::new(&mesh, Order::Quadratic);
+        let parameters = RecordParameters {
+            materials: vec![Material {
+                region: String::new(),
+                young_pa: 1e4,
+                poisson: 0.3,
+                density_kg_m3: 1e3,
+            }],
+            order: ElementOrder::Quadratic,
+            modes: 1,
+            damping: Damping::Ratio(0.0),
+            residual: ResidualChoice::None,
+            fixed_nodes: Vec::new(),
+            source: String::new(),
+            extent: RecordExtent::NoModes,
+        };
+        let body = RecordedBody::new(mesh.clone(), &parameters, &mut SilentProgress).expect("a body");
         let selection = select(&mesh, "--touchable", "surface").expect("a surface");
-        assert_eq!(union(&discretisation, &[selection]), discretisation.surface_nodes());
+        assert_eq!(union(&body, &[selection]), body.surface_nodes());
     }
 }

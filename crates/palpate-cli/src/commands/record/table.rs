@@ -7,10 +7,8 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate::{Metadata, Sampling};
 use palpate_fem::mesh::Mesh;
-use palpate_fem::progress::Progress;
-use palpate_fem::record::{Extent, Recorded};
-use palpate_fem::table::{BLOCK, Method, TableParameters, TableRecorder};
-use palpate_fem::transient::follows_hz;
+use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
+use palpate_fem::{Progress, RecordExtent, RecordedBody};
 use palpate_store::{Compression, Location, Number, Part, TableAttributes, TableContent, TableStore};
 use rayon::prelude::*;
 
@@ -140,7 +138,7 @@ pub struct TableCommand<'a> {
 impl<'a> TableCommand<'a> {
     /// Check the options that ask for a table; none if no table is wanted.
     pub fn new(arguments: &'a TableArguments, mesh: &Mesh) -> Result<Option<Self>, Failure> {
-        let Some(place) = &arguments.dense else { return Ok(None) };
+        let Some(output) = &arguments.dense else { return Ok(None) };
         let (step, duration) = (arguments.step, arguments.duration);
         if !(step > 0.0 && step <= 1.0) {
             return Err(Failure(format!("--step is {step} s, expected above 0 and at most 1")));
@@ -151,7 +149,7 @@ impl<'a> TableCommand<'a> {
                 "--duration is {duration} s, expected at least one --step of {step} s, and at most 1e8 of them"
             )));
         }
-        let location = Location::parse(place);
+        let location = Location::parse(output);
         if location.folder().is_some_and(|folder| folder.is_file()) {
             return Err(Failure(format!("cannot write {location}: it is a file, and a store is a folder")));
         }
@@ -168,18 +166,17 @@ impl<'a> TableCommand<'a> {
     }
 
     /// Part of a recording that the table needs; `also_recording` when one is written beside it.
-    pub fn extent(&self, also_recording: bool) -> Extent {
+    pub fn extent(&self, also_recording: bool) -> RecordExtent {
         match (also_recording, self.arguments.method) {
-            (true, _) => Extent::Whole,
-            (false, MethodOption::ClosedForm) => Extent::Uncertified,
-            (false, MethodOption::Transient) => Extent::Body,
+            (true, _) => RecordExtent::Full,
+            (false, MethodOption::ClosedForm) => RecordExtent::NoCertificate,
+            (false, MethodOption::Transient) => RecordExtent::NoModes,
         }
     }
 
     /// Record what is missing of the table.
-    pub fn record(&self, recorded: &Recorded, progress: &mut Bars) -> Result<TableStore, Failure> {
+    pub fn record(&self, recorded: &RecordedBody, progress: &mut Bars) -> Result<TableStore, Failure> {
         let arguments = self.arguments;
-        let discretisation = &recorded.system.discretisation;
         let parameters = TableParameters {
             step_s: arguments.step,
             samples: self.samples,
@@ -188,11 +185,11 @@ impl<'a> TableCommand<'a> {
                 SamplingOption::Mean => Sampling::Mean,
             },
             method: match arguments.method {
-                MethodOption::ClosedForm => Method::ClosedForm,
-                MethodOption::Transient => Method::Transient { substeps: arguments.substeps },
+                MethodOption::ClosedForm => TableMethod::ClosedForm,
+                MethodOption::Transient => TableMethod::Transient { substeps: arguments.substeps },
             },
-            touchable_nodes: union(discretisation, &self.touchable),
-            observed_nodes: union(discretisation, &self.observed),
+            touchable_nodes: union(recorded, &self.touchable),
+            observed_nodes: union(recorded, &self.observed),
         };
         let failed = |e: palpate_fem::table::TableError| Failure(e.to_string());
         let recorder = TableRecorder::new(recorded, &parameters).map_err(failed)?;
@@ -225,7 +222,7 @@ impl<'a> TableCommand<'a> {
 
     fn content(
         &self,
-        recorded: &Recorded,
+        recorded: &RecordedBody,
         parameters: &TableParameters,
         recorder: &TableRecorder<'_>,
     ) -> TableContent {
@@ -253,20 +250,20 @@ impl<'a> TableCommand<'a> {
             ..recorded.recording.metadata.clone()
         };
         let method = match parameters.method {
-            Method::ClosedForm => {
+            TableMethod::ClosedForm => {
                 let residual = match &recorded.recording.residual {
                     palpate::ResidualCompliance::None => "no residual compliance",
                     _ => "residual compliance",
                 };
-                format!("closed-form, {} modes and {residual}", recorded.modes.squares.len())
+                format!("closed-form, {} modes and {residual}", recorded.recording.modes.len())
             }
-            Method::Transient { substeps } => format!(
+            TableMethod::Transient { substeps } => format!(
                 "transient, order 5, substeps {substeps}: follows waves up to {:.0} Hz to 1 % over 0.1 s",
-                follows_hz(recorder.integration_step_s().unwrap_or(parameters.step_s))
+                recorder.resolved_frequency_hz().unwrap_or_default()
             ),
         };
-        let centre = DVec3::from_array(recorded.system.mass.center_of_mass_m);
-        let nodes = &recorded.system.discretisation.nodes;
+        let centre = DVec3::from_array(recorded.recording.metadata.mass.center_of_mass_m);
+        let nodes = recorded.nodes();
         let observed_positions = parameters.observed_nodes.iter().map(|&node| nodes[node as usize] - centre);
         TableContent {
             attributes: TableAttributes {
@@ -307,9 +304,8 @@ impl<'a> TableCommand<'a> {
                 needed(1) as f64 / 1e9
             )));
         }
-        let room = |shards: u64| {
-            palpate_fem::factor::check_memory(needed(shards).saturating_sub(used_bytes()) as f64)
-        };
+        let room =
+            |shards: u64| palpate_fem::check_memory(needed(shards).saturating_sub(used_bytes()) as f64);
         room(1).map_err(|e| Failure(e.to_string()))?;
         let wanted = (block_width(columns) * rayon::current_num_threads()).div_ceil(columns as usize) as u64;
         let fits = |&shards: &u64| needed(shards) <= limit && room(shards).is_ok();
@@ -326,7 +322,7 @@ fn needed_bytes(recorder: &TableRecorder<'_>, columns: u64, number: Number) -> u
 
 /// Columns that are computed together: a property of the store, so that its bits don't depend on who writes it.
 fn block_width(columns_per_shard: u64) -> usize {
-    BLOCK.min(columns_per_shard as usize)
+    COLUMN_BLOCK.min(columns_per_shard as usize)
 }
 
 /// Memory [bytes] that this process uses, where the system tells.

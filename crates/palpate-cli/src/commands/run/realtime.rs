@@ -107,16 +107,16 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         (Some(real), _) => {
             let (attached, line) = attach_real(real, device.mode, rate, passivity)?;
             notify(&line);
-            Ok(SessionDevice::Here(attached))
+            Ok(SessionDevice::Local(attached))
         }
         (None, Some(path)) => {
             let attached = attach_path(path.clone(), device.simulated, device.mode, rate, passivity);
-            Ok(SessionDevice::Here(attached))
+            Ok(SessionDevice::Local(attached))
         }
         (None, None) => {
             let (device_port, force_port) = port();
             linked.push((device.name.clone(), device_port));
-            Ok(SessionDevice::Linked(force_port, device.mode))
+            Ok(SessionDevice::Remote(force_port, device.mode))
         }
     };
     let devices: Result<Vec<_>, Failure> = scene.devices.iter().map(attach).collect();
@@ -126,11 +126,11 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         model: scene.model.clone(),
         start,
         devices,
-        movers: movers(scene),
+        obstacle_trajectories: movers(scene),
         steps,
-        pictures_hz: options.pictures,
+        frame_rate_hz: options.pictures,
         scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
-        patience_s: DEVICE_TIMEOUT_S,
+        device_timeout_s: DEVICE_TIMEOUT_S,
         state: None,
         playback: Arc::default(),
         cycles: None,
@@ -182,9 +182,9 @@ fn watch(
                 bar.finish_and_clear();
             });
         }
-        let mut pictures = DeformationProcess::new(session.model.clone());
-        let ran = session.run(log, stop, &done, |moment| {
-            pictures.cycle(moment);
+        let mut deformation = DeformationProcess::new(session.model.clone());
+        let ran = session.run(log, stop, &done, |snapshot| {
+            deformation.cycle(snapshot);
         });
         over.store(true, Ordering::Relaxed);
         let (report, out) = ran?;

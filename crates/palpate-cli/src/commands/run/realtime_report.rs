@@ -30,20 +30,20 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         let (counts, safety) = (own.counts, own.counts.safety);
         json!({
             "name": device.name,
-            "kind": own.traits.kind,
+            "kind": own.spec.kind,
             "force_max_n": counts.force_max_n,
-            "given_j": counts.given_j,
+            "given_j": counts.work_on_hand_j,
             "updates": counts.updates,
             "failed": counts.failed,
             "failure": own.failure.as_ref().map(ToString::to_string),
             "timing": timing(&own.timing),
-            "answer_us": percentiles(own.answers.percentiles_us()),
-            "passivity": { "acted": counts.passivity_acted, "missing_max_j": counts.passivity_worst_j },
+            "answer_us": percentiles(own.motion_to_force.percentiles_us()),
+            "passivity": { "acted": counts.passivity_active_updates, "missing_max_j": counts.passivity_max_deficit_j },
             "safety": {
                 "clamped": safety.clamped,
-                "slewed": safety.slewed,
+                "slewed": safety.slew_limited,
                 "stale": safety.stale,
-                "too_fast": safety.too_fast,
+                "too_fast": safety.overspeed,
                 "not_finite": safety.not_finite,
                 "trips": safety.trips,
             },
@@ -59,8 +59,8 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         "steal_time_s": report.steal_time_s,
         "granted": report.granted.to_string(),
         "force_process": timing(&report.force),
-        "deformation_process": timing(&report.pictures),
-        "unsolved_steps": report.unsolved,
+        "deformation_process": timing(&report.deformation),
+        "unsolved_steps": report.unsolved_steps,
         "max_contact_samples": scene.model.parameters().max_contact_samples,
         "devices": devices.collect::<Vec<_>>(),
         "objects": objects.collect::<Vec<_>>(),
@@ -95,14 +95,14 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     );
     out += &line("force: compute", report.force.compute_us());
     out += &line("force: lateness", report.force.lateness_us());
-    if report.pictures.cycles() > 0 {
-        out += &line("deformation: compute", report.pictures.compute_us());
+    if report.deformation.cycles() > 0 {
+        out += &line("deformation: compute", report.deformation.compute_us());
     }
     let here = || {
         scene.devices.iter().zip(&report.devices).filter_map(|(device, own)| Some((device, own.as_ref()?)))
     };
     for (device, own) in here() {
-        out += &line(&format!("{}: motion to force", device.name), own.answers.percentiles_us());
+        out += &line(&format!("{}: motion to force", device.name), own.motion_to_force.percentiles_us());
     }
     out += "\n";
     out += &overruns(report, step_s);
@@ -128,10 +128,10 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
             parameters.max_contact_samples
         );
     }
-    if report.unsolved > 0 {
+    if report.unsolved_steps > 0 {
         out += &format!(
             "  warning      in {} steps contacts could not be solved, or were left out\n",
-            report.unsolved
+            report.unsolved_steps
         );
     }
     if let (Some(summary), Some(path)) = (report.log, log) {
@@ -150,19 +150,19 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
 /// Forces, passivity and safety of a device, in a line.
 pub fn device_line(own: &DeviceReport) -> String {
     let (counts, safety) = (own.counts, own.counts.safety);
-    let mut out = format!("{}, {:.4} N at most", own.traits.kind, counts.force_max_n);
-    if own.traits.force_n.is_infinite() {
+    let mut out = format!("{}, {:.4} N at most", own.spec.kind, counts.force_max_n);
+    if own.spec.force_n.is_infinite() {
         return out;
     }
     out += &format!(
         "; gave the hand {:+.3e} J; passivity acted in {} of {} updates",
-        counts.given_j, counts.passivity_acted, counts.updates
+        counts.work_on_hand_j, counts.passivity_active_updates, counts.updates
     );
     let faults = [
         (safety.clamped, "clamped"),
-        (safety.slewed, "slewed"),
+        (safety.slew_limited, "slewed"),
         (safety.stale, "stale"),
-        (safety.too_fast, "too fast"),
+        (safety.overspeed, "too fast"),
         (safety.not_finite, "no number"),
         (safety.trips, "trips"),
         (counts.failed, "failed"),

@@ -70,7 +70,7 @@ impl LogSeries {
             begun.store(true, Ordering::Relaxed);
             log.map_err(|failure| {
                 series.note_failure(&failure.0);
-                failure.0
+                failure.0.into()
             })
         }))
     }

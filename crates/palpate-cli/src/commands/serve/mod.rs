@@ -128,7 +128,7 @@ pub fn serve_built_in(serving: &Serving, id: &str) -> Result<(), Failure> {
             }
         });
         bar.finish_and_clear();
-        opened.map_err(Failure)
+        opened.map_err(|e| Failure(e.to_string()))
     })
 }
 
@@ -144,7 +144,7 @@ fn serve_live(
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let core = serving.core.or(cores.checked_sub(1));
     let scheduling = Scheduling { priority: Some(PRIORITY), core };
-    let live = Live { workshop: Arc::new(provider), first, scheduling };
+    let live = Live { provider: Arc::new(provider), first, scheduling };
     serving.serve(server, ServedContent::Live(Box::new(live)))?;
     logs.map_or(Ok(()), |logs| logs.end())
 }
@@ -157,15 +157,15 @@ impl Serving {
     /// Binds the given address, or the default port, or a free one.
     pub fn bind(&self) -> Result<Server, Failure> {
         if let Some(listen) = self.listen {
-            return Server::bind(&self.settings(listen)).map_err(Failure);
+            return Server::bind(&self.settings(listen)).map_err(|e| Failure(e.to_string()));
         }
         let here = |port| self.settings((Ipv4Addr::LOCALHOST, port).into());
-        Server::bind(&here(PORT)).or_else(|_| Server::bind(&here(0))).map_err(Failure)
+        Server::bind(&here(PORT)).or_else(|_| Server::bind(&here(0))).map_err(|e| Failure(e.to_string()))
     }
 
     /// Prints the address, opens a browser, and serves until Ctrl-C.
     pub fn serve(&self, server: Server, content: ServedContent) -> Result<(), Failure> {
-        let mut address = format!("http://{}/", server.address().map_err(Failure)?);
+        let mut address = format!("http://{}/", server.address().map_err(|e| Failure(e.to_string()))?);
         if let Some(token) = &self.token {
             address += &format!("?token={token}");
         }
@@ -175,7 +175,7 @@ impl Serving {
         if !self.no_browser {
             open_browser(&address);
         }
-        server.run(content, stop).map_err(Failure)
+        server.run(content, stop).map_err(|e| Failure(e.to_string()))
     }
 }
 

@@ -10,8 +10,8 @@ use palpate_scene::{
     SettingsChange, attach_path, attach_real,
 };
 use palpate_viewer::{
-    MaterialDescription, PhysicsSettings, ProgressCallback, SceneProvider, SceneSummary, SharedTrajectory,
-    Upload, ViewerDevice, ViewerScene,
+    MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -54,19 +54,22 @@ impl LibraryProvider {
             description,
             model: scene.model.clone(),
             devices: scene.devices.iter().map(viewer_device).collect(),
-            movers: movers.collect(),
+            obstacle_trajectories: movers.collect(),
             log,
         })
     }
 
-    /// Scene of a result, with errors as text.
-    fn provided<E: Into<Failure>>(&self, opened: Result<OpenedScene, E>) -> Result<ViewerScene, String> {
-        opened.map_err(Into::into).and_then(|opened| self.viewer_scene(opened)).map_err(|failure| failure.0)
+    /// Scene of the viewer, with the provider's error.
+    fn provided<E: Into<Failure>>(&self, opened: Result<OpenedScene, E>) -> Result<ViewerScene, SceneError> {
+        opened
+            .map_err(Into::into)
+            .and_then(|opened| self.viewer_scene(opened))
+            .map_err(|failure| failure.0.into())
     }
 }
 
 impl SceneProvider for LibraryProvider {
-    fn titles(&self) -> Vec<SceneSummary> {
+    fn scenes(&self) -> Vec<SceneSummary> {
         let summary = |scene: &palpate_scene::BuiltInScene| SceneSummary {
             id: scene.id.into(),
             title: scene.title.into(),
@@ -75,11 +78,11 @@ impl SceneProvider for LibraryProvider {
         BUILT_IN_SCENES.iter().map(summary).collect()
     }
 
-    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, String> {
+    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
         self.provided(self.library.open_built_in(id, &mut ProgressFn::new(tell)))
     }
 
-    fn change(&self, settings: &PhysicsSettings) -> Result<ViewerScene, String> {
+    fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, SceneError> {
         let coupling = settings
             .coupling
             .map(|coupling| palpate::Coupling { stiffness: coupling.stiffness, damping: coupling.damping });
@@ -97,12 +100,12 @@ impl SceneProvider for LibraryProvider {
         object: usize,
         material: MaterialDescription,
         tell: ProgressCallback,
-    ) -> Result<ViewerScene, String> {
+    ) -> Result<ViewerScene, SceneError> {
         let progress = &mut ProgressFn::new(tell);
         self.provided(self.library.change_material(object, uniform(material), progress))
     }
 
-    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, String> {
+    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
         let Upload { name, bytes, scale, material, modes } = upload;
         let upload = MeshUpload { name, bytes, scale, material: uniform(material), modes };
         self.provided(self.library.record_upload(upload, &mut ProgressFn::new(tell)))
@@ -119,7 +122,7 @@ fn viewer_device(device: &SceneDevice) -> ViewerDevice {
     match (&device.real, &device.path) {
         (Some(real), _) => {
             let (real, mode): (RealDevice, DeviceMode) = (real.clone(), device.mode);
-            ViewerDevice::Here(Arc::new(move || {
+            ViewerDevice::Local(Arc::new(move || {
                 let (attached, line) =
                     attach_real(&real, mode, DEVICE_HZ, true).map_err(|error| error.to_string())?;
                 notify(&line);
@@ -127,10 +130,10 @@ fn viewer_device(device: &SceneDevice) -> ViewerDevice {
             }))
         }
         (None, Some(path)) => match device.simulated {
-            None => ViewerDevice::Following(path.clone(), device.mode),
+            None => ViewerDevice::Path(path.clone(), device.mode),
             simulated => {
                 let (path, mode) = (path.clone(), device.mode);
-                ViewerDevice::Here(Arc::new(move || {
+                ViewerDevice::Local(Arc::new(move || {
                     Ok(attach_path(path.clone(), simulated, mode, DEVICE_HZ, true))
                 }))
             }

@@ -1,4 +1,4 @@
-//! What Gmsh's element type numbers mean (Gmsh reference manual, "MSH file format", and the
+//! Element type numbers of Gmsh (Gmsh reference manual, "MSH file format", and the
 //! `MSH_*` constants of `gmsh/src/common/GmshDefines.h`).
 
 /// The shape of an element, whatever its order.

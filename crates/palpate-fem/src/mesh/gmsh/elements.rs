@@ -1,17 +1,14 @@
 //! The section `$Elements`: tetrahedra, and the nodes of every physical group's elements.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use super::element_types::{Shape, element_type};
-use super::labels::Labels;
+use super::labels::{Labels, Members};
 use super::nodes::Nodes;
-use super::{Version, end_of_section};
-use crate::mesh::MeshError;
+use super::sections::{Version, end_of_section};
+use crate::mesh::error::MeshError;
 use crate::mesh::scan::Number::{I32, U64};
-use crate::mesh::scan::{OtherSolids, Scan};
-
-/// The nodes of elements, with repeats, by dimension and entity (2.2: physical tag).
-pub(super) type Members = BTreeMap<(u8, i64), Vec<u32>>;
+use crate::mesh::scan::{OtherSolids, Scanner};
 
 /// The elements of a file.
 #[derive(Default)]
@@ -31,7 +28,7 @@ pub(super) struct Elements {
     row: Vec<u32>,
 }
 
-/// What the elements of a block have in common.
+/// Common properties of the elements of a block.
 struct Block {
     shape: Shape,
     node_count: usize,
@@ -43,7 +40,7 @@ struct Block {
 
 impl Elements {
     pub fn read(
-        scan: &mut Scan,
+        scan: &mut Scanner,
         version: Version,
         nodes: &Nodes,
         labels: &Labels,
@@ -54,7 +51,7 @@ impl Elements {
             Version::V4 => elements.read_v4(scan, nodes, labels)?,
         };
         end_of_section(scan, "Elements", &format!("after {count} elements"))?;
-        elements.other_solids.none(scan)?;
+        elements.other_solids.refuse(scan)?;
         if version == Version::V2 {
             elements.drop_repeats();
         }
@@ -63,7 +60,7 @@ impl Elements {
 
     /// A count, then a row `number type tag-count tags… nodes…` per element. A binary file says
     /// `type element-count tag-count` once for a run of elements.
-    fn read_v2(&mut self, scan: &mut Scan, nodes: &Nodes) -> Result<usize, MeshError> {
+    fn read_v2(&mut self, scan: &mut Scanner, nodes: &Nodes) -> Result<usize, MeshError> {
         let row_bytes = if scan.is_text() { 8 } else { 8 + 4 };
         scan.skip_blank();
         let stated = scan.text_number("the number of elements")?;
@@ -105,7 +102,7 @@ impl Elements {
     }
 
     /// Blocks, one per entity and element type: a row `number nodes…` per element.
-    fn read_v4(&mut self, scan: &mut Scan, nodes: &Nodes, labels: &Labels) -> Result<usize, MeshError> {
+    fn read_v4(&mut self, scan: &mut Scanner, nodes: &Nodes, labels: &Labels) -> Result<usize, MeshError> {
         let number_bytes = if scan.is_text() { 2 } else { 8 };
         scan.start_of_row();
         let blocks = scan.unsigned(U64, "the number of element blocks")?;
@@ -140,7 +137,7 @@ impl Elements {
 
             let key = (shape.dimension(), entity);
             let tags = labels.physical_tags(Version::V4, &key);
-            self.unlisted_blocks += usize::from(labels.misses(&key));
+            self.unlisted_blocks += usize::from(labels.omits(&key));
             let block = Block {
                 shape,
                 node_count,
@@ -163,7 +160,7 @@ impl Elements {
     }
 
     /// The nodes of one element, to the end of its row.
-    fn read_element(&mut self, scan: &mut Scan, nodes: &Nodes, block: &Block) -> Result<(), MeshError> {
+    fn read_element(&mut self, scan: &mut Scanner, nodes: &Nodes, block: &Block) -> Result<(), MeshError> {
         self.row.clear();
         for _ in 0..block.node_count {
             let number = nodes.read_number(scan)?;
@@ -213,7 +210,7 @@ impl Elements {
     }
 }
 
-fn read_type(scan: &mut Scan) -> Result<(Shape, usize), MeshError> {
+fn read_type(scan: &mut Scanner) -> Result<(Shape, usize), MeshError> {
     let number = scan.integer(I32, "an element type")?;
     element_type(number).ok_or_else(|| scan.error(format!("unknown element type {number}")))
 }

@@ -3,11 +3,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::elements::Members;
-use super::{Version, end_of_section};
+use super::sections::{Version, end_of_section};
+use crate::mesh::error::MeshError;
 use crate::mesh::scan::Number::{F64, I32, U64};
-use crate::mesh::scan::{Scan, quoted};
-use crate::mesh::{MeshError, NodeGroup};
+use crate::mesh::scan::{Scanner, quoted};
+use crate::mesh::volume_mesh::NodeGroup;
+
+/// The nodes of elements, with repeats, by dimension and entity (2.2: physical tag).
+pub(super) type Members = BTreeMap<(u8, i64), Vec<u32>>;
 
 /// Physical groups: their names, and which entities they consist of.
 #[derive(Default)]
@@ -20,7 +23,7 @@ pub(super) struct Labels {
 
 impl Labels {
     /// A count, then a row `dimension tag "name"` per physical group; text in binary files too.
-    pub fn read_names(&mut self, scan: &mut Scan) -> Result<(), MeshError> {
+    pub fn read_names(&mut self, scan: &mut Scanner) -> Result<(), MeshError> {
         scan.skip_blank();
         let stated: u64 = scan.text_number("the number of physical names")?;
         let count = scan.count(stated, 6, "physical names")?;
@@ -43,7 +46,7 @@ impl Labels {
 
     /// Four counts, then per entity its tag, its box (a point: its position), its physical tags
     /// and the entities that bound it (4.1).
-    pub fn read_entities(&mut self, scan: &mut Scan) -> Result<(), MeshError> {
+    pub fn read_entities(&mut self, scan: &mut Scanner) -> Result<(), MeshError> {
         scan.start_of_row();
         let mut counts = [0; 4];
         for count in &mut counts {
@@ -91,7 +94,7 @@ impl Labels {
     }
 
     /// Whether the file lists entities, but not this one.
-    pub fn misses(&self, entity: &(u8, i64)) -> bool {
+    pub fn omits(&self, entity: &(u8, i64)) -> bool {
         !self.entities.is_empty() && !self.entities.contains_key(entity)
     }
 
@@ -99,15 +102,15 @@ impl Labels {
         self.names.get(&(dimension, tag)).cloned()
     }
 
-    /// The groups, by dimension and tag, and a remark for each two that have become one.
+    /// The groups, by dimension and tag, and a warning for each two of one name.
     pub fn groups(
         &self,
-        scan: &Scan,
+        scan: &Scanner,
         version: Version,
         members: Members,
     ) -> Result<(Vec<NodeGroup>, Vec<String>), MeshError> {
         // Many tags on the same entities could list far more nodes than the file has bytes.
-        let most_members = 4 * scan.file_size();
+        let max_members = 4 * scan.file_size();
         let mut member_count = 0;
         let mut by_tag: BTreeMap<(u8, i64), Vec<u32>> = BTreeMap::new();
         for (entity, mut nodes) in members {
@@ -115,7 +118,7 @@ impl Labels {
             nodes.dedup();
             for &tag in self.physical_tags(version, &entity) {
                 member_count += nodes.len();
-                if member_count > most_members {
+                if member_count > max_members {
                     let message = "too many physical tags on the same entities";
                     return scan.fail(message);
                 }
@@ -124,14 +127,14 @@ impl Labels {
         }
 
         let mut groups: Vec<NodeGroup> = Vec::new();
-        let mut places: HashMap<String, usize> = HashMap::new();
-        let mut remarks = Vec::new();
+        let mut indices: HashMap<String, usize> = HashMap::new();
+        let mut warnings = Vec::new();
         for ((dimension, tag), nodes) in by_tag {
             let name = self.name(dimension, tag).unwrap_or_else(|| tag.to_string());
-            let place = *places.entry(name.clone()).or_insert(groups.len());
-            match groups.get_mut(place) {
+            let index = *indices.entry(name.clone()).or_insert(groups.len());
+            match groups.get_mut(index) {
                 Some(group) => {
-                    remarks.push(format!(
+                    warnings.push(format!(
                         "physical group {tag} of dimension {dimension} and another are both \
                          called '{name}': their nodes are joined"
                     ));
@@ -144,6 +147,6 @@ impl Labels {
             group.nodes.sort_unstable();
             group.nodes.dedup();
         }
-        Ok((groups, remarks))
+        Ok((groups, warnings))
     }
 }

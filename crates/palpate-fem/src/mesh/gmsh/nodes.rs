@@ -4,20 +4,20 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::{Version, end_of_section};
-use crate::mesh::MeshError;
+use super::sections::{Version, end_of_section};
+use crate::mesh::error::MeshError;
 use crate::mesh::scan::Number::{F64, I32, U64};
-use crate::mesh::scan::{Number, Scan};
+use crate::mesh::scan::{Number, Scanner};
 
-/// A place in [`Nodes::by_number`] that no node has.
+/// Entry of [`Nodes::by_number`] without a node.
 const NONE: u32 = u32::MAX;
 
 /// The nodes of a file, in its order.
 pub(super) struct Nodes {
     pub positions: Vec<DVec3>,
-    /// How numbers of nodes are stored.
+    /// Type of node numbers.
     number: Number,
-    /// How many nodes have been given a number; in a 4.1 block, numbers come before positions.
+    /// Number of nodes that have a number already; in a 4.1 block, numbers come before positions.
     numbered: u32,
     /// Positions of the nodes whose numbers are below `dense_below`.
     by_number: Vec<u32>,
@@ -27,7 +27,7 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    pub fn read(scan: &mut Scan, version: Version) -> Result<Self, MeshError> {
+    pub fn read(scan: &mut Scanner, version: Version) -> Result<Self, MeshError> {
         match version {
             Version::V2 => Self::read_v2(scan),
             Version::V4 => Self::read_v4(scan),
@@ -47,7 +47,7 @@ impl Nodes {
 
     /// A node number in an element.
     #[inline]
-    pub fn read_number(&self, scan: &mut Scan) -> Result<u64, MeshError> {
+    pub fn read_number(&self, scan: &mut Scanner) -> Result<u64, MeshError> {
         scan.unsigned(self.number, "a node number")
     }
 
@@ -62,8 +62,8 @@ impl Nodes {
         }
     }
 
-    /// Gives the next node its number.
-    fn add_number(&mut self, scan: &mut Scan) -> Result<(), MeshError> {
+    /// Numbers the next node.
+    fn add_number(&mut self, scan: &mut Scanner) -> Result<(), MeshError> {
         let number = self.read_number(scan)?;
         let node = self.numbered;
         if node == NONE {
@@ -71,11 +71,11 @@ impl Nodes {
         }
         self.numbered += 1;
         let before = if number < self.dense_below {
-            let place = number as usize;
-            if place >= self.by_number.len() {
-                self.by_number.resize(place + 1, NONE);
+            let index = number as usize;
+            if index >= self.by_number.len() {
+                self.by_number.resize(index + 1, NONE);
             }
-            match self.by_number.get_mut(place) {
+            match self.by_number.get_mut(index) {
                 Some(slot) => std::mem::replace(slot, node),
                 None => NONE,
             }
@@ -89,7 +89,7 @@ impl Nodes {
         Err(scan.error(format!("node {number} is in the file twice")))
     }
 
-    fn add_position(&mut self, scan: &mut Scan) -> Result<(), MeshError> {
+    fn add_position(&mut self, scan: &mut Scanner) -> Result<(), MeshError> {
         let mut coordinate = || scan.real(F64, "a coordinate");
         let position = DVec3::new(coordinate()?, coordinate()?, coordinate()?);
         self.positions.push(position);
@@ -97,7 +97,7 @@ impl Nodes {
     }
 
     /// A count, then a row `number x y z` per node.
-    fn read_v2(scan: &mut Scan) -> Result<Self, MeshError> {
+    fn read_v2(scan: &mut Scanner) -> Result<Self, MeshError> {
         let row_bytes = if scan.is_text() { 8 } else { 28 };
         scan.skip_blank();
         let stated = scan.text_number("the number of nodes")?;
@@ -116,7 +116,7 @@ impl Nodes {
     }
 
     /// Blocks, one per entity: the numbers of its nodes, then their positions.
-    fn read_v4(scan: &mut Scan) -> Result<Self, MeshError> {
+    fn read_v4(scan: &mut Scanner) -> Result<Self, MeshError> {
         let row_bytes = if scan.is_text() { 8 } else { 32 };
         scan.start_of_row();
         let blocks = scan.unsigned(U64, "the number of node blocks")?;

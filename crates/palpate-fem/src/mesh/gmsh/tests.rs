@@ -29,7 +29,7 @@ fn region(tag: i64, name: Option<&str>) -> Region {
     Region { tag, name: name.map(str::to_owned) }
 }
 
-/// What all variants of the file say.
+/// Content of all variants of the file.
 fn expected() -> Mesh {
     Mesh {
         nodes: POSITIONS.map(DVec3::from).to_vec(),
@@ -42,7 +42,7 @@ fn expected() -> Mesh {
             group("hard", &[1, 2, 3, 4]),
             group("soft part", &[0, 1, 2, 3]),
         ],
-        remarks: vec![],
+        warnings: vec![],
     }
 }
 
@@ -253,20 +253,20 @@ fn a_file_on_disk_is_read_and_a_missing_one_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.msh");
     std::fs::write(&path, file(true, Little)).unwrap();
-    assert_eq!(super::read(&path).unwrap(), expected());
-    let missing = super::read(&folder.path().join("no.msh"));
+    assert_eq!(super::read_gmsh(&path).unwrap(), expected());
+    let missing = super::read_gmsh(&folder.path().join("no.msh"));
     assert!(matches!(missing, Err(MeshError::Read { .. })));
 }
 
 #[test]
-fn quadratic_tetrahedra_give_their_corners_and_a_remark() {
+fn quadratic_tetrahedra_give_their_corners_and_a_warning() {
     let elements = v2_with(&["1 11 1 6 4 3 2 1 1 1 1 1 1 1", "2 9 1 2 1 2 3 1 2 3"]);
     let mesh = read(elements).unwrap();
     assert_eq!(mesh.tets, [[3, 2, 1, 0]]);
     assert_eq!(mesh.groups, [group("2", &[0, 1, 2]), group("6", &[0, 1, 2, 3])]);
-    let remark = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
+    let warning = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
                   straight";
-    assert_eq!(mesh.remarks, [remark]);
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]
@@ -309,29 +309,29 @@ fn a_tetrahedron_that_2_2_lists_for_each_of_its_volumes_is_kept_once() {
     assert_eq!(mesh.tet_regions, [0, 1]);
     let all = [0, 1, 2, 3];
     assert_eq!(mesh.groups, [group("7", &all), group("9", &all)]);
-    let remark = "tetrahedra listed again under another physical volume: 1; each is kept once, in \
+    let warning = "tetrahedra listed again under another physical volume: 1; each is kept once, in \
                   the volume listed first";
-    assert_eq!(mesh.remarks, [remark]);
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]
-fn groups_of_one_name_are_joined_with_a_remark() {
+fn groups_of_one_name_are_joined_with_a_warning() {
     let mesh = read(v2_with(&["1 15 1 2 4", "2 1 1 2 1 2", "3 15 1 1 3"])).unwrap();
     assert_eq!(mesh.groups, [group("1", &[2]), group("2", &[0, 1, 3])]);
-    let remark = "physical group 2 of dimension 1 and another are both called '2': their nodes \
+    let warning = "physical group 2 of dimension 1 and another are both called '2': their nodes \
                   are joined";
-    assert_eq!(mesh.remarks, [remark]);
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]
-fn blocks_of_unlisted_entities_are_remarked() {
+fn blocks_of_unlisted_entities_are_reported() {
     let text = v4_with(["5", "6"]).replace("3 2 4 1\n", "3 20 4 1\n");
     let mesh = read(text).unwrap();
     assert_eq!(mesh.tet_regions, [1, 0]);
     assert_eq!(mesh.regions, [region(0, None), region(5, None)]);
-    let remark = "element blocks of entities that $Entities does not list, as in a partitioned \
+    let warning = "element blocks of entities that $Entities does not list, as in a partitioned \
                   mesh: 1; they are in no region and no group";
-    assert_eq!(mesh.remarks, [remark]);
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]

@@ -1,8 +1,24 @@
-//! Arrays of a VTK legacy file: those that make regions and groups are kept, the others passed over.
+//! Arrays of a VTK legacy file: those that make regions and groups are kept, the others skipped.
 
-use super::super::scan::{Number, quoted};
-use super::super::{MeshError, NodeGroup};
-use super::{ArraysOf, REGION_ARRAYS, Reader};
+use super::reader::{ArraysOf, Reader};
+use crate::mesh::error::MeshError;
+use crate::mesh::scan::{Number, quoted};
+use crate::mesh::volume_mesh::NodeGroup;
+
+/// Names of the cell arrays that tell regions apart; case does not matter.
+const REGION_ARRAYS: [&str; 11] = [
+    "material",
+    "materials",
+    "materialids",
+    "region",
+    "regions",
+    "regionid",
+    "gmsh:physical",
+    "cellentityids",
+    "medit:ref",
+    "physical",
+    "part",
+];
 
 impl Reader<'_> {
     /// `POINT_DATA` or `CELL_DATA`.
@@ -136,8 +152,8 @@ impl Reader<'_> {
                 self.groups.push(NodeGroup { name, nodes });
             }
             ArraysOf::Cells(_) if is_region_array && !number.is_integer() => {
-                let remark = format!("cell array '{name}' is ignored: its type is no integer");
-                self.remarks.push(remark);
+                let warning = format!("cell array '{name}' is ignored: its type is no integer");
+                self.warnings.push(warning);
             }
             ArraysOf::Cells(_) if is_region_array && self.labels.is_none() => {
                 self.labels = Some(values);
@@ -165,7 +181,7 @@ impl Reader<'_> {
     }
 }
 
-/// A name as written by VTK, with `%20` for a space.
+/// A name as VTK writes it, with `%20` for a space.
 fn decoded(name: &[u8]) -> String {
     let mut bytes = Vec::with_capacity(name.len());
     let mut rest = name;

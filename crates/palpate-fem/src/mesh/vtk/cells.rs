@@ -1,21 +1,8 @@
 //! Cells of a VTK legacy file: which points they have, and which of them are tetrahedra.
 
-use super::super::MeshError;
-use super::super::scan::{CURVED_REMARK, Number, OtherSolids};
-use super::Reader;
-
-/// The points of all cells, and where each cell's end among them.
-pub(super) struct Cells {
-    pub(super) ends: Vec<usize>,
-    points: Vec<u32>,
-}
-
-/// Tetrahedra, and which cell each of them is.
-#[derive(Default)]
-pub(super) struct Tets {
-    pub(super) corners: Vec<[u32; 4]>,
-    pub(super) cells: Vec<usize>,
-}
+use super::reader::{Cells, Reader, Tets};
+use crate::mesh::error::MeshError;
+use crate::mesh::scan::{CURVED_WARNING, Number, OtherSolids};
 
 impl Reader<'_> {
     pub(super) fn read_cells(&mut self) -> Result<(), MeshError> {
@@ -67,7 +54,7 @@ impl Reader<'_> {
         Ok(Cells { ends, points })
     }
 
-    /// Where each cell's points begin, then the points of all cells (5.1).
+    /// Start of each cell's points, then the points of all cells (5.1).
     fn read_offsets_and_connectivity(
         &mut self,
         rows: u64,
@@ -156,20 +143,20 @@ impl Reader<'_> {
                 (Shape::Solid(name), _) => other_solids.add(scan, name),
             }
         }
-        other_solids.none(scan)?;
+        other_solids.refuse(scan)?;
         if curved {
-            self.remarks.push(CURVED_REMARK.to_owned());
+            self.warnings.push(CURVED_WARNING.to_owned());
         }
         if flat_cells > 0 {
-            let remark = format!("cells of dimension 0 to 2 are ignored: {flat_cells}");
-            self.remarks.push(remark);
+            let warning = format!("cells of dimension 0 to 2 are ignored: {flat_cells}");
+            self.warnings.push(warning);
         }
         self.tets = Some(tets);
         Ok(())
     }
 }
 
-/// What matters of a cell's shape.
+/// Shape of a cell.
 #[derive(Clone, Copy)]
 enum Shape {
     /// A point, line or face.

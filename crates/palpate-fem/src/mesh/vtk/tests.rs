@@ -17,7 +17,7 @@ fn region(tag: i64) -> Region {
     Region { tag, name: None }
 }
 
-/// What all variants of the file say.
+/// Content of all variants of the file.
 fn expected() -> Mesh {
     Mesh {
         nodes: POSITIONS.map(DVec3::from).to_vec(),
@@ -28,7 +28,7 @@ fn expected() -> Mesh {
             NodeGroup { name: "left side".to_owned(), nodes: vec![0, 2] },
             NodeGroup { name: "top".to_owned(), nodes: vec![4] },
         ],
-        remarks: vec!["cells of dimension 0 to 2 are ignored: 1".to_owned()],
+        warnings: vec!["cells of dimension 0 to 2 are ignored: 1".to_owned()],
     }
 }
 
@@ -151,7 +151,7 @@ fn file(has_offsets: bool, is_text: bool) -> Vec<u8> {
 const SHORT: &str = "# vtk DataFile Version 2.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\n\
                      POINTS 4 float\n0 0 0 1 0 0\n0 1 0\n0 0 1\n\
                      CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
-/// The same in layout 5.1.
+/// The file in layout 5.1.
 const SHORT_OFFSETS: &str = "# vtk DataFile Version 5.1\n\nASCII\nDATASET UNSTRUCTURED_GRID\n\
                              POINTS 4 float\n0 0 0 1 0 0\n0 1 0\n0 0 1\n\
                              CELLS 2 4\nOFFSETS vtktypeint64\n0 4\n\
@@ -195,8 +195,8 @@ fn a_file_on_disk_is_read_and_a_missing_one_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.vtk");
     std::fs::write(&path, file(true, false)).unwrap();
-    assert_eq!(super::read(&path).unwrap(), expected());
-    let missing = super::read(&folder.path().join("no.vtk"));
+    assert_eq!(super::read_vtk(&path).unwrap(), expected());
+    let missing = super::read_vtk(&folder.path().join("no.vtk"));
     assert!(matches!(missing, Err(MeshError::Read { .. })));
 }
 
@@ -206,17 +206,17 @@ fn without_a_region_array_there_is_one_region() {
         let mesh = read(file).unwrap();
         assert_eq!(mesh.tets, [[0, 1, 2, 3]]);
         assert_eq!((mesh.regions, mesh.tet_regions), (vec![region(0)], vec![0]));
-        assert_eq!(mesh.remarks, Vec::<String>::new());
+        assert_eq!(mesh.warnings, Vec::<String>::new());
     }
 }
 
 #[test]
-fn region_arrays_with_fractions_are_remarked_and_the_first_other_is_taken() {
+fn region_arrays_with_fractions_are_reported_and_the_first_other_is_taken() {
     let arrays = "CELL_DATA 1\nFIELD f 3\nRegion 1 1 float\n2\npart 1 1 short\n5\nregion 1 1 int\n6\n";
     let mesh = read(format!("{SHORT}{arrays}")).unwrap();
     assert_eq!(mesh.regions, [region(5)]);
-    let remark = "cell array 'Region' is ignored: its type is no integer";
-    assert_eq!(mesh.remarks, [remark]);
+    let warning = "cell array 'Region' is ignored: its type is no integer";
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]
@@ -228,13 +228,13 @@ fn strings_in_text_are_skipped_and_in_binary_refused() {
 }
 
 #[test]
-fn quadratic_tetrahedra_give_their_corners_and_a_remark() {
+fn quadratic_tetrahedra_give_their_corners_and_a_warning() {
     let file = SHORT.replace("1 5\n4 0 1 2 3", "1 11\n10 3 2 1 0 0 0 0 0 0 0").replace("\n10\n", "\n24\n");
     let mesh = read(file).unwrap();
     assert_eq!(mesh.tets, [[3, 2, 1, 0]]);
-    let remark = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
+    let warning = "curved or quadratic tetrahedra: only the corner nodes are used, edges are taken \
                   straight";
-    assert_eq!(mesh.remarks, [remark]);
+    assert_eq!(mesh.warnings, [warning]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::error::VerifyError;
 use glam::DVec3;
 use palpate::Recording;
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
 use palpate_testkit::ElasticMaterial;
 use std::sync::Arc;
@@ -24,7 +24,10 @@ pub fn bodies() -> Result<Vec<(&'static str, Arc<Recording>)>, VerifyError> {
         ("bar", box_mesh([0.2, 0.02, 0.02], [16, 2, 2])?),
         ("U", hollow()?),
     ];
-    meshes.into_iter().map(|(name, mesh)| Ok((name, RUBBER.free_body(mesh, Order::Linear, MODES)?))).collect()
+    meshes
+        .into_iter()
+        .map(|(name, mesh)| Ok((name, RUBBER.free_body(mesh, ElementOrder::Linear, MODES)?)))
+        .collect()
 }
 
 /// A box of 5 × 5 × 2 cells without the middle of its upper four layers: a U that opens upwards.

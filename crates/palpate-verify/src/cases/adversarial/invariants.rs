@@ -12,6 +12,9 @@ const LOOSE: f64 = 1e-5;
 /// Force that an open contact may keep, as a share of the step's largest: what remains where many are solved loosely.
 const RESIDUAL_FORCE: f64 = 1e-3;
 
+/// Rounding of a force over its bound, as a share of it.
+const COUPLING: f64 = 1e-9;
+
 /// Share of steps that may be unsolved: devices without coupling that jump by the size of a body pose problems without solution.
 const UNSOLVED: f64 = 0.02;
 
@@ -299,7 +302,7 @@ impl Violations {
                 UNSOLVED,
             ),
             none("steps unsolved that don't say so", &self.unreported),
-            Check::new(format!("{of}: force over what its coupling gives"), self.ratio.value, 1.0, 1e-9),
+            Check::new(format!("{of}: force over what its coupling gives"), self.ratio.value, 1.0, COUPLING),
             none("proxies without force that do not go as their coupling", &self.left_behind),
             none(
                 &format!("of {} steps of devices that left, with force", self.steps_after_leaving),

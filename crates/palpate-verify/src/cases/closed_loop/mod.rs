@@ -12,10 +12,10 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use glam::DVec3;
 use palpate::{Recording, SurfacePoint};
-use palpate_fem::element::Order;
+use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
-use palpate_haptics::device::{Hand, Traits};
-use palpate_haptics::stability::{ClosedLoop, LoopTiming, PlaceResponse};
+use palpate_haptics::device::{DeviceSpec, Hand};
+use palpate_haptics::stability::{ClosedLoop, LoopTiming, PointResponse};
 use palpate_testkit::ElasticMaterial;
 use rayon::prelude::*;
 use simulation::{LoopRun, diverges, press_with_fingertip};
@@ -53,7 +53,7 @@ const ONSET: f64 = 0.1;
 const DEPTH: f64 = 0.01;
 
 /// Energy [J] that half a step of the encoder hides at the largest force: ½·Δx·k·depth = 5.5 µJ.
-const HIDDEN_J: f64 = 0.5 * Traits::TOUCH.resolution_m * HAND.stiffness_n_m * DEPTH;
+const HIDDEN_J: f64 = 0.5 * DeviceSpec::TOUCH.resolution_m * HAND.stiffness_n_m * DEPTH;
 
 /// Stiffness with which the controller is tried, over the stable bound.
 const BEYOND: f64 = 3.0;
@@ -78,8 +78,9 @@ fn standing_block(young: f64) -> Result<Arc<Recording>, VerifyError> {
         density_kg_m3: 1000.0,
         stiffness_damping_s: 2.0 * DAMPED / omega,
     };
-    Ok(material
-        .fixed_body(box_mesh(SIZE, [4, 2, 4])?, Order::Quadratic, 40, |node| node.y < -0.499 * SIZE[1])?)
+    Ok(material.fixed_body(box_mesh(SIZE, [4, 2, 4])?, ElementOrder::Quadratic, 40, |node| {
+        node.y < -0.499 * SIZE[1]
+    })?)
 }
 
 impl Cell {
@@ -88,16 +89,16 @@ impl Cell {
     }
 
     fn damping(&self) -> f64 {
-        DAMPING * Traits::TOUCH.mass_kg / self.timing().age_s()
+        DAMPING * DeviceSpec::TOUCH.mass_kg / self.timing().age_s()
     }
 
     /// Responses of the touched point along the axes, which are uncoupled in the middle of the face.
-    fn places(&self) -> [PlaceResponse; 3] {
-        DVec3::AXES.map(|axis| PlaceResponse::new(&self.body, &self.point, 0.0, axis))
+    fn places(&self) -> [PointResponse; 3] {
+        DVec3::AXES.map(|axis| PointResponse::new(&self.body, &self.point, 0.0, axis))
     }
 
     fn loops(&self) -> [ClosedLoop; 3] {
-        self.places().map(|place| ClosedLoop::new(&place, Traits::TOUCH, Some(HAND), self.timing()))
+        self.places().map(|place| ClosedLoop::new(&place, DeviceSpec::TOUCH, Some(HAND), self.timing()))
     }
 
     /// Stiffness [N/m] up to which all axes are stable, if it is below the stiffest coupling.
@@ -145,7 +146,7 @@ fn evaluate(cell: &Cell) -> Result<Found, VerifyError> {
     let onset = bound.map(|bound| onset(cell, bound)).transpose()?;
     let differ = disagreements(cell);
     let stiffness = bound.map_or(STIFFEST, |bound| BEYOND * bound);
-    let own = Traits::TOUCH.damping_n_s_m;
+    let own = DeviceSpec::TOUCH.damping_n_s_m;
     let free = press_with_fingertip(cell, stiffness, own, false)?;
     let controlled = [
         press_with_fingertip(cell, stiffness, own, true)?,

@@ -4,7 +4,7 @@ use super::{Cell, DEPTH, HAND};
 use crate::error::{VerifyError, numerics};
 use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp};
-use palpate_haptics::device::{Device, Mount, Reading, Simulated, Traits};
+use palpate_haptics::device::{Device, DeviceSpec, Mount, Reading, SimulatedDevice};
 use palpate_haptics::{
     Columns, DevicePort, Effort, ForcePort, ForceProcess, HapticUpdate, Motion, MotionPath,
     PassivityController, Safety, SafetyLimits, port,
@@ -35,7 +35,7 @@ impl DelayLine {
         while self.motions.front().is_some_and(|(due, _)| *due <= tick) {
             let Some((_, motion)) = self.motions.pop_front() else { break };
             if motion.sequence > 0 {
-                self.scene.tell(Motion { time_s: now_s, ..motion });
+                self.scene.send(Motion { time_s: now_s, ..motion });
             }
         }
     }
@@ -45,7 +45,7 @@ impl DelayLine {
         while self.efforts.front().is_some_and(|(due, _)| *due <= tick) {
             let Some((_, effort)) = self.efforts.pop_front() else { break };
             if effort.sequence > 0 {
-                self.device.answer(Effort { time_s: now_s, ..effort });
+                self.device.send(Effort { time_s: now_s, ..effort });
             }
         }
     }
@@ -53,25 +53,25 @@ impl DelayLine {
 
 /// A simulated device whose true position [m] and work on the hand [J] can be read from outside.
 struct ObservedDevice {
-    device: Simulated,
+    device: SimulatedDevice,
     truth: Arc<Mutex<(DVec3, f64)>>,
 }
 
 impl Device for ObservedDevice {
-    fn traits(&self) -> Traits {
-        self.device.traits()
+    fn spec(&self) -> DeviceSpec {
+        self.device.spec()
     }
 
     fn read(&mut self, now_s: f64) -> Result<Reading, palpate_haptics::Error> {
         let reading = self.device.read(now_s);
         if let Ok(mut truth) = self.truth.lock() {
-            *truth = (self.device.position(), self.device.given_j());
+            *truth = (self.device.position(), self.device.work_on_hand_j());
         }
         reading
     }
 
-    fn push(&mut self, force: DVec3, now_s: f64) -> Result<(), palpate_haptics::Error> {
-        self.device.push(force, now_s)
+    fn set_force(&mut self, force: DVec3, now_s: f64) -> Result<(), palpate_haptics::Error> {
+        self.device.set_force(force, now_s)
     }
 }
 
@@ -90,7 +90,7 @@ pub struct LoopRun {
 /// Parameters of a run.
 struct Setup {
     coupling: Coupling,
-    traits: Traits,
+    traits: DeviceSpec,
     mode: DeviceMode,
     path: String,
     limits: SafetyLimits,
@@ -121,7 +121,8 @@ fn run(cell: &Cell, setup: &Setup) -> Result<LoopRun, VerifyError> {
     let mut process = ForceProcess::new(model, vec![(scene_port, setup.mode)], Vec::new(), 1.0);
     let path = MotionPath::parse(&setup.path, Columns::Position).map_err(numerics)?;
     let truth = Arc::new(Mutex::new((DVec3::ZERO, 0.0)));
-    let device = ObservedDevice { device: Simulated::new(setup.traits, HAND, path), truth: truth.clone() };
+    let device =
+        ObservedDevice { device: SimulatedDevice::new(setup.traits, HAND, path), truth: truth.clone() };
     let controller = PassivityController::new(setup.traits.mass_kg, setup.traits.resolution_m, step_s);
     let controller = setup.controlled.then_some(controller);
     let safety = Safety::new(setup.limits);
@@ -156,10 +157,10 @@ const UNLIMITED: SafetyLimits = SafetyLimits {
     force_n: f64::MAX,
     slew_n_s: f64::MAX,
     speed_m_s: f64::MAX,
-    stale_s: 1.0,
+    watchdog_s: 1.0,
     ramp_up_s: 0.0,
     ramp_down_s: 0.02,
-    calm_s: 0.0,
+    recovery_s: 0.0,
 };
 
 /// Whether the oscillation grows of a hand that holds the point and is displaced a little.
@@ -170,7 +171,8 @@ pub fn diverges(cell: &Cell, stiffness: f64) -> Result<bool, VerifyError> {
         format!("{t},{},{},{}\n", p.x, p.y, p.z)
     };
     let path = row(0.0, DVec3::ZERO) + &row(0.02, DVec3::ZERO) + &row(0.03, DVec3::new(1.0, 0.8, 0.6));
-    let traits = Traits { friction_n: 0.0, resolution_m: 0.0, force_n: f64::INFINITY, ..Traits::TOUCH };
+    let traits =
+        DeviceSpec { friction_n: 0.0, resolution_m: 0.0, force_n: f64::INFINITY, ..DeviceSpec::TOUCH };
     let setup = Setup {
         coupling: Coupling { stiffness, damping: cell.damping() },
         traits,
@@ -196,7 +198,7 @@ pub fn press_with_fingertip(
     let path = format!("0,0,{},0\n0.3,0,{},0\n", top + 0.005, top - DEPTH);
     let setup = Setup {
         coupling: Coupling { stiffness, damping: cell.damping() },
-        traits: Traits { friction_n: 0.0, damping_n_s_m: device_damping, ..Traits::TOUCH },
+        traits: DeviceSpec { friction_n: 0.0, damping_n_s_m: device_damping, ..DeviceSpec::TOUCH },
         mode: DeviceMode::Touch,
         path,
         limits: SafetyLimits { ramp_up_s: 0.01, ..SafetyLimits::default() },

@@ -3,8 +3,8 @@
 use super::{Cell, HAND, STIFFEST};
 use faer::Mat;
 use palpate::{Coupling, OscillatorState, SampledOscillator};
-use palpate_haptics::device::Traits;
-use palpate_haptics::stability::{LoopTiming, PlaceResponse, SLOWEST_S};
+use palpate_haptics::device::DeviceSpec;
+use palpate_haptics::stability::{LoopTiming, PointResponse, SLOWEST_GROWTH_S};
 
 /// log₂ of the power N in |A^N|^(1/N), which is the spectral radius to 1e-8 with N = 2³⁰.
 const SQUARINGS: i32 = 30;
@@ -13,17 +13,17 @@ const SQUARINGS: i32 = 30;
 const SHARES: [f64; 4] = [0.5, 0.999, 1.001, 2.0];
 
 /// Largest |eigenvalue| of the loop along an axis. The state: modes, stretch of the coupling, delayed forces, device.
-fn spectral_radius(cell: &Cell, place: &PlaceResponse, coupling: Coupling) -> f64 {
+fn spectral_radius(cell: &Cell, place: &PointResponse, coupling: Coupling) -> f64 {
     let LoopTiming { step_s: h, delay_updates } = cell.timing();
     let swings: Vec<(SampledOscillator, f64)> = place
-        .swings()
+        .oscillators()
         .map(|[omega, zeta, gain]| (SampledOscillator::new(omega, zeta, h), gain.sqrt()))
         .collect();
-    let mass = Traits::TOUCH.mass_kg + HAND.mass_kg;
+    let mass = DeviceSpec::TOUCH.mass_kg + HAND.mass_kg;
     let omega = (HAND.stiffness_n_m / mass).sqrt();
-    let zeta = 0.5 * (HAND.damping_n_s_m + Traits::TOUCH.damping_n_s_m) / (mass * omega);
+    let zeta = 0.5 * (HAND.damping_n_s_m + DeviceSpec::TOUCH.damping_n_s_m) / (mass * omega);
     let device = SampledOscillator::new(omega, zeta, h);
-    let (rate, within) = (coupling.damping / h, place.within_step(h));
+    let (rate, within) = (coupling.damping / h, place.instantaneous_compliance(h));
     let sum = coupling.stiffness + rate;
     let (m, d) = (swings.len(), delay_updates as usize);
     let n = 2 * m + 1 + d + 2;
@@ -75,7 +75,8 @@ pub fn disagreements(cell: &Cell) -> u32 {
         };
         for share in SHARES {
             let coupling = Coupling { stiffness: share * most, damping: cell.damping() };
-            let stable = spectral_radius(cell, place, coupling) < 1.0 + cell.timing().step_s / SLOWEST_S;
+            let stable =
+                spectral_radius(cell, place, coupling) < 1.0 + cell.timing().step_s / SLOWEST_GROWTH_S;
             differ += u32::from(stable != closed.is_stable(coupling));
         }
     }

@@ -1,0 +1,74 @@
+//! Errors of a recording.
+
+use crate::material::MaterialError;
+use crate::mesh::MeshError;
+#[cfg(doc)]
+use crate::progress::Progress;
+use crate::solve_error::SolveError;
+
+/// A recording that cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// The mesh is not one sound body.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A material is out of range.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// The body cannot be factored, or its modes cannot be found.
+    #[error(transparent)]
+    Solve(SolveError),
+    /// The reference of the certificate cannot be computed.
+    #[error("certificate: {0}")]
+    Certificate(SolveError),
+    /// The number of materials is not that of the mesh's regions.
+    #[error("{materials} materials for {regions} regions")]
+    MaterialCount {
+        /// Number of materials.
+        materials: usize,
+        /// Number of regions.
+        regions: usize,
+    },
+    /// No mode is requested.
+    #[error("0 modes are requested, expected 1 or more")]
+    NoModes,
+    /// The radius of the near field is not a positive number.
+    #[error("residual radius is {radius} m, expected a positive number")]
+    ResidualRadius {
+        /// The given radius [m].
+        radius: f64,
+    },
+    /// A coefficient of Rayleigh damping is negative or not finite.
+    #[error("Rayleigh damping is {alpha} 1/s, {beta} s, expected two numbers that are not negative")]
+    RayleighDamping {
+        /// Coefficient of the mass matrix [1/s].
+        alpha: f64,
+        /// Coefficient of the stiffness matrix [s].
+        beta: f64,
+    },
+    /// The damping ratio is negative or not finite.
+    #[error("damping ratio is {ratio}, expected a number that is not negative")]
+    DampingRatio {
+        /// The given ratio.
+        ratio: f64,
+    },
+    /// The nodes to fix belong to no tetrahedron.
+    #[error("the nodes to fix belong to no tetrahedron")]
+    FixedNodesUnused,
+    /// All nodes are fixed.
+    #[error("all nodes are fixed: nothing can move")]
+    AllNodesFixed,
+    /// The listener interrupted the work, see [`Progress::is_interrupted`].
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl From<SolveError> for RecordError {
+    fn from(error: SolveError) -> Self {
+        match error {
+            SolveError::Interrupted => Self::Interrupted,
+            error => Self::Solve(error),
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Channels between the manager, the running scene and the page sessions.
+
+use super::command::Command;
+use super::current::CurrentScene;
+use super::frames::FramePublisher;
+use super::job::JobSlot;
+use crate::pointers::SharedPointers;
+use palpate_haptics::Playback;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use tokio::sync::{broadcast, watch};
+
+/// Manager's ends of the channels.
+pub(super) struct SceneChannels {
+    pub current: watch::Sender<Arc<CurrentScene>>,
+    pub frames: FramePublisher,
+    /// JSON messages to all pages.
+    pub events: broadcast::Sender<Arc<str>>,
+    pub commands: Sender<Command>,
+    pub pointers: SharedPointers,
+    pub playback: Arc<Playback>,
+    pub job_slot: Arc<JobSlot>,
+}

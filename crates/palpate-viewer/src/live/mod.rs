@@ -1,0 +1,114 @@
+//! Live scene: a manager thread owns the running session, one thread moves the pointers, jobs run on threads of their own.
+
+mod channels;
+mod command;
+mod current;
+mod frames;
+mod job;
+mod manager;
+mod running;
+
+pub(crate) use command::Command;
+pub(crate) use current::CurrentScene;
+pub(crate) use frames::Viewers;
+
+use crate::pointers::SharedPointers;
+use crate::scene_provider::{SceneProvider, ViewerScene};
+use axum::body::Bytes;
+use channels::SceneChannels;
+use frames::FramePublisher;
+use job::JobSlot;
+use manager::Manager;
+use palpate_haptics::{Playback, Scheduling};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle};
+use tokio::sync::{broadcast, watch};
+
+/// Capacity of the event queue of each page [messages].
+const EVENT_CAPACITY: usize = 256;
+
+/// Handle of a live scene, shared by the page sessions.
+pub(crate) struct LiveScene {
+    pub current: watch::Receiver<Arc<CurrentScene>>,
+    /// Newest modal frame.
+    pub modal: watch::Receiver<Bytes>,
+    /// Newest vertex frame.
+    pub vertices: watch::Receiver<Bytes>,
+    /// JSON messages to all pages.
+    pub events: broadcast::Sender<Arc<str>>,
+    pub commands: Sender<Command>,
+    pub pointers: SharedPointers,
+    pub playback: Arc<Playback>,
+    pub viewers: Arc<Viewers>,
+    job_slot: Arc<JobSlot>,
+    manager: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl LiveScene {
+    /// Starts a scene and its manager thread.
+    ///
+    /// # Errors
+    /// If the thread cannot be started.
+    pub fn start(
+        provider: Arc<dyn SceneProvider>,
+        first: ViewerScene,
+        scheduling: Scheduling,
+    ) -> std::io::Result<Self> {
+        let (commands, received) = channel();
+        let (modal_sender, modal) = watch::channel(Bytes::new());
+        let (vertices_sender, vertices) = watch::channel(Bytes::new());
+        let (events, _) = broadcast::channel(EVENT_CAPACITY);
+        let (current_sender, current) = watch::channel(Arc::new(CurrentScene::new(0, first.clone())));
+        let viewers = Arc::new(Viewers::default());
+        let pointers: SharedPointers = Arc::default();
+        let playback: Arc<Playback> = Arc::default();
+        let job_slot: Arc<JobSlot> = Arc::default();
+        let channels = SceneChannels {
+            current: current_sender,
+            frames: FramePublisher::new(modal_sender, vertices_sender, viewers.clone()),
+            events: events.clone(),
+            commands: commands.clone(),
+            pointers: pointers.clone(),
+            playback: playback.clone(),
+            job_slot: job_slot.clone(),
+        };
+        let mut manager = Manager::new(provider, scheduling, channels);
+        // Before the first page connects, so that it gets this scene.
+        manager.start_scene(first, None);
+        let manager = Builder::new().name("palpate scene".into()).spawn(move || manager.run(&received))?;
+        let manager = Mutex::new(Some(manager));
+        Ok(Self {
+            current,
+            modal,
+            vertices,
+            events,
+            commands,
+            pointers,
+            playback,
+            viewers,
+            job_slot,
+            manager,
+        })
+    }
+
+    /// Claims the single job slot; returns false if a job is running.
+    pub fn claim_job(&self) -> bool {
+        self.job_slot.claim()
+    }
+
+    /// Stops the scene and waits until its log is complete.
+    pub fn end(&self) {
+        let _ = self.commands.send(Command::End);
+        let manager = self.manager.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(manager) = manager {
+            let _ = manager.join();
+        }
+    }
+}
+
+impl Drop for LiveScene {
+    fn drop(&mut self) {
+        self.end();
+    }
+}

@@ -1,0 +1,184 @@
+//! Running session of a live scene, with its pointer thread.
+
+use super::channels::SceneChannels;
+use crate::error::SceneError;
+use crate::pointers::{Pointers, SharedPointers, lock};
+use crate::protocol::{FrameEncoder, ProcessTiming, ServerMessage, Status};
+use crate::scene_provider::{OpenLog, SharedTrajectory, ViewerDevice, ViewerScene};
+use palpate::{DeviceInput, DeviceMode, Input, ObjectSnapshot, State};
+use palpate_haptics::{
+    Clock, CycleReceiver, DevicePort, ObstacleTrajectory, Playback, Report, Scheduling, Session,
+    SessionDevice, Snapshot, Timing, cycle_channel, port,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
+
+/// Frame rate [Hz].
+const FRAME_RATE_HZ: f64 = 60.0;
+
+/// Update rate of the pointers [Hz].
+const POINTER_RATE_HZ: f64 = 1000.0;
+
+/// Time without an input after which a device becomes inactive [s].
+const DEVICE_TIMEOUT_S: f64 = 0.1;
+
+/// Capacity of the channel of cycle records: some seconds at 4 kHz.
+const CYCLES: usize = 16_384;
+
+/// Whether a scene may resume from another state: no device follows a path, and no obstacle moves.
+pub(super) fn is_resumable(scene: &ViewerScene) -> bool {
+    let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Path(..));
+    let moves = |pose: &SharedTrajectory| pose(0.0) != pose(1.0) || pose(0.0) != pose(0.37);
+    !scene.devices.iter().any(follows_path) && !scene.obstacle_trajectories.iter().any(moves)
+}
+
+/// Snapshot before the first step.
+pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
+    let input = Input {
+        devices: vec![DeviceInput::inactive(); scene.devices.len()],
+        obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
+    };
+    Snapshot::new(&scene.model, state, &input)
+}
+
+/// Opened devices of a scene.
+pub(super) struct DeviceInputs {
+    devices: Vec<SessionDevice>,
+    /// Ports of the pointers, by device index.
+    pointer_ports: Vec<(usize, DevicePort)>,
+}
+
+impl DeviceInputs {
+    /// Opens the devices of a scene.
+    pub fn open(scene: &ViewerScene) -> Result<Self, SceneError> {
+        let mut pointer_ports = Vec::new();
+        let open = |(index, device): (usize, &ViewerDevice)| match device {
+            ViewerDevice::Pointer => {
+                let (device_port, force_port) = port();
+                pointer_ports.push((index, device_port));
+                Ok(SessionDevice::Remote(force_port, DeviceMode::Touch))
+            }
+            ViewerDevice::Path(path, mode) => Ok(SessionDevice::Path(path.clone(), *mode)),
+            ViewerDevice::Local(open) => open().map(SessionDevice::Local),
+        };
+        let devices = scene.devices.iter().enumerate().map(open).collect::<Result<_, SceneError>>()?;
+        Ok(Self { devices, pointer_ports })
+    }
+}
+
+/// Session and pointer thread of a scene.
+pub(super) struct RunningScene {
+    stop: Arc<AtomicBool>,
+    steps: Arc<AtomicU64>,
+    session: JoinHandle<Option<Vec<ObjectSnapshot>>>,
+    pointer_thread: JoinHandle<()>,
+    timing: Timing,
+    cycle_receiver: CycleReceiver,
+}
+
+impl RunningScene {
+    /// Starts the threads of a scene.
+    pub fn start(
+        scene: &ViewerScene,
+        state: State,
+        inputs: DeviceInputs,
+        log: Option<OpenLog>,
+        mut encoder: FrameEncoder,
+        scheduling: Scheduling,
+        channels: &SceneChannels,
+    ) -> Result<Self, SceneError> {
+        let movers = scene.obstacle_trajectories.iter().map(|pose| {
+            let pose = pose.clone();
+            Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
+        });
+        let (cycle_sender, cycle_receiver) = cycle_channel(CYCLES);
+        let start = Instant::now();
+        let session = Session {
+            model: scene.model.clone(),
+            state: Some(state),
+            start,
+            devices: inputs.devices,
+            obstacle_trajectories: movers.collect(),
+            steps: None,
+            frame_rate_hz: FRAME_RATE_HZ,
+            scheduling,
+            device_timeout_s: DEVICE_TIMEOUT_S,
+            playback: channels.playback.clone(),
+            cycles: Some(cycle_sender),
+        };
+        *lock(&channels.pointers) = Pointers::new(inputs.pointer_ports);
+        let stop = Arc::new(AtomicBool::new(false));
+        let steps = Arc::new(AtomicU64::new(0));
+        let pointer_thread = {
+            let (stop, pointers) = (stop.clone(), channels.pointers.clone());
+            let clock = Clock::new(start, 1.0 / POINTER_RATE_HZ).without_spinning();
+            let advance = move || advance_pointers(&stop, &pointers, &clock);
+            Builder::new().name("palpate pointers".into()).spawn(advance).map_err(SceneError::Thread)?
+        };
+        let (frames, events) = (channels.frames.clone(), channels.events.clone());
+        let (stop_session, step_count) = (stop.clone(), steps.clone());
+        let run = move || {
+            let publish = |snapshot: &Snapshot| frames.publish(&mut encoder, snapshot);
+            match session.run(log, &stop_session, &step_count, publish) {
+                Ok((Report { state, log, .. }, file)) => {
+                    // The log file itself reports failed writes.
+                    if let (Some(Ok(file)), Some(summary)) = (file, log) {
+                        file.finish(summary);
+                    }
+                    Some(state.snapshots())
+                }
+                Err(error) => {
+                    let text = error.to_string();
+                    let _ = events.send(ServerMessage::Error { text: &text }.to_json().into());
+                    None
+                }
+            }
+        };
+        let session = Builder::new().name("palpate session".into()).spawn(run).map_err(SceneError::Thread)?;
+        Ok(Self { stop, steps, session, pointer_thread, timing: Timing::default(), cycle_receiver })
+    }
+
+    /// Stops the threads; returns the final object snapshots, if the session ended without error.
+    pub fn stop(self) -> Option<Vec<ObjectSnapshot>> {
+        self.stop.store(true, Ordering::Release);
+        let objects = self.session.join().ok().flatten();
+        let _ = self.pointer_thread.join();
+        objects
+    }
+
+    /// Status with the timing so far.
+    pub fn status(&mut self, generation: u32, viewers: usize, playback: &Playback) -> Status {
+        let Self { steps, timing, cycle_receiver, .. } = self;
+        cycle_receiver.drain_into(timing);
+        let granted = cycle_receiver.granted();
+        Status {
+            generation,
+            paused: playback.is_paused(),
+            slowdown: playback.slowdown(),
+            steps: steps.load(Ordering::Relaxed),
+            viewers,
+            force_process: ProcessTiming {
+                compute_us: timing.compute_us().into(),
+                lateness_us: timing.lateness_us().into(),
+                overruns: timing.overruns,
+                compute_overruns: timing.own_overruns,
+                realtime_priority: granted.is_some_and(|granted| matches!(granted.priority, Ok(Some(_)))),
+            },
+        }
+    }
+}
+
+/// Advances the pointers at [`POINTER_RATE_HZ`] until `stop` is set.
+fn advance_pointers(stop: &AtomicBool, pointers: &SharedPointers, clock: &Clock) {
+    let mut tick = clock.next_after(0);
+    let mut last = clock.now_s();
+    while !stop.load(Ordering::Relaxed) {
+        clock.wait(tick);
+        let now = clock.now_s();
+        lock(pointers).advance(now - last, now);
+        last = now;
+        tick = clock.next_after(tick);
+    }
+}

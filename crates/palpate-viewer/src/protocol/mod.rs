@@ -1,0 +1,18 @@
+//! Protocol with the page: JSON messages and binary frames (docs/viewer-protocol.md).
+
+mod bytes;
+mod description;
+mod frame;
+mod messages;
+mod surface;
+
+pub use description::{
+    CouplingDescription, DeviceDescription, FrameTimes, MaterialDescription, ObjectDescription,
+    ObstacleDescription, SceneDescription, ShapeDescription, View,
+};
+pub use frame::{FrameEncoder, FrameFormat};
+pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary};
+pub(crate) use messages::{
+    ClientMessage, Hello, LogEntry, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status,
+};
+pub(crate) use surface::{mode_shapes_bytes, surface_bytes};

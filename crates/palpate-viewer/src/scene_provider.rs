@@ -1,0 +1,109 @@
+//! Scenes that the server runs, and the interface that makes them.
+
+use crate::error::SceneError;
+use crate::protocol::{MaterialDescription, PhysicsSettings, SceneDescription, SceneSummary};
+use palpate::{DeviceMode, Model, Pose, State};
+use palpate_haptics::log::{LogSender, LogSummary, LogWriter};
+use palpate_haptics::{AttachedDevice, MotionPath};
+use std::io::{Seek, Write};
+use std::sync::Arc;
+
+/// Pose of an obstacle as a function of simulation time [s]. Must not allocate.
+pub type SharedTrajectory = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
+
+/// Opens a device; called at each start of the scene.
+pub type DeviceOpener = Arc<dyn Fn() -> Result<AttachedDevice, SceneError> + Send + Sync>;
+
+/// Target of a log. Dropped before `finish`, it leaves no log.
+pub trait LogFile: Write + Seek + Send {
+    /// Keeps the log, which is complete.
+    fn finish(self: Box<Self>, summary: LogSummary);
+}
+
+/// Sends an error text to all pages.
+pub type PageNotifier = Arc<dyn Fn(&str) + Send + Sync>;
+
+/// Sender and writer of an open log.
+pub type OpenLog = (LogSender, LogWriter<Box<dyn LogFile>>);
+
+/// Opens a log that begins with a state; called at each start of the scene. The notifier reports later errors.
+pub type LogOpener = Arc<dyn Fn(&State, PageNotifier) -> Result<OpenLog, SceneError> + Send + Sync>;
+
+/// Scene that can be started repeatedly.
+#[derive(Clone)]
+pub struct ViewerScene {
+    /// Description for the page.
+    pub description: SceneDescription,
+    /// Model.
+    pub model: Arc<Model>,
+    /// Input source per device of the model.
+    pub devices: Vec<ViewerDevice>,
+    /// Trajectory per obstacle of the model.
+    pub obstacle_trajectories: Vec<SharedTrajectory>,
+    /// Log opener, if the scene is logged.
+    pub log: Option<LogOpener>,
+}
+
+/// Input source of a device.
+#[derive(Clone)]
+pub enum ViewerDevice {
+    /// Pointer of a page, inactive until one claims it.
+    Pointer,
+    /// Path in simulation time.
+    Path(MotionPath, DeviceMode),
+    /// Device on this machine.
+    Local(DeviceOpener),
+}
+
+/// Mesh file uploaded by a page.
+#[derive(Debug, Clone)]
+pub struct Upload {
+    /// File name.
+    pub name: String,
+    /// File content.
+    pub bytes: Vec<u8>,
+    /// Length unit of the file [m].
+    pub scale: f64,
+    /// Material of the whole mesh.
+    pub material: MaterialDescription,
+    /// Number of modes to record.
+    pub modes: usize,
+}
+
+/// Progress of a job: its phase, and the completed fraction of the phase, if known.
+pub type ProgressCallback<'a> = &'a mut (dyn FnMut(&str, Option<f64>) + Send);
+
+/// Makes the scenes of the server. Pages show the errors as text.
+pub trait SceneProvider: Send + Sync + 'static {
+    /// Scenes that [`SceneProvider::open`] accepts.
+    fn scenes(&self) -> Vec<SceneSummary>;
+
+    /// Scene of an id.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be made.
+    fn open(&self, id: &str, progress: ProgressCallback) -> Result<ViewerScene, SceneError>;
+
+    /// Most recent scene with changed physics settings.
+    ///
+    /// # Errors
+    /// If a value is out of range.
+    fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, SceneError>;
+
+    /// Most recent scene with another material of one object.
+    ///
+    /// # Errors
+    /// If the object cannot be recorded.
+    fn change_material(
+        &self,
+        object: usize,
+        material: MaterialDescription,
+        progress: ProgressCallback,
+    ) -> Result<ViewerScene, SceneError>;
+
+    /// Scene of an uploaded mesh.
+    ///
+    /// # Errors
+    /// If the file is not a mesh, or cannot be recorded.
+    fn record(&self, upload: Upload, progress: ProgressCallback) -> Result<ViewerScene, SceneError>;
+}

@@ -1,0 +1,138 @@
+//! HTTP routes.
+
+use super::page;
+use super::session;
+use super::state::{ServerState, StaticDataKey};
+use super::upload;
+use crate::protocol::{mode_shapes_bytes, surface_bytes};
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::{StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use palpate::Shape;
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// Size limit of a response with frames of a log [bytes].
+const MAX_FRAMES_BYTES: usize = 8 << 20;
+
+/// Router of all addresses.
+pub(super) fn routes(state: Arc<ServerState>) -> Router {
+    Router::new()
+        .route("/session", get(session::connect))
+        .route("/scene/{generation}/object/{index}/surface", get(object_surface))
+        .route("/scene/{generation}/object/{index}/mode_shapes", get(object_mode_shapes))
+        .route("/scene/{generation}/obstacle/{index}/surface", get(obstacle_surface))
+        .route("/log/{log}/frames", get(log_frames))
+        .route("/log/{log}/series", get(log_series))
+        .route("/record", post(upload::record))
+        .route("/image/{index}", post(image))
+        .fallback(get(page::file))
+        .layer(DefaultBodyLimit::max(upload::MAX_BODY_BYTES))
+        .layer(from_fn_with_state(state.clone(), check_access))
+        .with_state(state)
+}
+
+async fn check_access(State(state): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
+    match state.guard.rejection(&request) {
+        Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
+        None => next.run(request).await,
+    }
+}
+
+fn not_found() -> Response {
+    (StatusCode::NOT_FOUND, "there is nothing here").into_response()
+}
+
+/// Runs blocking work outside of the async threads.
+async fn blocking(work: impl FnOnce() -> Response + Send + 'static) -> Response {
+    let failed = |_| StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    tokio::task::spawn_blocking(work).await.unwrap_or_else(failed)
+}
+
+/// Response with static data of a generation, from the cache.
+async fn static_data(
+    state: Arc<ServerState>,
+    key: StaticDataKey,
+    encode: impl FnOnce() -> Option<Vec<u8>> + Send + 'static,
+) -> Response {
+    blocking(move || {
+        let headers = [
+            (header::CONTENT_TYPE, "application/octet-stream"),
+            (header::CACHE_CONTROL, "private, max-age=3600, immutable"),
+        ];
+        state.cache.get(key, encode).map_or_else(not_found, |bytes| (headers, bytes).into_response())
+    })
+    .await
+}
+
+async fn object_surface(
+    State(state): State<Arc<ServerState>>,
+    Path((generation, index)): Path<(u32, usize)>,
+) -> Response {
+    let Some(model) = state.model(generation) else { return not_found() };
+    let encode = move || {
+        let surface = &model.recordings().nth(index)?.surface;
+        Some(surface_bytes(&surface.positions, &surface.triangles))
+    };
+    static_data(state, (generation, "surface", index), encode).await
+}
+
+async fn object_mode_shapes(
+    State(state): State<Arc<ServerState>>,
+    Path((generation, index)): Path<(u32, usize)>,
+) -> Response {
+    let Some(model) = state.model(generation) else { return not_found() };
+    let encode = move || {
+        let recording = model.recordings().nth(index)?;
+        Some(mode_shapes_bytes(&recording.modes, recording.surface.positions.len()))
+    };
+    static_data(state, (generation, "mode_shapes", index), encode).await
+}
+
+async fn obstacle_surface(
+    State(state): State<Arc<ServerState>>,
+    Path((generation, index)): Path<(u32, usize)>,
+) -> Response {
+    let Some(model) = state.model(generation) else { return not_found() };
+    let encode = move || match &model.parameters().obstacles.get(index)?.shape {
+        Shape::Mesh(mesh) => Some(surface_bytes(&mesh.surface().positions, &mesh.surface().triangles)),
+        _ => None,
+    };
+    static_data(state, (generation, "obstacle", index), encode).await
+}
+
+#[derive(Deserialize)]
+struct FrameRange {
+    from: usize,
+    count: usize,
+}
+
+async fn log_frames(
+    State(state): State<Arc<ServerState>>,
+    Path(log): Path<usize>,
+    Query(FrameRange { from, count }): Query<FrameRange>,
+) -> Response {
+    let Some(log) = state.logs.get(log).cloned() else { return not_found() };
+    blocking(move || {
+        let headers = [(header::CONTENT_TYPE, "application/octet-stream")];
+        (headers, log.frames(from, count, MAX_FRAMES_BYTES)).into_response()
+    })
+    .await
+}
+
+async fn log_series(State(state): State<Arc<ServerState>>, Path(log): Path<usize>) -> Response {
+    let Some(log) = state.logs.get(log).cloned() else { return not_found() };
+    blocking(move || Json(log.series()).into_response()).await
+}
+
+async fn image(State(state): State<Arc<ServerState>>, Path(index): Path<u64>, body: Bytes) -> Response {
+    let Some(job) = &state.render else { return not_found() };
+    match job.images.send((index, body.to_vec())) {
+        Ok(()) => StatusCode::NO_CONTENT.into_response(),
+        Err(_) => StatusCode::GONE.into_response(),
+    }
+}

@@ -1,0 +1,336 @@
+//! WebSocket session of one page.
+
+use super::state::ServerState;
+use crate::live::{Command, LiveScene};
+use crate::pointers::{PointerId, lock};
+use crate::protocol::{
+    ClientMessage, FrameFormat, Hello, LogEntry, MaterialDescription, PROTOCOL, PressMode, ServerMessage,
+};
+use axum::body::Bytes;
+use axum::extract::State;
+use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
+use axum::response::Response;
+use glam::DVec3;
+use palpate::{DeviceMode, Grasp, SurfacePoint};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use tokio::sync::broadcast::error::RecvError;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+/// Size limit of a message from a page [bytes].
+const MAX_MESSAGE_BYTES: usize = 64 << 10;
+
+/// Rate limit of messages from a page [1/s].
+const MESSAGES_PER_S: f64 = 300.0;
+
+/// Burst limit of messages from a page.
+const MAX_MESSAGE_BURST: f64 = 600.0;
+
+/// Maximum number of pages.
+const MAX_VIEWERS: usize = 32;
+
+/// Time after which a page that does not receive is disconnected.
+const SEND_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Interval of progress messages of logs.
+const LOG_PROGRESS_INTERVAL: Duration = Duration::from_millis(300);
+
+/// Largest distance of a pointer from the origin [m].
+const MAX_POINTER_DISTANCE_M: f64 = 1e4;
+
+/// Handler of `/session`.
+pub(super) async fn connect(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
+    upgrade
+        .max_message_size(MAX_MESSAGE_BYTES)
+        .max_frame_size(MAX_MESSAGE_BYTES)
+        .on_upgrade(move |socket| async move { PageSession::new(&state, socket).serve().await })
+}
+
+/// End of a session.
+struct SessionEnd;
+
+/// Session of one page.
+struct PageSession<'s> {
+    state: &'s ServerState,
+    socket: WebSocket,
+    viewer: u64,
+    /// Number of messages that the page may send now (token bucket).
+    allowance: f64,
+    allowance_updated: Instant,
+    format: FrameFormat,
+    /// Every n-th frame is sent; 0: none.
+    stride: u32,
+    frames: u32,
+}
+
+impl<'s> PageSession<'s> {
+    fn new(state: &'s ServerState, socket: WebSocket) -> Self {
+        Self {
+            state,
+            socket,
+            viewer: state.next_viewer.fetch_add(1, Ordering::Relaxed),
+            allowance: MAX_MESSAGE_BURST,
+            allowance_updated: Instant::now(),
+            format: FrameFormat::Modal,
+            stride: 1,
+            frames: 0,
+        }
+    }
+
+    async fn serve(mut self) {
+        let hello = Hello {
+            protocol: PROTOCOL,
+            version: env!("CARGO_PKG_VERSION"),
+            kind: match (&self.state.live, &self.state.render) {
+                (Some(_), _) => "live",
+                (None, Some(_)) => "render",
+                (None, None) => "logs",
+            },
+            scenes: self.state.scenes.clone(),
+            logs: self.state.logs.iter().map(|log| LogEntry { name: log.name.clone() }).collect(),
+            render: self.state.render.as_ref().map(|job| job.request.clone()),
+        };
+        let hello = serde_json::to_string(&hello).unwrap_or_default();
+        if self.send(Message::text(hello)).await.is_err() {
+            return;
+        }
+        match &self.state.live {
+            Some(live) => {
+                let before = live.viewers.all.fetch_add(1, Ordering::Relaxed);
+                if before < MAX_VIEWERS {
+                    let _ = self.serve_live(live).await;
+                } else {
+                    self.close(close_code::AGAIN, "too many pages show this scene already").await;
+                }
+                self.count_vertex_stream(live, false);
+                live.viewers.all.fetch_sub(1, Ordering::Relaxed);
+                lock(&live.pointers).release_viewer(self.viewer);
+            }
+            None => {
+                let _ = self.serve_logs().await;
+            }
+        }
+    }
+
+    async fn serve_live(&mut self, live: &LiveScene) -> Result<(), SessionEnd> {
+        let mut events = live.events.subscribe();
+        let (mut modal, mut vertices) = (live.modal.clone(), live.vertices.clone());
+        let scene = live.current.borrow().message.clone();
+        self.send(Message::text(&*scene)).await?;
+        let first = modal.borrow_and_update().clone();
+        self.send(Message::Binary(first)).await?;
+        let _ = live.commands.send(Command::SendStatus);
+        loop {
+            tokio::select! {
+                biased;
+                received = self.socket.recv() => match received {
+                    Some(Ok(Message::Text(text))) => self.receive(live, &text).await?,
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(SessionEnd),
+                    Some(Ok(_)) => self.count_message().await?,
+                },
+                event = events.recv() => match event {
+                    Ok(text) => self.send(Message::text(&*text)).await?,
+                    // Some messages were skipped, perhaps the scene message.
+                    Err(RecvError::Lagged(_)) => {
+                        let scene = live.current.borrow().message.clone();
+                        self.send(Message::text(&*scene)).await?;
+                    }
+                    Err(RecvError::Closed) => return Err(SessionEnd),
+                },
+                changed = modal.changed(), if self.format == FrameFormat::Modal && self.stride > 0 => {
+                    changed.map_err(|_| SessionEnd)?;
+                    let frame = modal.borrow_and_update().clone();
+                    self.send_frame(frame).await?;
+                }
+                changed = vertices.changed(), if self.format == FrameFormat::Vertices && self.stride > 0 => {
+                    changed.map_err(|_| SessionEnd)?;
+                    let frame = vertices.borrow_and_update().clone();
+                    self.send_frame(frame).await?;
+                }
+            }
+        }
+    }
+
+    /// Sends progress until the page disconnects; it fetches the frames by HTTP.
+    async fn serve_logs(&mut self) -> Result<(), SessionEnd> {
+        for log in &self.state.logs {
+            self.send(Message::text(log.scene_message())).await?;
+        }
+        let mut ticks = interval(LOG_PROGRESS_INTERVAL);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut finished = vec![false; self.state.logs.len()];
+        loop {
+            tokio::select! {
+                received = self.socket.recv() => match received {
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(SessionEnd),
+                    Some(Ok(_)) => self.count_message().await?,
+                },
+                _ = ticks.tick() => {
+                    for (log, finished) in self.state.logs.iter().zip(&mut finished).filter(|(_, finished)| !**finished) {
+                        let (text, done) = log.progress();
+                        *finished = done;
+                        self.send(Message::text(text)).await?;
+                    }
+                }
+            }
+        }
+    }
+
+    async fn send_frame(&mut self, frame: Bytes) -> Result<(), SessionEnd> {
+        self.frames = self.frames.wrapping_add(1);
+        if self.frames.is_multiple_of(self.stride.max(1)) {
+            self.send(Message::Binary(frame)).await?;
+        }
+        Ok(())
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), SessionEnd> {
+        match timeout(SEND_TIMEOUT, self.socket.send(message)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_)) | Err(_) => Err(SessionEnd),
+        }
+    }
+
+    async fn send_message(&mut self, message: ServerMessage<'_>) -> Result<(), SessionEnd> {
+        self.send(Message::text(message.to_json())).await
+    }
+
+    async fn close(&mut self, code: u16, reason: &'static str) {
+        let _ = self.send(Message::Close(Some(CloseFrame { code, reason: reason.into() }))).await;
+    }
+
+    /// Counts a message; a page that exceeds the rate limit is disconnected.
+    async fn count_message(&mut self) -> Result<(), SessionEnd> {
+        let now = Instant::now();
+        let earned = now.duration_since(self.allowance_updated).as_secs_f64() * MESSAGES_PER_S;
+        (self.allowance, self.allowance_updated) =
+            ((self.allowance + earned).min(MAX_MESSAGE_BURST) - 1.0, now);
+        if self.allowance < 0.0 {
+            self.close(close_code::POLICY, "too many messages").await;
+            return Err(SessionEnd);
+        }
+        Ok(())
+    }
+
+    async fn receive(&mut self, live: &LiveScene, text: &str) -> Result<(), SessionEnd> {
+        self.count_message().await?;
+        match serde_json::from_str(text) {
+            Ok(message) => self.execute(live, message).await,
+            Err(error) => {
+                let text = format!("the server cannot read a message of the page: {error}");
+                self.send_message(ServerMessage::Error { text: &text }).await
+            }
+        }
+    }
+
+    async fn execute(&mut self, live: &LiveScene, message: ClientMessage) -> Result<(), SessionEnd> {
+        let command = match message {
+            ClientMessage::Press { pointer, mode, position, object, triangle, weights } => {
+                return self.press(live, pointer, mode, position, (object, triangle, weights)).await;
+            }
+            ClientMessage::Move { pointers } => {
+                let mut slots = lock(&live.pointers);
+                for target in pointers {
+                    if let Some(position) = valid_position(target.position) {
+                        slots.set_target((self.viewer, target.pointer), position);
+                    }
+                }
+                return Ok(());
+            }
+            ClientMessage::Release { pointer } => {
+                lock(&live.pointers).release((self.viewer, pointer));
+                return Ok(());
+            }
+            ClientMessage::Stream { format, stride } => {
+                self.count_vertex_stream(live, format == FrameFormat::Vertices && stride > 0);
+                (self.format, self.stride) = (format, stride);
+                return Ok(());
+            }
+            ClientMessage::Pause { paused } => {
+                live.playback.set_paused(paused);
+                Command::SendStatus
+            }
+            ClientMessage::SingleStep => {
+                live.playback.request_step();
+                return Ok(());
+            }
+            ClientMessage::SlowMotion { slowdown } => {
+                live.playback.set_slowdown(slowdown.clamp(1, 1000));
+                Command::SendStatus
+            }
+            ClientMessage::Reset => Command::Reset,
+            ClientMessage::OpenScene { scene } => Command::Open(scene),
+            ClientMessage::SetPhysics(settings) => Command::ChangePhysics(settings),
+            ClientMessage::SetMaterial { object, young, poisson, density } => {
+                Command::ChangeMaterial(object, MaterialDescription { young, poisson, density })
+            }
+        };
+        live.commands.send(command).map_err(|_| SessionEnd)
+    }
+
+    async fn press(
+        &mut self,
+        live: &LiveScene,
+        pointer: u64,
+        press_mode: PressMode,
+        position: [f64; 3],
+        grasp: (Option<usize>, Option<u32>, Option<[f64; 3]>),
+    ) -> Result<(), SessionEnd> {
+        let Some(position) = valid_position(position) else {
+            return self
+                .send_message(ServerMessage::Error {
+                    text: "the position of a pointer is three finite numbers [m]",
+                })
+                .await;
+        };
+        let mode = match press_mode {
+            PressMode::Touch => Some(DeviceMode::Touch),
+            PressMode::Hold => self.grasp(live, grasp).map(DeviceMode::Held),
+        };
+        let Some(mode) = mode else {
+            let text = "a hold needs an object, a triangle and barycentric weights, on nodes that can move";
+            return self.send_message(ServerMessage::Error { text }).await;
+        };
+        let id: PointerId = (self.viewer, pointer);
+        let device = lock(&live.pointers).press(id, mode, position);
+        self.send_message(ServerMessage::Assigned { pointer, device }).await
+    }
+
+    fn grasp(
+        &self,
+        live: &LiveScene,
+        (object, triangle, weights): (Option<usize>, Option<u32>, Option<[f64; 3]>),
+    ) -> Option<Grasp> {
+        let (object, triangle, weights) = (object?, triangle?, weights?);
+        let current = live.current.borrow();
+        let recording = current.scene.model.recordings().nth(object)?;
+        let sum: f64 = weights.iter().sum();
+        let valid = weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0) && sum > 0.0;
+        if !valid || triangle as usize >= recording.surface.triangles.len() {
+            return None;
+        }
+        let point = SurfacePoint { triangle, weights: weights.map(|weight| weight / sum) };
+        recording.is_movable(&point).then_some(Grasp { object, point })
+    }
+
+    /// Updates the number of vertex streams; `wanted`: whether this page streams vertex frames from now on.
+    fn count_vertex_stream(&self, live: &LiveScene, wanted: bool) {
+        let before = self.format == FrameFormat::Vertices && self.stride > 0;
+        match (before, wanted) {
+            (false, true) => {
+                live.viewers.vertices.fetch_add(1, Ordering::Relaxed);
+            }
+            (true, false) => {
+                live.viewers.vertices.fetch_sub(1, Ordering::Relaxed);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Position within range [m, world].
+fn valid_position(position: [f64; 3]) -> Option<DVec3> {
+    let position = DVec3::from_array(position);
+    (position.is_finite() && position.length() < MAX_POINTER_DISTANCE_M).then_some(position)
+}

@@ -1,0 +1,89 @@
+//! State shared by all requests.
+
+use super::content::{Live, RenderJob, ServedContent};
+use super::guard::Guard;
+use crate::live::LiveScene;
+use crate::log_frames::LogFrames;
+use crate::protocol::SceneSummary;
+use axum::body::Bytes;
+use palpate::Model;
+use std::collections::HashMap;
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Mutex, PoisonError};
+use tokio::sync::Semaphore;
+
+/// Shared server state.
+pub(super) struct ServerState {
+    pub live: Option<LiveScene>,
+    pub scenes: Vec<SceneSummary>,
+    pub logs: Vec<Arc<LogFrames>>,
+    pub render: Option<RenderJob>,
+    pub guard: Guard,
+    pub cache: StaticDataCache,
+    /// Permit of the one mesh upload at a time.
+    pub uploads: Semaphore,
+    /// Number of the next viewer.
+    pub next_viewer: AtomicU64,
+}
+
+impl ServerState {
+    /// State for some content; starts a live scene.
+    ///
+    /// # Errors
+    /// If a thread cannot be started.
+    pub fn new(guard: Guard, content: ServedContent) -> std::io::Result<Self> {
+        let mut state = Self {
+            live: None,
+            scenes: Vec::new(),
+            logs: Vec::new(),
+            render: None,
+            guard,
+            cache: StaticDataCache::default(),
+            uploads: Semaphore::new(1),
+            next_viewer: AtomicU64::new(1),
+        };
+        match content {
+            ServedContent::Live(live) => {
+                let Live { provider, first, scheduling } = *live;
+                state.scenes = provider.scenes();
+                state.live = Some(LiveScene::start(provider, first, scheduling)?);
+            }
+            ServedContent::Logs(logs) => state.logs = logs,
+            ServedContent::Render(log, job) => (state.logs, state.render) = (vec![log], Some(job)),
+        }
+        Ok(state)
+    }
+
+    /// Model of a generation, if it is current.
+    pub fn model(&self, generation: u32) -> Option<Arc<Model>> {
+        match &self.live {
+            Some(live) => {
+                let current = live.current.borrow().clone();
+                (current.generation == generation).then(|| current.scene.model.clone())
+            }
+            None => self.logs.get(generation as usize).map(|log| log.model.clone()),
+        }
+    }
+}
+
+/// Generation, kind of data, and index of the object or obstacle.
+pub(super) type StaticDataKey = (u32, &'static str, usize);
+
+/// Cache of encoded static data, shared by all pages.
+#[derive(Default)]
+pub(super) struct StaticDataCache(Mutex<HashMap<StaticDataKey, Bytes>>);
+
+impl StaticDataCache {
+    /// Cached bytes, encoded at the first request; `None` if there is no such data.
+    pub fn get(&self, key: StaticDataKey, encode: impl FnOnce() -> Option<Vec<u8>>) -> Option<Bytes> {
+        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Older generations are not requested any more; two logs have generations 0 and 1.
+        cache.retain(|(generation, ..), _| *generation + 1 >= key.0);
+        if let Some(bytes) = cache.get(&key) {
+            return Some(bytes.clone());
+        }
+        let bytes = Bytes::from(encode()?);
+        cache.insert(key, bytes.clone());
+        Some(bytes)
+    }
+}

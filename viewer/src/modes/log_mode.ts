@@ -1,0 +1,229 @@
+// Log mode: plays one log, or two side by side with a shared timeline.
+
+import type { Hello, Progress, SceneMessage } from "../protocol/messages";
+import { decodeFrame } from "../protocol/frame";
+import type { PageMode } from "./page_mode";
+import { FrameCache } from "../playback/frame_cache";
+import { fetchFrames, fetchSeries } from "../playback/log_requests";
+import { Player } from "../playback/player";
+import { Timeline } from "../playback/timeline";
+import { element } from "../ui/elements";
+import type { PageLayout } from "../ui/page_layout";
+import { JobList } from "../ui/job_list";
+import type { DisplayPanel } from "../ui/display_panel";
+import { AccuracyPanel } from "../ui/accuracy_panel";
+import { PlotPanels } from "../ui/plot_panels";
+import type { Notifications } from "../ui/notifications";
+import { hasFloor, loadScene } from "../rendering/scene_loader";
+import type { SceneView } from "../rendering/scene_view";
+import { PointerEvents } from "../interaction/pointer_events";
+
+const SERIES_RETRY_MS = 1500;
+
+interface Log {
+  scene: SceneMessage;
+  cache: FrameCache;
+  plots: PlotPanels;
+  caption: HTMLElement;
+  shownFrame: number;
+  seriesLoaded: boolean;
+}
+
+/** Page mode of recorded logs. */
+export class LogMode implements PageMode {
+  private readonly logs: Log[] = [];
+  private readonly player = new Player(0, 1 / 60);
+  private readonly timeline: Timeline;
+  private readonly jobs = new JobList();
+  private readonly accuracy = new AccuracyPanel();
+  private readonly captions = element("div", { class: "captions" });
+  private names: string[] = [];
+  private last = 0;
+  private started = false;
+  private loading: Promise<void> = Promise.resolve();
+
+  constructor(
+    private readonly sceneView: SceneView,
+    private readonly layout: PageLayout,
+    private readonly notifications: Notifications,
+    display: DisplayPanel,
+  ) {
+    new PointerEvents(sceneView, null);
+    this.timeline = new Timeline(this.player, () => sceneView.resetView());
+    layout.toolbar.append(...this.timeline.parts);
+    layout.overlayTop.append(this.jobs.box);
+    layout.viewArea.append(this.captions);
+    layout.controls.append(display.section);
+    layout.measurements.append(this.accuracy.section);
+    sceneView.canvas.setAttribute("aria-label", "The scene of the log. Drag to rotate the view.");
+  }
+
+  hello(hello: Hello): void {
+    this.names = hello.logs.map((log) => log.name);
+    this.layout.title.textContent = this.names.join("  |  ");
+    this.layout.about.textContent = this.names.length > 1 ? "Two logs, one timeline" : "Log playback";
+    document.title = `${this.names.join(", ")} · palpate`;
+    this.sceneView.clear();
+    for (const log of this.logs.splice(0)) {
+      log.caption.remove();
+      for (const part of log.plots.sections) part.remove();
+    }
+  }
+
+  scene(scene: SceneMessage): void {
+    // Sequential, so that scene graphs keep the order of the logs.
+    this.loading = this.loading.then(() => this.load(scene)).catch((error: unknown) => {
+      this.notifications.notify(`A log could not be loaded: ${error instanceof Error ? error.message : String(error)}`, "error");
+    });
+  }
+
+  private async load(scene: SceneMessage): Promise<void> {
+    const index = scene.log ?? 0;
+    const loaded = await loadScene(scene, this.sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);
+    const name = this.names[index] ?? scene.title;
+    const old = this.logs[index];
+    const cache = old?.cache ?? new FrameCache((from, count) => fetchFrames(index, from, count), scene.frames ?? 0);
+    cache.frames = scene.frames ?? 0;
+    const log: Log = {
+      scene,
+      cache,
+      plots: old?.plots ?? new PlotPanels(this.names.length > 1 ? name : ""),
+      caption: old?.caption ?? element("span", { text: name }),
+      shownFrame: -1,
+      seriesLoaded: false,
+    };
+    cache.onFailure = (error) => this.notifications.notifyOnce(`frames ${index}`, `Frames did not come: ${error instanceof Error ? error.message : String(error)}`);
+    if (old === undefined) {
+      log.plots.force.onSeek = log.plots.energy.onSeek = (time) => this.player.seek(time - this.startTime());
+      this.layout.measurements.insertBefore(element("div", {}, ...log.plots.sections), this.accuracy.section);
+      if (this.names.length > 1) this.captions.append(log.caption);
+    }
+    this.logs[index] = log;
+    if (index === 0) this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
+    this.sceneView.setScene(index, loaded);
+    this.sceneView.fitCamera();
+    if (index === 0) this.sceneView.orbit.reset();
+    const durations = this.logs.map(({ scene: { frames, frame_interval_s } }) => Math.max(0, (frames ?? 1) - 1) * (frame_interval_s ?? 1 / 60));
+    this.player.duration = Math.max(...durations);
+    this.player.frameSeconds = this.logs[0]?.scene.frame_interval_s ?? 1 / 60;
+    this.accuracy.update(this.logs.filter((known) => known !== undefined).map((known) => known.scene));
+    if (!this.started) {
+      this.started = true;
+      this.player.playing = true;
+    }
+    void this.loadSeries(index, log);
+  }
+
+  private async loadSeries(index: number, log: Log): Promise<void> {
+    if (log.seriesLoaded || this.logs[index] !== log) return;
+    try {
+      const series = await fetchSeries(index);
+      log.plots.showSeries(series);
+      log.seriesLoaded = true;
+    } catch {
+      // Not computed yet: retried after a delay and on progress.
+      window.setTimeout(() => void this.loadSeries(index, log), SERIES_RETRY_MS);
+    }
+  }
+
+  /** Simulation time of the first frame [s]; the timeline begins at 0. */
+  private startTime(): number {
+    return this.logs[0]?.scene === undefined ? 0 : this.firstFrameTime;
+  }
+
+  private firstFrameTime = 0;
+
+  frameReceived(): void {}
+
+  status(): void {}
+
+  assigned(): void {}
+
+  progress(progress: Progress): void {
+    this.jobs.update(progress);
+    if (progress.done !== true) return;
+    this.logs.forEach((log, index) => {
+      log.seriesLoaded = false;
+      void this.loadSeries(index, log);
+    });
+  }
+
+  connectionLost(): void {
+    this.player.playing = false;
+  }
+
+  visibilityChanged(): void {
+    if (document.hidden) this.player.playing = false;
+  }
+
+  contextRestored(): void {
+    const scenes = this.logs.map((log) => log.scene);
+    this.sceneView.clear();
+    for (const scene of scenes) this.scene(scene);
+  }
+
+  animate(now: number): void {
+    const seconds = Math.min(0.25, (now - this.last) / 1000);
+    this.last = now;
+    // The clock waits for frames that are being fetched.
+    const all = this.logs.map((log, i) => this.showLog(log, i, now));
+    if (all.every(Boolean)) this.player.advance(seconds);
+    this.timeline.show();
+  }
+
+  private showLog(log: Log | undefined, index: number, now: number): boolean {
+    const graph = this.sceneView.graphs[index];
+    if (log === undefined || graph === undefined) return true;
+    const frameSeconds = log.scene.frame_interval_s ?? 1 / 60;
+    const frameNumber = this.player.frameOf(log.scene.frames ?? 1, frameSeconds);
+    const bytes = log.cache.get(frameNumber);
+    if (this.player.playing) log.cache.prefetch(frameNumber, 1);
+    if (bytes === null) return false;
+    if (log.shownFrame === frameNumber) return true;
+    log.shownFrame = frameNumber;
+    try {
+      const frame = decodeFrame(bytes);
+      if (frameNumber === 0) this.firstFrameTime = frame.time;
+      graph.setFrame(frame, now / 1000);
+      log.plots.force.setMarker(frame.time);
+      log.plots.energy.setMarker(frame.time);
+      this.sceneView.requestRender();
+    } catch (error) {
+      this.notifications.notifyOnce(`frame of ${index}`, `A frame of the log cannot be drawn: ${error instanceof Error ? error.message : String(error)}`);
+    }
+    return true;
+  }
+
+  applyTheme(): void {
+    for (const log of this.logs) log?.plots.applyTheme();
+  }
+
+  handleKey(event: KeyboardEvent): boolean {
+    const count = event.shiftKey ? 10 : 1;
+    switch (event.key) {
+      case " ":
+        this.player.toggle();
+        return true;
+      case "ArrowLeft":
+        this.player.stepFrames(-count);
+        return true;
+      case "ArrowRight":
+        this.player.stepFrames(count);
+        return true;
+      case "Home":
+        this.player.seek(0);
+        return true;
+      case "End":
+        this.player.seek(this.player.duration);
+        return true;
+      case "[":
+        this.player.changeSpeed(-1);
+        return true;
+      case "]":
+        this.player.changeSpeed(1);
+        return true;
+      default:
+        return false;
+    }
+  }
+}

@@ -1,0 +1,52 @@
+// Server URLs with the token that the page was opened with.
+
+function here(): URL {
+  return new URL(window.location.href);
+}
+
+function withToken(url: URL): URL {
+  const token = here().searchParams.get("token");
+  if (token !== null) url.searchParams.set("token", token);
+  return url;
+}
+
+/** URL of a path without leading slash, so that a server under a prefix works too. */
+export function serverUrl(path: string): string {
+  return withToken(new URL(path, here())).href;
+}
+
+export function sessionUrl(): string {
+  const url = withToken(new URL("session", here()));
+  url.protocol = here().protocol === "https:" ? "wss:" : "ws:";
+  url.hash = "";
+  return url.href;
+}
+
+/** Whether `?stream=vertices` asks for nodal positions from the server instead of modal reconstruction here. */
+export function prefersVertexStream(): boolean {
+  return here().searchParams.get("stream") === "vertices";
+}
+
+/** Response body with progress reports. Never cached: a restarted server counts generations from 1 again. */
+export async function fetchBytes(path: string, signal: AbortSignal, onProgress: (bytes: number) => void): Promise<ArrayBuffer> {
+  const response = await fetch(serverUrl(path), { signal, cache: "no-store" });
+  if (!response.ok) throw new Error(`${path}: ${response.status} ${response.statusText}`);
+  if (response.body === null) return response.arrayBuffer();
+  const parts: Uint8Array[] = [];
+  let bytes = 0;
+  const reader = response.body.getReader();
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    parts.push(value);
+    bytes += value.byteLength;
+    onProgress(value.byteLength);
+  }
+  const whole = new Uint8Array(bytes);
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.byteLength;
+  }
+  return whole.buffer;
+}

@@ -1,0 +1,180 @@
+// three.js scene graph of one palpate scene: elastic objects, planes, obstacles, device markers, force arrows.
+
+import { Color, type Object3D, Scene, Vector3, type Vector4, type WebGLRenderer } from "three";
+import type { SceneMessage } from "../protocol/messages";
+import type { Frame } from "../protocol/frame";
+import type { ModeShapes, Surface } from "../protocol/surface";
+import { Arrows } from "./arrows";
+import { DARK, LIGHT, type ColourMode, type Palette } from "./colours";
+import { ElasticMesh, FrameMismatch } from "./elastic/elastic_mesh";
+import type { TextureLimits } from "./elastic/texture_layout";
+import { DeviceMarker } from "./device_marker";
+import { drawForces, largestForce, type Label } from "./force_arrows";
+import { GroundPlane } from "./ground_plane";
+import { ObstacleMesh } from "./obstacle_mesh";
+import { AutoRange } from "./auto_range";
+
+const MAX_SHADOWS = 2;
+const ARROW_CAPACITY = 256;
+
+/** Static data of a scene, fetched once. */
+export interface LoadedScene {
+  scene: SceneMessage;
+  surfaces: Surface[];
+  shapes: (ModeShapes | null)[];
+  obstacleSurfaces: (Surface | null)[];
+}
+
+/** Display settings of the page. */
+export interface DisplaySettings {
+  colour: ColourMode;
+  arrows: boolean;
+  wireframe: boolean;
+  dark: boolean;
+}
+
+/** three.js objects of one scene. */
+export class SceneGraph {
+  readonly scene = new Scene();
+  private readonly casters = new Scene();
+  readonly info: SceneMessage;
+  readonly objects: ElasticMesh[];
+  readonly center: Vector3;
+  readonly radius: number;
+  private readonly groundPlanes = new Map<number, GroundPlane>();
+  private readonly obstacles = new Map<number, ObstacleMesh>();
+  private readonly markers: DeviceMarker[];
+  private readonly arrows = new Arrows(ARROW_CAPACITY);
+  readonly forceRange = new AutoRange(0.02);
+  frame: Frame | null = null;
+  labels: Label[] = [];
+  private shadowsDirty = true;
+
+  constructor(loaded: LoadedScene, limits: TextureLimits, onGpu: boolean, up: Vector3) {
+    const { scene } = loaded;
+    this.info = scene;
+    this.center = new Vector3(...scene.view.center);
+    this.radius = scene.view.radius;
+    this.objects = scene.objects.map(
+      (info, i) => new ElasticMesh(info, loaded.surfaces[i], loaded.shapes[i], limits, onGpu, LIGHT.objects[0], up),
+    );
+    let shadows = 0;
+    scene.obstacles.forEach((info, i) => {
+      if ("plane" in info.shape) {
+        const ground = new GroundPlane(this.center, this.radius, shadows++ < MAX_SHADOWS);
+        ground.setPose(info.pose);
+        this.groundPlanes.set(i, ground);
+        this.scene.add(ground.group);
+        return;
+      }
+      const obstacle = ObstacleMesh.make(info, loaded.obstacleSurfaces[i], LIGHT.obstacle, up);
+      if (obstacle === null) return;
+      obstacle.setPose(info.pose);
+      this.obstacles.set(i, obstacle);
+      this.scene.add(obstacle.group);
+      this.casters.add(obstacle.shadow);
+    });
+    this.markers = scene.devices.map((info) => new DeviceMarker(info, this.radius, up));
+    for (const object of this.objects) {
+      this.scene.add(object.group);
+      this.casters.add(object.shadow);
+    }
+    for (const marker of this.markers) {
+      this.scene.add(marker.group);
+      this.casters.add(marker.shadow);
+    }
+    this.scene.add(this.arrows.group);
+  }
+
+  /** Shows a frame; throws `FrameMismatch` without change if it belongs to another scene. */
+  setFrame(frame: Frame, now: number): void {
+    const { objects, obstacles, devices } = frame;
+    if (objects.length !== this.objects.length) {
+      throw new FrameMismatch(`${objects.length} objects for the ${this.objects.length} of the scene`);
+    }
+    if (obstacles.length !== this.info.obstacles.length || devices.length !== this.markers.length) {
+      throw new FrameMismatch(`${obstacles.length} obstacles and ${devices.length} devices are not those of the scene`);
+    }
+    this.objects.forEach((object, i) => object.checkFrame(objects[i]));
+    this.frame = frame;
+    this.objects.forEach((object, i) => object.setFrame(objects[i]));
+    obstacles.forEach((pose, i) => {
+      this.groundPlanes.get(i)?.setPose(pose);
+      this.obstacles.get(i)?.setPose(pose);
+    });
+    this.markers.forEach((marker, i) => marker.setFrame(devices[i]));
+    this.forceRange.update(largestForce(frame), now);
+    this.shadowsDirty = true;
+  }
+
+  /** Obstacle meshes that block picking rays. */
+  get obstacleMeshes(): Object3D[] {
+    return [...this.obstacles.values()].map((obstacle) => obstacle.solid);
+  }
+
+  /** Arrow length at the full force range [m]. */
+  get maxArrowLength(): number {
+    return 0.7 * this.radius;
+  }
+
+  applyTheme(settings: DisplaySettings, colourRange: number): void {
+    const palette = settings.dark ? DARK : LIGHT;
+    this.objects.forEach((object, i) => {
+      object.setColours(settings.colour, colourRange, palette.objects[i % palette.objects.length], palette.wire);
+      object.wireframe = settings.wireframe;
+    });
+    for (const obstacle of this.obstacles.values()) obstacle.colour = palette.obstacle;
+    for (const ground of this.groundPlanes.values()) ground.applyTheme(palette);
+    for (const marker of this.markers) marker.applyTheme(palette);
+    this.drawArrows(settings, palette);
+  }
+
+  private drawArrows(settings: DisplaySettings, palette: Palette): void {
+    const { frame } = this;
+    this.labels = [];
+    this.arrows.show([], []);
+    if (frame === null) return;
+    const shown = this.markers.map((marker) => marker.visible);
+    if (settings.arrows) {
+      const drawn = drawForces(frame, shown, this.forceRange.value, this.maxArrowLength, palette);
+      this.arrows.show(drawn.arrows, drawn.dots);
+      this.labels = drawn.labels;
+    }
+    const interfacePoint = new Color(palette.interfacePoint);
+    frame.devices.forEach((device, i) => {
+      if (shown[i]) this.arrows.line(new Vector3(...device.proxy), new Vector3(...device.position), 0.004 * this.radius, interfacePoint);
+    });
+  }
+
+  /** Draws the render targets that the scene needs: reconstructed surfaces, shadow maps. */
+  updateTargets(renderer: WebGLRenderer): void {
+    for (const object of this.objects) object.reconstruct(renderer);
+    if (!this.shadowsDirty) return;
+    this.shadowsDirty = false;
+    // Obstacles stay near the scene's centre; objects may have moved away.
+    const objects = this.objectsCentre();
+    const focus = objects.distanceTo(this.center) < 1.6 * this.radius ? this.center : objects;
+    const setPlane = (plane: Vector4, shear: Vector3, reach: number) => {
+      const materials = [...this.objects, ...this.obstacles.values(), ...this.markers].map((x) => x.shadowMaterial);
+      for (const material of materials) {
+        material.uniforms.plane.value = plane;
+        material.uniforms.shear.value = shear;
+        material.uniforms.reach.value = reach;
+      }
+    };
+    for (const ground of this.groundPlanes.values()) ground.draw(renderer, this.casters, focus, setPlane);
+  }
+
+  /** Mean of the objects' centres of mass [m, world]. */
+  objectsCentre(): Vector3 {
+    const centre = new Vector3();
+    if (this.objects.length === 0) return centre.copy(this.center);
+    for (const object of this.objects) centre.add(object.group.position);
+    return centre.divideScalar(this.objects.length);
+  }
+
+  dispose(): void {
+    for (const part of [...this.objects, ...this.groundPlanes.values(), ...this.obstacles.values(), ...this.markers]) part.dispose();
+    this.arrows.dispose();
+  }
+}

@@ -1,0 +1,251 @@
+// Scene view: a WebGL canvas, a 2D overlay canvas, one camera, and one scene graph per viewport.
+
+import { Vector2, Vector3, WebGLRenderer } from "three";
+import { prefersVertexStream } from "../protocol/urls";
+import { OrbitCamera } from "./orbit_camera";
+import { DARK, LIGHT, type Palette } from "./colours";
+import { textureLimits } from "./elastic/gpu_reconstruction";
+import type { TextureLimits } from "./elastic/texture_layout";
+import { drawArrowScale, drawColourBar, drawLabels, drawTime, type Rectangle } from "./overlay";
+import { AutoRange } from "./auto_range";
+import { SceneGraph, type LoadedScene, type DisplaySettings } from "./scene_graph";
+
+const RANGE_INTERVAL_S = 0.15;
+// Viewports up to this width [px] place the legend below the scene, if their aspect (height per width) allows it.
+const NARROW_WIDTH = 480;
+const MIN_ASPECT_FOR_LEGEND_BELOW = 1.3;
+// Height of a legend at the top: caption and force scale, and with the colour bar [px].
+const LEGEND_HEIGHT = 62;
+const LEGEND_HEIGHT_WITH_BAR = 116;
+
+export interface ViewSize {
+  width: number;
+  height: number;
+  ratio: number;
+}
+
+/** Canvases, renderer, camera and scene graphs. */
+export class SceneView {
+  readonly canvas = document.createElement("canvas");
+  readonly overlay = document.createElement("canvas");
+  readonly orbit = new OrbitCamera();
+  readonly renderer: WebGLRenderer;
+  readonly limits: TextureLimits;
+  /** Whether surfaces are reconstructed on the GPU. */
+  readonly reconstructsOnGpu: boolean;
+  graphs: SceneGraph[] = [];
+  settings: DisplaySettings;
+  /** Whether title and time are drawn into the overlay. */
+  showsTime = false;
+  /** Hook that draws pointer cursors into the overlay. */
+  drawOverlay: ((context: CanvasRenderingContext2D, viewport: Rectangle) => void) | null = null;
+  private readonly context: CanvasRenderingContext2D;
+  private size: ViewSize = { width: 1, height: 1, ratio: 1 };
+  private readonly ranges = { displacement: new AutoRange(1e-4), strain: new AutoRange(2e-3) };
+  private fixedRange: number | null = null;
+  private rangePending = false;
+  private rangeUpdatedAt = -1;
+  private dirty = true;
+  lost = false;
+
+  constructor(settings: DisplaySettings) {
+    this.settings = settings;
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer.autoClear = true;
+    this.limits = textureLimits(this.renderer);
+    this.reconstructsOnGpu = this.renderer.extensions.has("EXT_color_buffer_float") && !prefersVertexStream();
+    const context = this.overlay.getContext("2d");
+    if (context === null) throw new Error("this browser offers no 2D canvas");
+    this.context = context;
+  }
+
+  /** Palette of the current theme. */
+  get palette(): Palette {
+    return this.settings.dark ? DARK : LIGHT;
+  }
+
+  /** Replaces the scene graph of a viewport. */
+  setScene(index: number, loaded: LoadedScene): SceneGraph {
+    this.graphs[index]?.dispose();
+    const graph = new SceneGraph(loaded, this.limits, this.reconstructsOnGpu, this.orbit.up);
+    this.graphs[index] = graph;
+    if (index === 0) {
+      this.ranges.displacement = new AutoRange(2e-3 * Math.max(...graph.objects.map((o) => o.info.radius), 1e-3));
+      this.ranges.strain = new AutoRange(5e-3);
+    }
+    this.rangeUpdatedAt = -1;
+    this.requestRender();
+    return graph;
+  }
+
+  resize(width: number, height: number, ratio: number): void {
+    if (width < 1 || height < 1) return;
+    this.size = { width, height, ratio };
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(width, height, false);
+    this.overlay.width = Math.round(width * ratio);
+    this.overlay.height = Math.round(height * ratio);
+    this.fitCamera();
+    this.requestRender();
+  }
+
+  /** Resets the camera to the scene's centre, or to its objects if they have moved away. */
+  resetView(): void {
+    const [graph] = this.graphs;
+    const movedAway = graph !== undefined && graph.objectsCentre().distanceTo(graph.center) > 1.5 * graph.radius;
+    this.orbit.reset(movedAway ? graph.objectsCentre() : undefined);
+  }
+
+  /** Whether the objects have left the view. */
+  get isOutOfView(): boolean {
+    const [graph] = this.graphs;
+    if (graph === undefined || graph.objects.length === 0) return false;
+    const at = graph.objectsCentre().project(this.orbit.camera);
+    return Math.abs(at.x) > 1.15 || Math.abs(at.y) > 1.15 || Math.abs(at.z) > 1;
+  }
+
+  fitCamera(): void {
+    const viewport = this.viewportOf(0);
+    this.orbit.resize(viewport.width / viewport.height);
+  }
+
+  /** Viewport of a scene graph [px]: one fills the view, two are side by side, or stacked in a narrow window. */
+  viewportOf(index: number): Rectangle {
+    const { width, height } = this.size;
+    const count = Math.max(1, this.graphs.length);
+    if (count === 1) return { x: 0, y: 0, width, height };
+    return width >= height
+      ? { x: Math.round((index * width) / count), y: 0, width: Math.round(width / count), height }
+      : { x: 0, y: Math.round((index * height) / count), width, height: Math.round(height / count) };
+  }
+
+  /** Area whose lower edge carries the legend [px]: the viewport, or its top where two narrow ones leave no room below. */
+  legendAreaOf(index: number): Rectangle {
+    const viewport = this.viewportOf(index);
+    if (this.graphs.length < 2 || viewport.width > NARROW_WIDTH || viewport.height > MIN_ASPECT_FOR_LEGEND_BELOW * viewport.width) return viewport;
+    return { ...viewport, height: index === 0 ? LEGEND_HEIGHT_WITH_BAR : LEGEND_HEIGHT };
+  }
+
+  requestRender(): void {
+    this.dirty = true;
+  }
+
+  setFixedRange(range: number | null): void {
+    this.fixedRange = range;
+  }
+
+  get colourRange(): number {
+    if (this.settings.colour === "plain") return 0;
+    return this.fixedRange ?? this.ranges[this.settings.colour].value;
+  }
+
+  /** Draws if anything changed; `now` [s]. */
+  draw(now: number): void {
+    if (this.lost || !(this.dirty || this.orbit.changed)) return;
+    this.dirty = this.orbit.changed = false;
+    const { context, renderer, palette, size } = this;
+    renderer.setClearColor(palette.background, 1);
+    context.setTransform(size.ratio, 0, 0, size.ratio, 0, 0);
+    context.clearRect(0, 0, size.width, size.height);
+    renderer.setScissorTest(false);
+    renderer.setViewport(0, 0, size.width, size.height);
+    if (this.graphs.length === 0) renderer.clear();
+    if (this.settings.colour === "displacement" && this.fixedRange === null) {
+      const estimates = this.graphs.flatMap((graph) => graph.objects.map((object) => object.approximateDisplacement));
+      this.ranges.displacement.update(Math.max(0, ...estimates), now);
+    }
+    this.graphs.forEach((graph, i) => this.drawScene(graph, i));
+    this.updateRange(now);
+  }
+
+  private drawScene(graph: SceneGraph, index: number): void {
+    const { context, renderer, palette, size, settings } = this;
+    const viewport = this.viewportOf(index);
+    const camera = this.orbit.camera;
+    renderer.setScissorTest(false);
+    graph.applyTheme(settings, this.colourRange);
+    graph.updateTargets(renderer);
+    const y = size.height - viewport.y - viewport.height;
+    renderer.setViewport(viewport.x, y, viewport.width, viewport.height);
+    renderer.setScissor(viewport.x, y, viewport.width, viewport.height);
+    renderer.setScissorTest(true);
+    renderer.render(graph.scene, camera);
+
+    // One colour bar and scale for all scenes.
+    const legend = this.legendAreaOf(index);
+    const bar = index > 0 ? 0 : drawColourBar(context, settings.colour, this.colourRange, legend, palette);
+    if (settings.arrows && graph.labels.length > 0) {
+      const pixels = (graph.maxArrowLength / this.orbit.viewHeightAt(camera.position.distanceTo(graph.center))) * viewport.height;
+      drawArrowScale(context, graph.forceRange.value, pixels, legend, bar, palette);
+    }
+    const keepOut = [{ x: viewport.x, y: legend.y + legend.height - bar - 26, width: 260, height: bar + 26 }];
+    drawLabels(context, graph.labels, camera, viewport, palette, keepOut);
+    if (this.showsTime) drawTime(context, graph.frame?.time ?? 0, graph.info.title, viewport, palette);
+    this.drawOverlay?.(context, viewport);
+  }
+
+  /** Updates the colour range at intervals. */
+  private updateRange(now: number): void {
+    const mode = this.settings.colour;
+    if (mode === "plain" || this.fixedRange !== null || this.rangePending) return;
+    if (this.graphs.length === 0 || (now >= this.rangeUpdatedAt && now < this.rangeUpdatedAt + RANGE_INTERVAL_S && this.rangeUpdatedAt >= 0)) return;
+    if (this.rangeUpdatedAt < 0 && this.graphs.every((graph) => graph.frame !== null)) {
+      // First frame: updated synchronously.
+      this.rangeUpdatedAt = now;
+      if (this.ranges[mode].update(this.maxValue(), now)) this.requestRender();
+      return;
+    }
+    this.rangeUpdatedAt = now;
+    this.rangePending = true;
+    const objects = this.graphs.flatMap((graph) => graph.objects);
+    Promise.all(objects.map((object) => object.maxValueAsync(this.renderer, mode)))
+      .then((largest) => {
+        if (this.ranges[mode].update(Math.max(0, ...largest), now)) this.requestRender();
+      })
+      .catch(() => undefined) // The scene was replaced meanwhile.
+      .finally(() => {
+        this.rangePending = false;
+      });
+  }
+
+  /** Largest displacement [m] or strain of all scenes. Waits for the GPU. */
+  maxValue(): number {
+    const { colour } = this.settings;
+    if (colour === "plain") return 0;
+    return Math.max(0, ...this.graphs.flatMap((graph) => graph.objects.map((object) => object.maxValue(this.renderer, colour))));
+  }
+
+  /** Normalised device coordinates of a page position [px] in the first viewport. */
+  toNdc(clientX: number, clientY: number): Vector2 {
+    const box = this.canvas.getBoundingClientRect();
+    const viewport = this.viewportOf(0);
+    return new Vector2(((clientX - box.left - viewport.x) / viewport.width) * 2 - 1, 1 - ((clientY - box.top - viewport.y) / viewport.height) * 2);
+  }
+
+  /** View position [px] of a world point [m] in the first viewport. */
+  toPixels(point: Vector3): Vector2 {
+    const at = point.clone().project(this.orbit.camera);
+    const viewport = this.viewportOf(0);
+    return new Vector2(viewport.x + (0.5 + 0.5 * at.x) * viewport.width, viewport.y + (0.5 - 0.5 * at.y) * viewport.height);
+  }
+
+  /** PNG of canvas and overlay. */
+  async png(): Promise<Blob> {
+    const combined = document.createElement("canvas");
+    combined.width = this.canvas.width;
+    combined.height = this.canvas.height;
+    const context = combined.getContext("2d");
+    if (context === null) throw new Error("this browser offers no 2D canvas");
+    context.drawImage(this.canvas, 0, 0);
+    context.drawImage(this.overlay, 0, 0);
+    return new Promise((done, failed) =>
+      combined.toBlob((blob) => (blob === null ? failed(new Error("the PNG could not be encoded")) : done(blob)), "image/png"),
+    );
+  }
+
+  clear(): void {
+    for (const graph of this.graphs) graph.dispose();
+    this.graphs = [];
+    this.requestRender();
+  }
+}

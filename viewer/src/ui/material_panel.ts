@@ -1,0 +1,109 @@
+// Material of an object; a change is recorded again in the background.
+
+import type { Material, SceneMessage, ClientMessage } from "../protocol/messages";
+import { element, numberField, section } from "./elements";
+
+export const PRESETS: readonly (Material & { name: string })[] = [
+  { name: "Jelly", young: 2e3, poisson: 0.45, density: 110 },
+  { name: "Liver", young: 5e3, poisson: 0.45, density: 1060 },
+  { name: "Sponge", young: 2e4, poisson: 0.2, density: 60 },
+  { name: "Soft silicone", young: 1e5, poisson: 0.48, density: 1080 },
+  { name: "Rubber", young: 2e6, poisson: 0.49, density: 1100 },
+];
+
+/** Input fields of a material, with presets. */
+export class MaterialFields {
+  readonly rows: HTMLElement[];
+  private readonly preset = element("select");
+  private readonly young;
+  private readonly poisson;
+  private readonly density;
+
+  constructor() {
+    const clearPreset = () => {
+      this.preset.value = "";
+    };
+    this.young = numberField("Young's modulus", "kPa", "Elastic stiffness: jelly 2, liver 5, rubber 2000 kPa", { min: 1e-3, max: 1e9, step: "any" }, clearPreset);
+    this.poisson = numberField("Poisson's ratio", "", "Lateral expansion under compression: cork 0, rubber 0.49", { min: 0, max: 0.499, step: "any" }, clearPreset);
+    this.density = numberField("Density", "kg/m³", "Mass per volume; water: 1000", { min: 0.1, max: 1e5, step: "any" }, clearPreset);
+    this.preset.append(
+      element("option", { text: "custom", attributes: { value: "" } }),
+      ...PRESETS.map(({ name }) => element("option", { text: name, attributes: { value: name } })),
+    );
+    this.preset.addEventListener("change", () => {
+      const preset = PRESETS.find(({ name }) => name === this.preset.value);
+      if (preset !== undefined) this.fill(preset);
+    });
+    const presets = element("label", { class: "field" }, element("span", { class: "name", text: "Preset" }), this.preset);
+    this.rows = [presets, this.young.row, this.poisson.row, this.density.row];
+  }
+
+  set value(material: Material) {
+    this.fill(material);
+    const close = (a: number, b: number) => Math.abs(a - b) <= 1e-6 * Math.abs(b);
+    const same = PRESETS.find(
+      (p) => close(p.young, material.young) && close(p.poisson, material.poisson) && close(p.density, material.density),
+    );
+    this.preset.value = same?.name ?? "";
+  }
+
+  private fill({ young, poisson, density }: Material): void {
+    this.young.value = young / 1000;
+    this.poisson.value = poisson;
+    this.density.value = density;
+  }
+
+  /** Material of the fields; null if one is invalid. */
+  get value(): Material | null {
+    const valid = [this.young, this.poisson, this.density].every(({ input }) => input.value !== "" && input.checkValidity());
+    return valid ? { young: 1000 * this.young.value, poisson: this.poisson.value, density: this.density.value } : null;
+  }
+}
+
+export class MaterialPanel {
+  readonly section: HTMLElement;
+  private readonly objectSelect = element("select");
+  private readonly fields = new MaterialFields();
+  private readonly record: HTMLButtonElement;
+  private scene: SceneMessage | null = null;
+
+  constructor(send: (message: ClientMessage) => void) {
+    this.record = element("button", {
+      class: "button wide",
+      type: "button",
+      text: "Record again",
+      title: "Computes how the object responds with this material; takes seconds to minutes while the scene keeps running",
+      on: {
+        click: () => {
+          const material = this.fields.value;
+          if (material !== null) send({ type: "set_material", object: Number(this.objectSelect.value), ...material });
+        },
+      },
+    });
+    this.objectSelect.addEventListener("change", () => this.selectObject());
+    this.section = section(
+      "Material",
+      false,
+      element("label", { class: "field" }, element("span", { class: "name", text: "Object" }), this.objectSelect),
+      ...this.fields.rows,
+      element("p", { class: "secondary", text: "A new material needs a new recording, which is made in the background." }),
+      this.record,
+    );
+  }
+
+  update(scene: SceneMessage): void {
+    this.scene = scene;
+    const recordable = scene.objects.map((object, i) => ({ object, i })).filter(({ object }) => object.recordable);
+    this.section.hidden = recordable.length === 0;
+    this.objectSelect.replaceChildren(
+      ...recordable.map(({ object, i }) => element("option", { text: object.name, attributes: { value: String(i) } })),
+    );
+    if (this.objectSelect.parentElement !== null) this.objectSelect.parentElement.hidden = recordable.length < 2;
+    this.selectObject();
+  }
+
+  private selectObject(): void {
+    const object = this.scene?.objects[Number(this.objectSelect.value)];
+    this.fields.value = object?.material ?? PRESETS[0];
+  }
+}

@@ -1,0 +1,119 @@
+// Upload of a mesh file: asks for length unit, material and modes, and has the server record it.
+
+import { serverUrl } from "../protocol/urls";
+import { element, section } from "./elements";
+import { MaterialFields, PRESETS } from "./material_panel";
+import type { Notifications } from "./notifications";
+
+const EXTENSIONS = [".msh", ".vtk", ".obj", ".stl"];
+const SCALES: readonly [string, number][] = [
+  ["millimetres", 0.001],
+  ["centimetres", 0.01],
+  ["metres", 1],
+  ["inches", 0.0254],
+];
+
+export class MeshUpload {
+  readonly section: HTMLElement;
+  readonly dialog = element("dialog", { class: "upload-dialog", attributes: { "aria-labelledby": "upload-title" } });
+  private readonly dropTarget = element("div", { class: "drop-target", text: "Drop a tetrahedral mesh here to record it (.msh, .vtk)" });
+  private readonly scale = element("select");
+  private readonly modes = element("input", { type: "number", attributes: { min: "1", max: "2000", value: "200" } });
+  private readonly fields = new MaterialFields();
+  private readonly fileName = element("strong");
+  private file: File | null = null;
+
+  constructor(private readonly notifications: Notifications) {
+    const input = element("input", { type: "file", attributes: { accept: EXTENSIONS.join(","), hidden: true } });
+    input.addEventListener("change", () => {
+      if (input.files?.[0] !== undefined) this.open(input.files[0]);
+      input.value = "";
+    });
+    const button = element("button", { class: "button wide", type: "button", text: "Choose a mesh file…", on: { click: () => input.click() } });
+    this.section = section(
+      "Import a mesh",
+      false,
+      element("p", { class: "secondary", text: "Drop a tetrahedral mesh onto the page, or choose a file (.msh of Gmsh, .vtk). Surface meshes (.obj, .stl) need a volume mesh first: Gmsh or fTetWild make one." }),
+      button,
+      input,
+    );
+    this.scale.append(...SCALES.map(([name, factor]) => element("option", { text: name, attributes: { value: String(factor) } })));
+    this.fields.value = PRESETS[1];
+    const form = element("form", { attributes: { method: "dialog" } });
+    form.append(
+      element("h2", { id: "upload-title" }, "Record ", this.fileName),
+      element("label", { class: "field" }, element("span", { class: "name", text: "Length unit" }), this.scale),
+      ...this.fields.rows,
+      element(
+        "label",
+        { class: "field", title: "Number of vibration modes; more modes are more accurate and take longer to record" },
+        element("span", { class: "name", text: "Modes" }),
+        this.modes,
+      ),
+      element("p", { class: "secondary", text: "Recording takes seconds to minutes. The scene keeps running; the new object opens when it is ready." }),
+      element(
+        "div",
+        { class: "dialog-buttons" },
+        element("button", { class: "button", type: "button", text: "Cancel", on: { click: () => this.dialog.close() } }),
+        element("button", { class: "button primary", type: "submit", text: "Record" }),
+      ),
+    );
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.dialog.close();
+      void this.post();
+    });
+    this.dialog.append(form);
+    this.listenForDrops();
+  }
+
+  private listenForDrops(): void {
+    const holdsFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") === true;
+    document.body.append(this.dropTarget);
+    window.addEventListener("dragover", (event) => {
+      if (!holdsFiles(event)) return;
+      event.preventDefault();
+      this.dropTarget.classList.add("visible");
+    });
+    window.addEventListener("dragleave", (event) => {
+      if (event.relatedTarget === null) this.dropTarget.classList.remove("visible");
+    });
+    window.addEventListener("drop", (event) => {
+      if (!holdsFiles(event)) return;
+      event.preventDefault();
+      this.dropTarget.classList.remove("visible");
+      const file = event.dataTransfer?.files[0];
+      if (file !== undefined) this.open(file);
+    });
+  }
+
+  private open(file: File): void {
+    if (!EXTENSIONS.some((extension) => file.name.toLowerCase().endsWith(extension))) {
+      this.notifications.notify(`${file.name} is not a supported mesh file. Supported: ${EXTENSIONS.join(", ")}`, "error");
+      return;
+    }
+    this.file = file;
+    this.fileName.textContent = file.name;
+    this.dialog.showModal();
+  }
+
+  private async post(): Promise<void> {
+    const material = this.fields.value;
+    if (this.file === null || material === null) return;
+    const query = new URLSearchParams({
+      name: this.file.name,
+      young: String(material.young),
+      poisson: String(material.poisson),
+      density: String(material.density),
+      scale: this.scale.value,
+      modes: this.modes.value,
+    });
+    try {
+      const response = await fetch(serverUrl(`record?${query}`), { method: "POST", body: this.file });
+      if (!response.ok) throw new Error((await response.text()) || `${response.status} ${response.statusText}`);
+      this.notifications.notify(`${this.file.name} is being recorded`);
+    } catch (error) {
+      this.notifications.notify(`${this.file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
+    }
+  }
+}

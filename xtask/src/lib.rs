@@ -1,0 +1,4 @@
+//! Checks of the repository that tests and chores share.
+
+pub mod layers;
+pub mod words;

@@ -1,0 +1,51 @@
+//! Tests, by part: Rust, doc comments, Python, and the page in a browser. One release build serves them all.
+
+use crate::process::{cargo, program, run};
+use crate::{machine, viewer};
+use std::process::Command;
+
+/// Parts of the tests in the order in which they run: the last lines are those of the Rust tests' runner.
+pub const PARTS: &[&str] = &["build", "python", "viewer", "doc", "rust"];
+
+/// All workspace members, as one release build.
+const WORKSPACE: &[&str] = &["--release", "--workspace", "--locked"];
+
+/// Run one part, or all.
+pub fn run_parts(only: Option<&str>) -> Result<(), String> {
+    machine::need_c_compiler()?;
+    viewer::build()?;
+    for part in PARTS.iter().filter(|part| only.is_none_or(|only| only == **part)) {
+        match *part {
+            "build" => build()?,
+            "python" => python()?,
+            "viewer" => {
+                build()?;
+                viewer::test(&program())?;
+            }
+            "doc" => cargo(&[&["test"], WORKSPACE, &["--doc"]].concat())?,
+            _ => rust()?,
+        }
+    }
+    Ok(())
+}
+
+/// Programs and tests of the workspace.
+fn build() -> Result<(), String> {
+    cargo(&[&["test"], WORKSPACE, &["--no-run", "--quiet"]].concat())
+}
+
+fn rust() -> Result<(), String> {
+    if machine::runs("cargo", &["nextest", "--version"]) {
+        return cargo(&[&["nextest", "run"], WORKSPACE, &["--no-fail-fast"]].concat());
+    }
+    eprintln!("cargo-nextest is not installed: using cargo test, which comes to the same end more slowly");
+    cargo(&[&["test"], WORKSPACE, &["--no-fail-fast", "--lib", "--bins", "--tests", "--examples"]].concat())
+}
+
+/// Stores as Python reads them, and the recording on Dask and Slurm.
+fn python() -> Result<(), String> {
+    let python = machine::need_python()?;
+    build()?;
+    let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
+    run(Command::new(python).args(tests).env("PALPATE", program()).env("PYTHONDONTWRITEBYTECODE", "1"))
+}
