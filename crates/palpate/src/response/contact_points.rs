@@ -51,7 +51,7 @@ pub(crate) struct ContactPoints {
     /// Forces g [N, body] and displacements C·g [m, body], three numbers per point.
     forces: Vec<f64>,
     moved: Vec<f64>,
-    /// Changes of force that move their point by less than this [m] wait until they have added up.
+    /// Displacement [m] below which a change of force is postponed.
     pub(crate) least_move: f64,
     unused: Vec<usize>,
     /// Index in `points` of each slot's point.
