@@ -8,7 +8,7 @@
 //! f = k·e⁺ + d·(e⁺ − e)/h        so        e⁺ = (f + d/h·e) / (k + d/h)
 //! ```
 
-use crate::error::Error;
+use crate::error::ModelError;
 use alloc::format;
 use glam::DVec3;
 
@@ -43,9 +43,9 @@ impl Default for DeviceParameters {
 }
 
 impl DeviceParameters {
-    /// Refuse numbers out of range.
-    pub(crate) fn check(&self, number: usize) -> Result<(), Error> {
-        let fail = |what| Err(Error::Model(format!("device {number}: {what}")));
+    /// Check the ranges of all numbers.
+    pub(crate) fn check(&self, device: usize) -> Result<(), ModelError> {
+        let fail = |what| Err(ModelError::Device { device, what });
         for (name, value) in [("tip_radius", self.tip_radius), ("patch_radius", self.patch_radius)] {
             if !(0.0..1e6).contains(&value) {
                 return fail(format!("{name} is {value} m, expected a number not below 0"));

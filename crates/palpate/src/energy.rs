@@ -1,54 +1,53 @@
-//! The energy ledger of one object.
+//! Energy ledger of one object.
 //!
 //! ```text
 //! kinetic + elastic + residual + potential + coupling
 //!     = at the start + input − dissipated − friction − impact + defect
 //! ```
 //!
-//! Input is Σ f·Δx of what the object is in contact with, in world coordinates: devices, obstacles, other objects; for a
-//! scene, of devices and obstacles. Friction and impact are what contacts take, across and along their normals.
-//! Dissipated is what modal damping takes
-//! (a quadratic form, see `response`) and what the residual spring loses when its force jumps,
-//! ½·Δfᵀ·S·Δf at least. The defect is what no term explains: round-off of the solver and of the
-//! sums; with the paper's update also the error of semi-implicit Euler.
+//! Input is the work Σ f·Δx [J] of the other sides of the object's contacts, in world coordinates: devices, obstacles, other
+//! objects; for a scene, of devices and obstacles. Friction and impact are the energies that contacts dissipate across and
+//! along their normals. Dissipated is the energy loss of modal damping (a quadratic form, `response::oscillator`) and of the
+//! residual spring when its force jumps, at least ½·Δfᵀ·S·Δf. The defect is the imbalance of these terms: round-off of the
+//! solver and of the sums; with the paper's update also the error of semi-implicit Euler.
 
 /// Energies [J] of one object, or of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnergyLedger {
-    /// Kinetic energy of rigid motion and modes.
+    /// Kinetic energy of rigid motion and modes [J].
     pub kinetic: f64,
-    /// Elastic energy of the modes.
+    /// Elastic energy of the modes [J].
     pub elastic: f64,
-    /// Elastic energy of the residual compliance, ½·fᵀ·S·f.
+    /// Elastic energy of the residual compliance [J], ½·fᵀ·S·f.
     pub residual: f64,
-    /// Energy in the gravity field; 0 at the world's origin.
+    /// Potential energy in the gravity field [J]; 0 at the world's origin.
     pub potential: f64,
-    /// Elastic energy of virtual couplings; of a scene, not of an object.
+    /// Elastic energy of virtual couplings [J]; of a scene, not of an object.
     pub coupling: f64,
-    /// Work done on the object at its contacts since the start.
+    /// Work on the object at its contacts since the start [J].
     pub input: f64,
-    /// Energy taken by damping since the start.
+    /// Energy dissipated by damping since the start [J].
     pub dissipated: f64,
-    /// Energy taken by friction since the start.
+    /// Energy dissipated by friction since the start [J].
     pub friction: f64,
-    /// Energy taken by impact since the start: work of contacts that close.
+    /// Energy dissipated by impact since the start [J]: work of closing contacts.
     pub impact: f64,
-    /// What the sum above misses since the start.
+    /// Imbalance of the terms above since the start [J].
     pub defect: f64,
 }
 
 impl EnergyLedger {
-    /// Energy [J] that the object holds now.
+    /// Stored energy [J].
     pub fn stored(&self) -> f64 {
         self.kinetic + self.elastic + self.residual + self.potential + self.coupling
     }
 
-    /// Energy [J] that was lost since the start.
+    /// Energy dissipated by damping, friction and impact since the start [J].
     pub fn lost(&self) -> f64 {
         self.dissipated + self.friction + self.impact
     }
 
-    /// All numbers [J] by their names, in the order above.
+    /// All terms [J] with their names, in the order of the fields.
     pub fn named(&self) -> [(&'static str, f64); 10] {
         [
             ("kinetic", self.kinetic),

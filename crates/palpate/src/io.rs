@@ -23,7 +23,7 @@ pub enum DeviceMode {
 pub struct DeviceInput {
     /// Interface point at the end of the step [m, world].
     pub position: DVec3,
-    /// Mode.
+    /// Mode in the step.
     pub mode: DeviceMode,
 }
 
@@ -99,7 +99,7 @@ pub struct ObjectOutput {
     pub energy: EnergyLedger,
 }
 
-/// Status of a step. A step cannot fail; this reports what it could not meet.
+/// Status of a step. A step cannot fail; the status reports rejected inputs and unsolved contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepStatus {
     /// Largest residual of a contact's law [m].
@@ -109,13 +109,13 @@ pub struct StepStatus {
     /// Devices and obstacles with a position that is not finite, or a grasp that does not exist: the device is inactive, the
     /// obstacle stays.
     pub rejected_inputs: u32,
-    /// Held directions that depend on others and got no force.
+    /// Held directions that depend linearly on others and got no force.
     pub dependent_rows: u32,
     /// Islands (objects that contacts connect) whose contacts were not solved to the tolerance, and objects whose rotation was
     /// not, because a device or a body moves too far in a step. Such contacts give a scaled force in this step, or none;
     /// islands with held points only give none.
     pub unsolved_islands: u32,
-    /// Contacts beyond the contact points of an object.
+    /// Contacts dropped beyond an object's limit of contact points.
     pub dropped_contacts: u32,
 }
 

@@ -1,7 +1,7 @@
 //! Contact forces from elastic objects that are free to move.
 //!
-//! A [`Recording`] holds the impulse responses of one elastic body, made once from a mesh.
-//! A [`Model`] puts recordings into a scene, a [`State`] moves through time by [`step`]:
+//! A [`Recording`] holds the impulse responses of one elastic body, computed once from a mesh.
+//! A [`Model`] puts recordings into a scene, a [`State`] advances in time by [`step`]:
 //!
 //! ```text
 //! step(&Model, &mut State, &Input) -> &Output
@@ -10,9 +10,27 @@
 //! Each step takes device positions and gives forces. Its cost grows with the modes and the
 //! contacts, never with the mesh. It allocates nothing, takes no lock and makes no system call.
 //!
+//! # Interface
+//!
+//! - **Scene.** [`Model`] of [`ModelParameters`] and [`ModelObject`]s with their [`ObjectStart`] and [`ResponseForm`];
+//!   [`DeviceParameters`] with a [`Coupling`]; [`Obstacle`] with a [`Shape`] or an [`ObstacleMesh`]; [`RigidCompliance`] and
+//!   [`RigidIntegrator`]; [`Pose`] and [`Twist`], with [`cayley`] and [`inertia_in_world`].
+//! - **Step.** [`step`] takes [`Input`] ([`DeviceInput`], [`DeviceMode`], [`Grasp`]) and gives [`Output`]: [`DeviceOutput`],
+//!   [`ObjectOutput`], [`ContactOutput`] against a [`Collider`], [`EnergyLedger`] and [`StepStatus`].
+//! - **State.** [`State`] resumes from [`ObjectSnapshot`]s; a [`DeformationSnapshot`] gives surfaces to another thread, with a
+//!   [`ResidualFieldCache`].
+//! - **Surface.** [`Surface`] and [`SurfacePoint`].
+//! - **Recording.** [`Recording`] of [`Metadata`], [`ModalBasis`], [`ResidualCompliance`] ([`NearField`]) and
+//!   [`GravityResponse`]; file format [`FORMAT_VERSION`]. Metadata: [`Support`], [`Material`], [`Damping`], [`MeshCounts`],
+//!   [`MassProperties`], [`Provenance`], and the [`Certificate`] of a [`CertificateEvent`].
+//! - **Table.** [`ImpulseResponse`] of the paper, with its [`Sampling`] and [`ImpulseColumns`] ([`Column`],
+//!   [`ColumnsInMemory`]).
+//! - **Modes.** [`SampledOscillator`] and [`OscillatorState`].
+//! - **Errors.** [`Error`] with the kinds of [`RecordingError`] ([`RecordingPart`]) and [`ModelError`].
+//!
 //! # Conventions
 //!
-//! - SI units. Frames stand in names: `world_from_body` maps body to world coordinates.
+//! - SI units. Names carry frames: `world_from_body` maps body to world coordinates.
 //! - The body frame has its origin at the centre of mass and the axes of the mesh file.
 //! - A force with index t is **held constant** over step t, and the displacement with index t is
 //!   the one at the **end** of that step. Elastic and rigid motion are sampled exactly for such
@@ -21,9 +39,14 @@
 //!   displacement in that frame, orthogonal to the rigid modes (paper, section 2.1).
 //!
 //! "The paper" is *A Study on Haptic Interaction and Simulation of Motion and Deformation of
-//! Elastic Object*; its equation numbers are given where they are used.
+//! Elastic Object*; the code cites its equation numbers.
 #![no_std]
 extern crate alloc;
+
+/// Compiles the README's program.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod collision;
 mod contact;
@@ -46,7 +69,7 @@ mod surface;
 pub use collision::{Collider, Grasp};
 pub use device::{Coupling, DeviceParameters};
 pub use energy::EnergyLedger;
-pub use error::Error;
+pub use error::{Error, ModelError, RecordingError, RecordingPart};
 pub use io::{ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, StepStatus};
 pub use motion::RigidIntegrator;
 pub use object::ObjectStart;

@@ -1,6 +1,6 @@
-//! Planes and rigid obstacles: shapes with a signed distance.
+//! Rigid obstacles: shapes with a signed distance [m].
 
-use crate::error::Error;
+use crate::error::{Error, ModelError};
 use crate::spatial::Pose;
 use crate::surface::{
     Bands, Bounds, DeformationBound, RigidNodes, SphereTree, Surface, area_normal, at_weights,
@@ -12,47 +12,47 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// A rigid thing that objects meet: fixed, or moved by the step's input.
+/// Rigid obstacle, fixed or moved by the step's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// Its shape, in its own frame.
+    /// Shape, in the obstacle's frame.
     pub shape: Shape,
-    /// Where it is at the start.
+    /// Placement at the start.
     pub pose: Pose,
-    /// Coulomb's coefficient against every object [1], not negative.
+    /// Coulomb's coefficient of friction against every object [1], not negative.
     pub friction: f64,
 }
 
-/// The shape of an obstacle.
+/// Shape of an obstacle.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// Everything on the side of the origin that the unit normal points away from.
+    /// Half-space through the origin, on the side opposite to the unit normal.
     Plane {
-        /// Out of the solid side.
+        /// Unit normal, out of the solid side.
         normal: DVec3,
     },
-    /// A ball about the origin.
+    /// Ball about the origin.
     Sphere {
-        /// [m]
+        /// Radius [m].
         radius: f64,
     },
-    /// A box about the origin.
+    /// Box about the origin.
     Box {
-        /// Half the lengths of its sides [m].
+        /// Half the side lengths [m].
         half_extents: DVec3,
     },
-    /// All points within a radius of a piece of the y axis.
+    /// Points within a radius of a segment of the y axis about the origin.
     Capsule {
-        /// [m]
+        /// Radius [m].
         radius: f64,
-        /// Half the length of that piece [m].
+        /// Half the length of the segment [m].
         half_length: f64,
     },
-    /// A closed triangle mesh.
+    /// Closed triangle mesh.
     Mesh(Arc<ObstacleMesh>),
 }
 
-/// A closed triangle mesh that does not deform.
+/// Closed triangle mesh that does not deform.
 #[derive(Debug, Clone)]
 pub struct ObstacleMesh {
     surface: Surface,
@@ -60,9 +60,9 @@ pub struct ObstacleMesh {
     bounds: Bounds,
     /// Angle-weighted normals of the nodes.
     normals: Vec<DVec3>,
-    /// The triangle that each node belongs to.
+    /// One triangle of each node, which owns it.
     owners: Vec<u32>,
-    /// Of the smallest sphere about the origin that holds it [m].
+    /// Radius of the bounding sphere about the origin [m].
     radius: f64,
 }
 
@@ -73,12 +73,12 @@ impl PartialEq for ObstacleMesh {
 }
 
 impl ObstacleMesh {
-    /// From nodes [m] and triangles, counter-clockwise seen from outside.
+    /// Mesh of nodes [m] and triangles, counter-clockwise seen from outside.
     ///
     /// # Errors
-    /// When a triangle names a node that does not exist or has no area, or the mesh is not closed.
+    /// [`ModelError::ObstacleMesh`] when a triangle has no area or a node that does not exist, or the mesh is not closed.
     pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
-        let fail = |what| Err(Error::Model(what));
+        let fail = |what| Err(ModelError::ObstacleMesh { what }.into());
         if triangles.is_empty() {
             return fail("an obstacle's mesh has no triangles".into());
         }
@@ -91,13 +91,13 @@ impl ObstacleMesh {
             if corners.iter().any(|&n| n as usize >= positions.len()) {
                 return fail(format!("triangle {t} of an obstacle's mesh names a node that does not exist"));
             }
-            let places = corners.map(|n| positions[n as usize]);
-            let normal = area_normal(places).normalize_or_zero();
+            let points = corners.map(|n| positions[n as usize]);
+            let normal = area_normal(points).normalize_or_zero();
             if normal == DVec3::ZERO {
                 return fail(format!("triangle {t} of an obstacle's mesh has no area"));
             }
             for k in 0..3 {
-                let (a, b, c) = (places[k], places[(k + 1) % 3], places[(k + 2) % 3]);
+                let (a, b, c) = (points[k], points[(k + 1) % 3], points[(k + 2) % 3]);
                 normals[corners[k] as usize] += normal * (b - a).angle_between(c - a);
                 edges.push((corners[k], corners[(k + 1) % 3]));
             }
@@ -121,51 +121,51 @@ impl ObstacleMesh {
         Ok(Self { surface, tree, bounds, normals, owners, radius })
     }
 
-    /// Its nodes and triangles.
+    /// Nodes and triangles.
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
 
-    /// Give the triangles in spheres (centre, radius) that `near` takes, with their corners.
+    /// Traverse the spheres (centre, radius) that `near` accepts; `found` takes triangles with their corners.
     fn traverse(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(u32, [DVec3; 3])) {
-        let place = |n: usize| self.surface.positions[n];
+        let position = |n: usize| self.surface.positions[n];
         self.tree.traverse(
             (&self.bounds, &DeformationBound::STILL),
             &mut RigidNodes(&self.surface),
             |_, _, centre, radius| near(centre, radius),
-            |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| place(n as usize))),
+            |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| position(n as usize))),
         );
     }
 
     fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
-        self.traverse(&near, |t, places| {
-            for (node, place) in self.surface.triangles[t as usize].into_iter().zip(places) {
-                // A node belongs to one of its triangles.
-                if self.owners[node as usize] == t && near(place, 0.0) {
-                    found(node as usize, place);
+        self.traverse(&near, |t, points| {
+            for (node, position) in self.surface.triangles[t as usize].into_iter().zip(points) {
+                // One of a node's triangles owns it.
+                if self.owners[node as usize] == t && near(position, 0.0) {
+                    found(node as usize, position);
                 }
             }
         });
     }
 
-    fn signed_distance(&self, p: DVec3, most: f64) -> Option<(f64, DVec3)> {
-        if p.length() - most > self.radius {
+    fn signed_distance(&self, p: DVec3, max_distance: f64) -> Option<(f64, DVec3)> {
+        if p.length() - max_distance > self.radius {
             return None;
         }
-        // However far: which side it is on counts. (least distance, nearest point, normal that tells the side).
+        // At any distance, since the sign counts: (least distance, nearest point, normal that decides the sign).
         let best = core::cell::Cell::new((f64::INFINITY, DVec3::ZERO, DVec3::ZERO));
         self.traverse(
             |centre, radius| (p - centre).length() - radius < best.get().0 + 1e-12,
-            |t, places| {
-                let weights = nearest_on_triangle(places, p);
-                let nearest = at_weights(places, weights);
+            |t, points| {
+                let weights = nearest_on_triangle(points, p);
+                let nearest = at_weights(points, weights);
                 let distance = (p - nearest).length();
                 let (least, at, side) = best.get();
                 let normal = match weights.iter().position(|w| *w > 1.0 - 1e-12) {
                     Some(corner) => self.normals[self.surface.triangles[t as usize][corner] as usize],
-                    None => area_normal(places).normalize_or_zero(),
+                    None => area_normal(points).normalize_or_zero(),
                 };
-                // Both triangles of an edge count for the side.
+                // Both triangles of an edge count for the sign.
                 let same = (nearest - at).length() <= 1e-9 * (1.0 + distance) && side != DVec3::ZERO;
                 if same {
                     best.set((least.min(distance), at, side + normal));
@@ -183,11 +183,11 @@ impl ObstacleMesh {
 }
 
 impl Shape {
-    /// Signed distance [m] of a point in the shape's frame, negative inside, and its direction of steepest growth.
-    /// None for a mesh when the point is outside and farther than `most`, or may be.
+    /// Signed distance [m] of a point in the shape's frame, negative inside, and its gradient [1].
+    /// None for a mesh when bounds leave it open that an outside point is farther than `max_distance` [m].
     ///
     /// # Real time
-    pub(crate) fn signed_distance(&self, p: DVec3, most: f64) -> Option<(f64, DVec3)> {
+    pub(crate) fn signed_distance(&self, p: DVec3, max_distance: f64) -> Option<(f64, DVec3)> {
         let from_core = |core: DVec3, radius: f64| {
             let away = p - core;
             let distance = away.length();
@@ -200,44 +200,44 @@ impl Shape {
                 from_core(DVec3::Y * p.y.clamp(-half_length, *half_length), *radius)
             }
             Self::Box { half_extents } => {
-                let half_space = p.abs() - *half_extents;
+                let excess = p.abs() - *half_extents;
                 let sign =
                     DVec3::new(libm::copysign(1.0, p.x), libm::copysign(1.0, p.y), libm::copysign(1.0, p.z));
-                let outside = half_space.max(DVec3::ZERO);
+                let outside = excess.max(DVec3::ZERO);
                 let distance = outside.length();
                 if distance > 0.0 {
                     (distance, outside / distance * sign)
                 } else {
-                    let axis = if half_space.x >= half_space.y && half_space.x >= half_space.z {
+                    let axis = if excess.x >= excess.y && excess.x >= excess.z {
                         DVec3::X
-                    } else if half_space.y >= half_space.z {
+                    } else if excess.y >= excess.z {
                         DVec3::Y
                     } else {
                         DVec3::Z
                     };
-                    (half_space.dot(axis), axis * sign)
+                    (excess.dot(axis), axis * sign)
                 }
             }
-            Self::Mesh(mesh) => return mesh.signed_distance(p, most),
+            Self::Mesh(mesh) => return mesh.signed_distance(p, max_distance),
         })
     }
 
-    /// Whether the middle of a triangle can come nearer to it than the corners, see [`Self::deepest`].
+    /// Whether a face of an object can penetrate deeper than its corners ([`Self::deepest`]).
     pub(crate) fn is_round(&self) -> bool {
         matches!(self, Self::Sphere { .. } | Self::Capsule { .. })
     }
 
-    /// Whether [`Self::corners`] has any to give.
+    /// Whether the shape has corners ([`Self::corners`]).
     pub(crate) fn has_corners(&self) -> bool {
         matches!(self, Self::Box { .. } | Self::Mesh(_))
     }
 
-    /// Weights of the point of a triangle that goes deepest into a round shape; those with corners meet the middle of
-    /// a triangle with these.
+    /// Barycentric weights of the deepest point of a triangle in a round shape; none for other shapes, which meet faces with
+    /// their corners.
     ///
     /// # Real time
     pub(crate) fn deepest(&self, corners: [DVec3; 3]) -> Option<[f64; 3]> {
-        // The nearest point of the middle: a point, or a piece of a line.
+        // Nearest point of the core: a point, or a segment.
         let core = |p: DVec3| match self {
             Self::Sphere { .. } => Some(DVec3::ZERO),
             Self::Capsule { half_length, .. } => Some(DVec3::Y * p.y.clamp(-half_length, *half_length)),
@@ -253,8 +253,8 @@ impl Shape {
         Some(weights)
     }
 
-    /// DeformationBound the corners of the shape that spheres (centre, radius) hold, where `near` takes these; all in the shape's
-    /// frame.
+    /// Corners of the shape, in its frame, in bounding spheres (centre, radius) that `near` accepts; passed to `found` with
+    /// their number.
     ///
     /// # Real time
     pub(crate) fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
@@ -273,7 +273,7 @@ impl Shape {
         }
     }
 
-    /// Size [m] of the shape: what moves farther in a step could miss it.
+    /// Size of the shape [m]: upper limit of a relative motion in a step that cannot pass through it.
     pub(crate) fn size(&self) -> f64 {
         match self {
             Self::Plane { .. } => f64::INFINITY,
@@ -283,7 +283,7 @@ impl Shape {
         }
     }
 
-    /// Radius [m] of a sphere about the origin that holds it.
+    /// Radius of the bounding sphere about the origin [m].
     pub fn radius(&self) -> f64 {
         match self {
             Self::Plane { .. } => f64::INFINITY,
@@ -296,9 +296,9 @@ impl Shape {
 }
 
 impl Obstacle {
-    /// Refuse numbers out of range.
-    pub(crate) fn check(&self, at: usize) -> Result<(), Error> {
-        let fail = |what| Err(Error::Model(format!("obstacle {at}: {what}")));
+    /// Check the ranges of all numbers.
+    pub(crate) fn check(&self, at: usize) -> Result<(), ModelError> {
+        let fail = |what| Err(ModelError::Obstacle { obstacle: at, what });
         let positive = |x: f64| x > 0.0 && x < 1e18;
         let unit = |length: f64| libm::fabs(length - 1.0) < 1e-9;
         if !(0.0..1e6).contains(&self.friction) {
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_grows_as_its_direction_says() {
+    fn distance_grows_along_its_gradient() {
         let shapes = [
             Shape::Plane { normal: DVec3::new(0.6, 0.8, 0.0) },
             Shape::Sphere { radius: 0.3 },

@@ -2,21 +2,22 @@
 
 use crate::collision::{Grasp, MAX_TIP_CONTACTS};
 use crate::device::DeviceParameters;
-use crate::error::Error;
+use crate::error::{Error, ModelError};
 use crate::motion::RigidIntegrator;
 use crate::object::{Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
 use crate::recording::Recording;
 use crate::response::ResponseForm;
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Rigid motion within the step as part of the compliance that a device feels.
+/// Rigid motion within the step as part of the contact compliance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RigidCompliance {
-    /// Equation (3) of the paper: held points are met exactly.
+    /// Equation (3) of the paper: held points follow exactly.
     #[default]
     Included,
     /// Equation (2) of the paper: neglected. Held points are off by about h²·f/m.
@@ -38,10 +39,11 @@ pub struct ModelParameters {
     pub devices: Vec<DeviceParameters>,
     /// Planes and rigid obstacles.
     pub obstacles: Vec<Obstacle>,
-    /// Most contact points of one object, 9·n² numbers of memory. HalfSpace it contacts are left out, and the status says so.
+    /// Upper limit of contact points of one object; memory of 9·n² numbers. Contacts beyond it are dropped, and counted in the
+    /// status.
     pub max_contact_points: usize,
     /// Upper limit of contact samples of an object against one obstacle or object. Where more surface nodes come near,
-    /// Poisson-disk samples stand for them, each with the patch around it.
+    /// Poisson-disk samples replace them, each with the patch around it.
     pub max_contact_samples: usize,
 }
 
@@ -61,7 +63,7 @@ impl Default for ModelParameters {
     }
 }
 
-/// An object to be put into a scene.
+/// Object to be put into a scene.
 #[derive(Debug, Clone)]
 pub struct ModelObject {
     /// Recording of the body.
@@ -70,11 +72,11 @@ pub struct ModelObject {
     pub response: ResponseForm,
     /// Placement and velocity at the start.
     pub start: ObjectStart,
-    /// Coulomb's coefficient against other objects [1]; between two, the geometric mean of theirs.
+    /// Coulomb's coefficient of friction against other objects [1]; of a pair, the geometric mean.
     pub friction: f64,
 }
 
-/// Lower limit of `max_contact_samples`: fewer do not carry a face.
+/// Lower limit of `max_contact_samples`: fewer do not support a face.
 const MIN_CONTACT_SAMPLES: usize = 8;
 
 /// Default coefficient of friction between objects [1]: rubber on wood.
@@ -95,23 +97,25 @@ pub struct Model {
 }
 
 impl Model {
-    /// Put recordings into a scene.
+    /// Model of a scene with objects.
     ///
     /// # Errors
-    /// When a number is out of its range; the text names it.
+    /// [`ModelError`] for a number out of its range, or an impulse response that does not fit.
     pub fn new(parameters: ModelParameters, objects: Vec<ModelObject>) -> Result<Self, Error> {
+        let fail = |name, what| Err(ModelError::Parameter { name, what }.into());
         let h = parameters.step_s;
         if !(h > 0.0 && h <= 1.0) {
-            return Err(Error::Model(format!("step is {h} s, expected above 0 and at most 1")));
+            return fail("step_s", format!("step is {h} s, expected above 0 and at most 1"));
         }
         if !parameters.gravity.is_finite() {
-            return Err(Error::Model(format!("gravity is {}, expected finite numbers", parameters.gravity)));
+            return fail("gravity", format!("gravity is {}, expected finite numbers", parameters.gravity));
         }
         if parameters.max_contact_samples < MIN_CONTACT_SAMPLES {
             let given = parameters.max_contact_samples;
-            return Err(Error::Model(format!(
-                "max_contact_samples is {given}, expected {MIN_CONTACT_SAMPLES} or more"
-            )));
+            return fail(
+                "max_contact_samples",
+                format!("max_contact_samples is {given}, expected {MIN_CONTACT_SAMPLES} or more"),
+            );
         }
         for (at, device) in parameters.devices.iter().enumerate() {
             device.check(at)?;
@@ -130,7 +134,7 @@ impl Model {
         let make = |(number, object): (usize, ModelObject)| {
             let ModelObject { recording, response, start, friction } = object;
             Object::new(recording, response, start, friction, rules)
-                .map_err(|what| Error::Model(format!("object {number}: {what}")))
+                .map_err(|error| ModelError::Object { object: number, error: Box::new(error) })
         };
         let objects: Result<Vec<Object>, _> = objects.into_iter().enumerate().map(make).collect();
         let mut objects = objects?;
@@ -154,7 +158,7 @@ impl Model {
         self.objects.iter().map(|object| &*object.body.recording)
     }
 
-    /// Whether object, triangle and weights of a grasp exist.
+    /// Whether object, triangle and weights of a grasp exist, and forces may enter there.
     pub(crate) fn accepts(&self, grasp: &Grasp) -> bool {
         self.objects.get(grasp.object).is_some_and(|object| {
             object.body.recording.surface.contains(&grasp.point) && object.response.accepts(&grasp.point)
@@ -163,18 +167,18 @@ impl Model {
 }
 
 impl ModelParameters {
-    /// Whether contact samples stand for nodes, in a scene of so many objects.
+    /// Whether contact samples replace nodes, by the number of objects.
     pub(crate) fn uses_samples(&self, objects: usize) -> bool {
         self.max_contact_samples < usize::MAX && self.touches_surfaces(objects)
     }
 
-    /// Whether objects, so many, meet obstacles or one another.
+    /// Whether surfaces come into contact with obstacles or one another, by the number of objects.
     fn touches_surfaces(&self, objects: usize) -> bool {
         !self.obstacles.is_empty() || objects > 1
     }
 
-    /// Room for the contact points of an object in a scene of so many: one held point and the tip contacts of every
-    /// device, and the surface nodes where surfaces meet, within `max_contact_points`.
+    /// Capacity of contact points of an object, by the number of objects: one held point and the tip contacts of every device,
+    /// and the surface nodes where surfaces meet, within `max_contact_points`.
     pub(crate) fn point_capacity(&self, object: &Object, objects: usize) -> usize {
         let devices = self.devices.len();
         if !object.is_touchable() {

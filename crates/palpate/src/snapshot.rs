@@ -1,4 +1,4 @@
-//! Snapshot of an object's deformation, from which another thread makes its surface (paper, section 3.2).
+//! Snapshot of an object's deformation, from which another thread computes its surface (paper, section 3.2).
 
 use crate::object::Object;
 use crate::response::{DeformationData, ResidualFields};
@@ -8,7 +8,7 @@ use crate::state::State;
 use glam::DVec3;
 
 /// Pose and deformation of an object at the end of a step: modal coordinates and contact forces, a few hundred numbers, from
-/// which another thread makes the whole surface. With a table, the forces of the last T steps.
+/// which another thread computes the whole surface. With a table, the forces of the last T steps.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), palpate::Error> {
@@ -94,7 +94,7 @@ impl DeformationSnapshot {
         self.data.surface_displacement(object, gravity, &mut cache.0, out);
     }
 
-    /// The object, and gravity in its body axes [m/s²].
+    /// Object, and gravity in its body axes [m/s²].
     fn object_and_gravity<'m>(&self, model: &'m Model, out: &[DVec3]) -> (&'m Object, DVec3) {
         let object: &Object = &model.objects[self.object];
         assert_eq!(out.len(), object.body.recording.surface.positions.len(), "one entry per surface node");
@@ -104,7 +104,7 @@ impl DeformationSnapshot {
 
 impl State {
     /// Elastic displacement of every surface node of an object at the end of the last step [m, body]. Costs nodes × modes, with
-    /// a table nodes × forces of the last T steps: for pictures, not for the force.
+    /// a table nodes × forces of the last T steps: for rendering, not for the force.
     ///
     /// # Panics
     /// When `out` does not have one entry per surface node.

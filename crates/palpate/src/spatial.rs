@@ -1,37 +1,37 @@
-//! Rigid placement and velocity, with frames in names.
+//! Pose and velocity of rigid frames.
 //!
 //! The rotation of one step is the Cayley map of a vector v (rotation axis times twice the
 //! tangent of half the angle), cay(v) = (I − v̂/2)⁻¹ (I + v̂/2). As a quaternion it is (1, v/2)
 //! normalised, and for every vector a it satisfies, exactly,
-//! cay(v)·a − a = v × (cay(v)·a + a)/2. The energy balance of a turning body rests on this.
+//! cay(v)·a − a = v × (cay(v)·a + a)/2. The energy balance of a turning body follows from this identity.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// Placement of a body frame in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Origin of the body frame, which is the centre of mass [m, world].
+    /// Origin of the body frame, the centre of mass [m, world].
     pub position: DVec3,
     /// Rotation from body to world, a unit quaternion.
     pub orientation: DQuat,
 }
 
 impl Pose {
-    /// The body frame on the world frame.
+    /// Body frame equal to the world frame.
     pub const IDENTITY: Self = Self { position: DVec3::ZERO, orientation: DQuat::IDENTITY };
 
-    /// A body point [m, body] in the world [m, world].
+    /// World position [m, world] of a body point [m, body].
     pub fn world_from_body(&self, point_in_body: DVec3) -> DVec3 {
         self.position + self.orientation * point_in_body
     }
 
-    /// A world point [m, world] in the body frame [m, body].
+    /// Body position [m, body] of a world point [m, world].
     pub fn body_from_world(&self, point_in_world: DVec3) -> DVec3 {
         self.orientation.inverse() * (point_in_world - self.position)
     }
 
-    /// Map from this frame to another; cheaper for many points than by way of the world.
-    pub(crate) fn seen_from(&self, other: &Self) -> DAffine3 {
+    /// Affine map from this frame to another: for many points cheaper than over the world frame.
+    pub(crate) fn relative_to(&self, other: &Self) -> DAffine3 {
         let rotation = DMat3::from_quat(other.orientation.inverse() * self.orientation);
         DAffine3::from_mat3_translation(rotation, other.body_from_world(self.position))
     }
@@ -52,16 +52,16 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// At rest.
+    /// Twist of a body at rest.
     pub const ZERO: Self = Self { linear: DVec3::ZERO, angular: DVec3::ZERO };
 }
 
-/// Rotation cay(v) of the module's equation, for v [rad] = step times mean angular velocity.
+/// Rotation cay(v), for v [rad], step times mean angular velocity: the unit quaternion along (1, v/2).
 pub fn cayley(v: DVec3) -> DQuat {
     DQuat::from_xyzw(0.5 * v.x, 0.5 * v.y, 0.5 * v.z, 1.0).normalize()
 }
 
-/// Matrix v̂ with v̂·a = v × a.
+/// Cross-product matrix v̂, with v̂·a = v × a.
 pub(crate) fn cross_matrix(v: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
 }

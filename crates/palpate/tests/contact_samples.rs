@@ -1,5 +1,5 @@
-//! Faces that meet obstacles at fewer places than they have nodes, on a released sample with a finer surface (a block of
-//! 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
+//! Contact samples: faces against obstacles at fewer contacts than nodes, on a released recording with a refined surface
+//! (a block of 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
 
 mod refined;
 
@@ -40,14 +40,14 @@ fn at(position: DVec3) -> Pose {
     Pose { position, ..Pose::IDENTITY }
 }
 
-/// What a ledger lacks to be closed [J].
+/// Imbalance of the energy ledger since the start [J].
 fn open(output: &Output, start: f64) -> f64 {
     let e = &output.energy;
     e.stored() - start - (e.input - e.lost())
 }
 
 #[test]
-fn a_block_lies_on_few_places_as_on_all_its_nodes() {
+fn block_rests_on_contact_samples_as_on_all_nodes() {
     let recording = block();
     let weight = recording.mass() * 9.81;
     for most in [usize::MAX, 24, 12] {
@@ -62,7 +62,7 @@ fn a_block_lies_on_few_places_as_on_all_its_nodes() {
         }
         let output = state.output();
         assert!((force - DVec3::Y * weight).length() < 1e-3 * weight, "{most}: {force}");
-        // It stands on its corners, too.
+        // Its corners are among the contacts.
         let pose = output.objects[0].pose;
         let outmost = |side: f64| {
             output.contacts.iter().map(|c| side * (c.point.x - pose.position.x)).fold(0.0, f64::max)
@@ -73,7 +73,7 @@ fn a_block_lies_on_few_places_as_on_all_its_nodes() {
 }
 
 #[test]
-fn places_carry_the_change_of_momentum_and_take_what_gets_lost() {
+fn contact_samples_carry_the_change_of_momentum_and_dissipate_the_lost_energy() {
     let recording = block();
     let mass = recording.mass();
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 0.3, 0.8);
@@ -105,7 +105,7 @@ fn places_carry_the_change_of_momentum_and_take_what_gets_lost() {
 }
 
 #[test]
-fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
+fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
     let recording = block();
     let shapes = [
         Shape::Sphere { radius: 0.3 },
@@ -129,13 +129,13 @@ fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
     for number in 0..12_000_u32 {
         let t = f64::from(number) * H;
         let centre = state.output().objects[0].pose.position;
-        // They come from all sides, press, and go, one after the other and sometimes two.
+        // Obstacles approach from all sides, press and retreat, one or two at a time.
         let obstacles = (0..4).map(|k| {
             let phase = t * (1.1 + 0.37 * f64::from(k)) + f64::from(k);
-            let way = DVec3::new((3.1 * phase).sin(), (2.3 * phase).cos(), (1.7 * phase).sin());
-            let far = [0.36, 0.09, 0.12, 0.1][k as usize] + 0.06 * (5.0 * phase).sin().max(-0.4);
-            let orientation = DQuat::from_rotation_arc(DVec3::Y, way.normalize());
-            Pose { position: centre + way.normalize() * far, orientation }
+            let direction = DVec3::new((3.1 * phase).sin(), (2.3 * phase).cos(), (1.7 * phase).sin());
+            let distance = [0.36, 0.09, 0.12, 0.1][k as usize] + 0.06 * (5.0 * phase).sin().max(-0.4);
+            let orientation = DQuat::from_rotation_arc(DVec3::Y, direction.normalize());
+            Pose { position: centre + direction.normalize() * distance, orientation }
         });
         let device = DeviceInput::touching(centre + DVec3::new(0.1 * (7.0 * t).sin(), 0.11, 0.0));
         let input = Input { obstacles: obstacles.collect(), devices: vec![device] };
@@ -144,8 +144,8 @@ fn obstacles_of_every_size_get_no_energy_out_of_few_places() {
         assert!(energy.stored() <= energy.input + 1e-9 * (1.0 + energy.input.abs()), "{number}: {energy:?}");
         assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
         for (k, most) in most.iter_mut().enumerate() {
-            let its = |c: &&palpate::ContactOutput| c.against == palpate::Collider::Obstacle(k);
-            *most = (*most).max(output.contacts.iter().filter(its).count());
+            let is_its = |c: &&palpate::ContactOutput| c.against == palpate::Collider::Obstacle(k);
+            *most = (*most).max(output.contacts.iter().filter(is_its).count());
         }
     }
     assert!(most.iter().all(|most| *most > 0), "{most:?}");

@@ -1,5 +1,5 @@
-//! Two objects that meet at fewer places than they have nodes, on a released sample with a finer surface (a block of
-//! 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
+//! Contact samples: two objects in contact at fewer points than nodes, on a released recording with a refined surface
+//! (a block of 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
 
 mod refined;
 
@@ -42,7 +42,7 @@ fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     }
 }
 
-/// What a ledger lacks to be closed [J].
+/// Imbalance of the energy ledger since the start [J].
 fn open(output: &Output, start: f64) -> f64 {
     let e = &output.energy;
     e.stored() - start - (e.input - e.lost())
@@ -53,7 +53,7 @@ fn between_objects(output: &Output) -> impl Iterator<Item = &palpate::ContactOut
 }
 
 #[test]
-fn pairs_push_each_other_alike_and_take_what_gets_lost() {
+fn pairs_have_opposite_forces_and_dissipate_the_lost_energy() {
     let body = block();
     let mass = body.mass();
     let tilted = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.2, 0.1);
@@ -81,7 +81,7 @@ fn pairs_push_each_other_alike_and_take_what_gets_lost() {
             for contact in &output.contacts {
                 let normal = contact.force.dot(-contact.normal);
                 let across = (contact.force + contact.normal * normal).length();
-                // What is met in part, as two whole faces that hit each other, may be beyond it.
+                // Scaled fallback solutions, of two whole faces that collide, may leave the cone.
                 let in_the_cone = normal > -1e-12 && across <= 0.5 * normal + 1e-12;
                 assert!(in_the_cone || output.status.unsolved_islands > 0, "{number}: {normal} {across}");
             }
@@ -99,8 +99,8 @@ fn pairs_push_each_other_alike_and_take_what_gets_lost() {
 }
 
 #[test]
-fn a_stack_stands_on_few_places() {
-    // How far it sags, against all nodes, is measured on a finer body: `palpate verify places`.
+fn stack_stands_on_contact_samples() {
+    // The sag against all nodes is measured on a finer body: `palpate verify places`.
     let body = block();
     let weight = body.mass() * 9.81;
     for most in [ALL, 24, 12] {
@@ -120,17 +120,17 @@ fn a_stack_stands_on_few_places() {
         assert!((carried - DVec3::Y * weight).length() < 5e-3 * weight, "{most}: {carried}");
         let count = between_objects(output).count();
         assert!((most == ALL) == (count > 24) && count <= most, "{most}: {count}");
-        // The upper one stands on its corners, too.
+        // Corners of the upper block are among the contacts.
         let outmost = between_objects(output).map(|c| c.point.x).fold(0.0, f64::max);
         assert!(outmost > 0.099, "{most}: {outmost}");
     }
 }
 
 #[test]
-fn a_block_that_overhangs_falls_where_it_does_by_all_nodes() {
+fn overhanging_block_tips_over_as_with_all_nodes() {
     let body = block();
     for most in [ALL, 24, 12] {
-        // Its centre of mass is over the other up to half of its length.
+        // Its centre of mass is above the other block up to half of its length.
         for (overhang, falls) in [(0.6, false), (1.1, true)] {
             let lower = at(DVec3::Y * HALF.y);
             let upper = at(DVec3::new(2.0 * HALF.x * 0.5 * overhang, 3.0 * HALF.y, 0.0));
@@ -145,8 +145,8 @@ fn a_block_that_overhangs_falls_where_it_does_by_all_nodes() {
 }
 
 #[test]
-fn few_nodes_are_no_fewer_places() {
-    // A corner on a face: it has a few nodes near, which stand for themselves.
+fn few_nodes_in_contact_are_not_subsampled() {
+    // A corner on a face: few nodes are near, and all of them are contacts.
     let body = block();
     let corner = DQuat::from_rotation_arc(HALF.normalize(), -DVec3::Y);
     let run = |max_contact_samples: usize| {
@@ -160,7 +160,7 @@ fn few_nodes_are_no_fewer_places() {
             .collect::<Vec<f64>>()
     };
     let (ours, theirs) = (run(24), run(ALL));
-    assert!(theirs.iter().any(|force| *force != 0.0), "they meet");
+    assert!(theirs.iter().any(|force| *force != 0.0), "they are in contact");
     // Both are solved to round-off: fewer than 24 contacts.
     for (number, (a, b)) in ours.iter().zip(&theirs).enumerate() {
         assert!((a - b).abs() < 1e-9, "step {number}: {a} {b}");

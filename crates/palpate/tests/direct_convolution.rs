@@ -1,4 +1,4 @@
-//! Direct convolution of a recorded table: the same forces as the modal form, whatever the contacts do.
+//! Direct convolution of a recorded table: forces equal to those of the modal form, for any contacts.
 
 use glam::DVec3;
 use palpate::{
@@ -26,11 +26,11 @@ fn fixed() -> Arc<Recording> {
 fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
     let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
     let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
-    // For each sample the answers of all modes.
+    // Responses of all modes at each sample.
     let mut oscillators: Vec<(SampledOscillator, OscillatorState)> = pairs
         .map(|(&omega, &zeta)| (SampledOscillator::new(omega, zeta, step_s), OscillatorState::default()))
         .collect();
-    let answers: Vec<Vec<f64>> = (0..samples)
+    let responses: Vec<Vec<f64>> = (0..samples)
         .map(|s| {
             let advance = |(oscillator, state): &mut (SampledOscillator, OscillatorState)| {
                 *state = oscillator.advance(*state, if s == 0 { 1.0 } else { 0.0 });
@@ -40,13 +40,13 @@ fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse 
         })
         .collect();
     let row = |dof: usize| recording.modes.row(dof / 3, dof % 3);
-    // Responses to modal forces, with a displacement that is there in the first sample only.
-    let respond = |forces: &[f64], still: &dyn Fn(usize) -> f64| -> Vec<f64> {
+    // Column under modal forces, with an additional displacement in the first sample.
+    let respond = |forces: &[f64], instantaneous: &dyn Fn(usize) -> f64| -> Vec<f64> {
         let mut column = Vec::with_capacity(samples * dofs);
-        for (s, answers) in answers.iter().enumerate() {
+        for (s, responses) in responses.iter().enumerate() {
             for i in 0..dofs {
-                let modal: f64 = (0..m).map(|k| row(i)[k] * answers[k] * forces[k]).sum();
-                column.push(if s == 0 { modal + still(i) } else { modal });
+                let modal: f64 = (0..m).map(|k| row(i)[k] * responses[k] * forces[k]).sum();
+                column.push(if s == 0 { modal + instantaneous(i) } else { modal });
             }
         }
         column
@@ -96,8 +96,8 @@ fn points(recording: &Recording) -> Vec<SurfacePoint> {
     all.filter(|point| recording.is_movable(point)).collect()
 }
 
-/// Largest difference of forces and of surface displacements between the two forms, as shares of the largest,
-/// with two hands that do what `grasps` says.
+/// Largest relative difference of forces and of surface displacements between the two forms [1], with two hands whose grasps
+/// at each step `grasps` gives.
 fn differences(
     recording: &Arc<Recording>,
     samples: usize,
@@ -117,7 +117,7 @@ fn differences(
     for number in 0..steps {
         let t = number as f64 * H;
         let devices = grasps(number).into_iter().enumerate().map(|(device, point)| {
-            // Hands sway about where the points of the moving body are.
+            // Hands sway about the points of the moving body.
             let pose = scenes[0].1.output().objects[0].pose;
             let sway =
                 3e-4 * DVec3::new((40.0 * t).sin(), (70.0 * t).cos(), (25.0 * t + device as f64).sin());
@@ -147,11 +147,11 @@ fn differences(
     (worst[0] / largest[0], worst[1] / largest[1])
 }
 
-/// Sums of a few hundred terms, in another order, and a solution of a system with condition below 1e3.
+/// Relative round-off of sums of a few hundred terms in another order, and of a system with condition below 1e3 [1].
 const ROUND_OFF: f64 = 1e-11;
 
 #[test]
-fn forces_and_shapes_are_those_of_the_modal_form() {
+fn forces_and_displacements_equal_those_of_the_modal_form() {
     let recording = free();
     let held = points(&recording);
     let (force, shape) =
@@ -159,15 +159,14 @@ fn forces_and_shapes_are_those_of_the_modal_form() {
     assert!(force < ROUND_OFF && shape < ROUND_OFF, "{force:e} {shape:e}");
 }
 
-/// The same, where every step pulls two new points to where hands are: round-off comes back enlarged, step after step.
+/// Relative round-off where every step brings new points to the hands: it is fed back and amplified [1].
 const FED_BACK: f64 = 1e-9;
 
 #[test]
-fn contacts_come_go_and_wander_while_the_history_remembers_them() {
+fn history_holds_contacts_that_appear_vanish_and_move() {
     let recording = free();
     let held = points(&recording);
-    // Every second step another point, more points than the history has room to copy series for; the second hand lets
-    // go now and then.
+    // Another point every second step, more points than copies of series; the second hand releases its point at times.
     let (force, shape) = differences(&recording, 300, 300, DVec3::ZERO, |number| {
         let first = held[(number / 2 * 7) % held.len()];
         let second = held[(number / 40 * 5 + 3) % held.len()];
@@ -188,7 +187,7 @@ fn a_body_with_fixed_nodes_sags_under_gravity_as_in_modal_form() {
 }
 
 #[test]
-fn what_lies_more_than_the_window_back_is_forgotten() {
+fn forces_older_than_the_window_have_no_effect() {
     let recording = free();
     let held = points(&recording);
     let samples = 20;
@@ -212,7 +211,7 @@ fn what_lies_more_than_the_window_back_is_forgotten() {
 }
 
 #[test]
-fn the_energy_that_hands_gave_is_in_motion_and_deformation() {
+fn work_of_hands_is_stored_in_motion_and_deformation() {
     let recording = free();
     let held = points(&recording);
     let form = ResponseForm::Fir(Arc::new(table(&recording, 200, H)));
@@ -268,10 +267,10 @@ fn tables_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn a_point_that_is_not_touchable_can_not_be_held() {
+fn untouchable_point_cannot_be_held() {
     let recording = free();
     let mut table = table(&recording, 5, H);
-    // The first node's columns are named as another's.
+    // The first node's first column belongs to another degree of freedom.
     table.touchable_dofs[0] = u32::MAX;
     let node = recording.surface.triangles.iter().position(|t| t.contains(&0)).expect("a triangle") as u32;
     let point = SurfacePoint { triangle: node, weights: [1.0 / 3.0; 3] };

@@ -1,4 +1,4 @@
-//! Held points: what a step must do, on the released sample recordings.
+//! Held points: constraint, momentum and energy, on the released recordings.
 
 use glam::DVec3;
 use palpate::{
@@ -34,18 +34,18 @@ fn parameters(devices: usize) -> ModelParameters {
     ModelParameters { devices: vec![DeviceParameters::default(); devices], ..ModelParameters::default() }
 }
 
-/// Run with one hand on a path; `see` looks at every output.
+/// Run with one hand on a path; `observe` takes every output.
 fn follow(
     model: &Model,
     state: &mut State,
     grasp: Grasp,
     steps: usize,
     path: impl Fn(f64) -> DVec3,
-    mut see: impl FnMut(&Output),
+    mut observe: impl FnMut(&Output),
 ) {
     for number in 1..=steps {
         let position = path(number as f64 * H);
-        see(step(
+        observe(step(
             model,
             state,
             &Input { devices: vec![DeviceInput::held(position, grasp)], ..Input::default() },
@@ -54,22 +54,22 @@ fn follow(
 }
 
 #[test]
-fn a_held_point_is_at_the_hand_at_the_end_of_every_step() {
+fn held_point_is_at_the_hand_at_the_end_of_every_step() {
     let (model, mut state) = one(free(), parameters(1));
     let rest = free().surface.rest_position(&grasp(0, 3).point);
     let path = |t: f64| rest + DVec3::new(0.02 * (9.0 * t).sin(), 0.01 * (25.0 * t).sin(), -0.1 * t * t);
     let mut number = 0;
     follow(&model, &mut state, grasp(0, 3), 1500, path, |output| {
         number += 1;
-        let miss = (output.devices[0].proxy - path(f64::from(number) * H)).length();
+        let error = (output.devices[0].proxy - path(f64::from(number) * H)).length();
         // Eight roundings of coordinates below one metre.
-        assert!(miss < 2e-15, "step {number}: {miss}");
+        assert!(error < 2e-15, "step {number}: {error}");
         assert_eq!(output.status.unsolved_islands, 0);
     });
 }
 
 #[test]
-fn what_the_hands_give_is_the_momentum_that_the_object_has() {
+fn impulse_of_the_hand_is_the_momentum_of_the_object() {
     let recording = free();
     let (model, mut state) = one(recording.clone(), parameters(1));
     let rest = recording.surface.rest_position(&grasp(0, 7).point);
@@ -81,7 +81,7 @@ fn what_the_hands_give_is_the_momentum_that_the_object_has() {
         let force = -output.devices[0].force_on_hand;
         let hand = path(f64::from(number) * H);
         given += force * H;
-        // About the world's origin the force acts where the hand is in the middle of the step.
+        // Moment about the world's origin: the force acts at the hand's position in the middle of the step.
         turning += (0.5 * (before + hand)).cross(force) * H;
         before = hand;
     });
@@ -113,7 +113,7 @@ fn the_energy_balance_closes_in_every_step_while_the_body_turns() {
 }
 
 #[test]
-fn a_fixed_body_sags_to_its_static_shape_and_its_point_then_needs_no_force() {
+fn fixed_body_sags_to_its_static_shape_which_needs_no_force_at_the_hand() {
     let recording = fixed();
     let gravity = DVec3::new(0.0, -9.81, 2.0);
     let (model, mut state) = one(recording.clone(), ModelParameters { gravity, ..parameters(1) });
@@ -123,7 +123,7 @@ fn a_fixed_body_sags_to_its_static_shape_and_its_point_then_needs_no_force() {
     });
     let mut sag = vec![DVec3::ZERO; recording.surface.positions.len()];
     state.surface_displacement(&model, 0, &mut sag);
-    // The second route: Φ·Λ⁻¹·p + residual, without time.
+    // Second route: Φ·Λ⁻¹·p + residual, without time integration.
     let response = recording.gravity.as_ref().expect("a fixed body");
     let m = recording.modes.len();
     for (node, moved) in sag.iter().enumerate() {
@@ -134,7 +134,7 @@ fn a_fixed_body_sags_to_its_static_shape_and_its_point_then_needs_no_force() {
             expected +=
                 DVec3::new(0.0, 1.0, 2.0).map(|axis| recording.modes.row(node, axis as usize)[mode]) * q;
         }
-        // What is left of the swing after 60 s, and round-off.
+        // Remaining vibration after 60 s, and round-off.
         assert!(
             (*moved - expected).length() < 1e-9 * sag[0].length().max(1e-3),
             "{node}: {moved} {expected}"
@@ -152,7 +152,7 @@ fn a_fixed_body_sags_to_its_static_shape_and_its_point_then_needs_no_force() {
 }
 
 #[test]
-fn a_hand_that_is_no_number_lets_go_and_the_rest_goes_on() {
+fn hand_at_nan_is_rejected_and_the_others_act() {
     let (model, mut state) = one(free(), parameters(2));
     let rest = |triangle| free().surface.rest_position(&grasp(0, triangle).point);
     let hold = |triangle, position| DeviceInput::held(position, grasp(0, triangle));
@@ -165,7 +165,7 @@ fn a_hand_that_is_no_number_lets_go_and_the_rest_goes_on() {
 }
 
 #[test]
-fn a_hand_that_jumps_too_far_gets_no_force_and_the_state_stays_sound() {
+fn hand_that_jumps_too_far_gets_no_force_and_the_state_stays_finite() {
     let (model, mut state) = one(free(), parameters(1));
     let rest = free().surface.rest_position(&grasp(0, 3).point);
     let hold =
@@ -180,7 +180,7 @@ fn a_hand_that_jumps_too_far_gets_no_force_and_the_state_stays_sound() {
 }
 
 #[test]
-fn two_hands_on_one_point_share_it_without_a_singular_force() {
+fn two_hands_on_one_point_give_dependent_rows_and_finite_forces() {
     let (model, mut state) = one(free(), parameters(2));
     let hand = DeviceInput {
         position: free().surface.rest_position(&grasp(0, 3).point) + DVec3::X * 1e-3,
@@ -193,7 +193,7 @@ fn two_hands_on_one_point_share_it_without_a_singular_force() {
 }
 
 #[test]
-fn the_same_inputs_give_the_same_bits() {
+fn equal_inputs_give_equal_bits() {
     let run = || {
         let (model, mut state) = one(free(), parameters(1));
         let rest = free().surface.rest_position(&grasp(0, 3).point);
@@ -208,7 +208,7 @@ fn the_same_inputs_give_the_same_bits() {
 }
 
 #[test]
-fn without_rigid_compliance_the_point_is_missed_by_half_h_squared_times_the_mobility() {
+fn without_rigid_compliance_the_residual_is_half_h_squared_times_the_mobility() {
     let recording = free();
     let dropped = ModelParameters { rigid_compliance: RigidCompliance::Dropped, ..parameters(1) };
     let (model, mut state) = one(recording.clone(), dropped);
@@ -217,12 +217,15 @@ fn without_rigid_compliance_the_point_is_missed_by_half_h_squared_times_the_mobi
     let input = Input { devices: vec![DeviceInput::held(hand, grasp(0, 3))], ..Input::default() };
     let output = step(&model, &mut state, &input);
     let force = -output.devices[0].force_on_hand;
-    let miss = output.devices[0].proxy - hand;
+    let residual = output.devices[0].proxy - hand;
     let linear = force * (0.5 * H * H / recording.mass());
     let spin = recording.inertia().inverse() * rest.cross(force) * (0.5 * H * H);
     // First order in the small displacement.
-    assert!((miss - linear - spin.cross(rest)).length() < 1e-2 * miss.length(), "{miss} {linear}");
-    assert!(miss.length() > 1e-9, "{miss}");
+    assert!(
+        (residual - linear - spin.cross(rest)).length() < 1e-2 * residual.length(),
+        "{residual} {linear}"
+    );
+    assert!(residual.length() > 1e-9, "{residual}");
 }
 
 #[test]
@@ -237,13 +240,13 @@ fn the_papers_update_gives_momentum_but_not_the_exact_energy() {
     let output = state.output();
     let momentum = output.objects[0].twist.linear * recording.mass();
     assert!((momentum - given).length() < 1e-13, "{momentum} {given}");
-    // Semi-implicit Euler: the defect is there, first order in the step, and is shown.
+    // Semi-implicit Euler: the ledger reports a defect of first order in the step.
     let share = output.energy.defect.abs() / output.energy.input.abs();
     assert!((1e-6..0.1).contains(&share), "{share}");
 }
 
 #[test]
-fn models_with_impossible_numbers_are_refused() {
+fn parameters_out_of_range_are_refused() {
     let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let refused = |parameters: ModelParameters, recording, start| {
         Model::new(parameters, vec![ModelObject::new(recording, start)])

@@ -1,12 +1,14 @@
-//! The README's program is the example, and prints what the README says.
+//! READMEs of the repository and of the crate: their program is the example `hold`, and prints the stated number.
 
 const README: &str = include_str!("../../../README.md");
+const CRATE_README: &str = include_str!("../README.md");
 
 #[test]
 fn the_readme_shows_the_example_as_it_is() {
     let example = include_str!("../examples/hold.rs");
     let (_, program) = example.split_once("\n\n").expect("a doc comment, then the program");
     assert!(README.contains(program.trim()), "README.md and examples/hold.rs differ");
+    assert!(CRATE_README.contains(program.trim()), "crates/palpate/README.md and examples/hold.rs differ");
 }
 
 #[test]
@@ -19,5 +21,7 @@ fn the_program_prints_the_number_in_the_readme() {
         .expect("cargo runs, since it runs this test");
     let printed = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(README.contains(&format!("prints `{}`", printed.trim())), "it prints {printed}");
+    for readme in [README, CRATE_README] {
+        assert!(readme.contains(&format!("prints `{}`", printed.trim())), "it prints {printed}");
+    }
 }

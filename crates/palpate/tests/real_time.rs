@@ -1,4 +1,4 @@
-//! A step allocates nothing, whatever the hands do.
+//! Real time: a step allocates nothing, for any input.
 
 mod refined;
 
@@ -47,7 +47,7 @@ fn recording(bytes: &[u8]) -> Arc<Recording> {
     Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
 }
 
-/// A table in which every node answers for itself alone: R[s] falls off over 50 samples.
+/// Table without coupling between nodes, with R[s] that decays over 50 samples.
 fn table(recording: &Recording) -> ImpulseResponse {
     let (dofs, samples) = (3 * recording.surface.positions.len(), 50);
     let mut values = vec![0.0; dofs * samples * dofs];
@@ -68,7 +68,7 @@ fn table(recording: &Recording) -> ImpulseResponse {
 }
 
 #[test]
-fn a_step_makes_no_allocation() {
+fn step_makes_no_allocation() {
     let free = recording(include_bytes!("../../../data/recordings/v1/free.palp"));
     let fixed = recording(include_bytes!("../../../data/recordings/v1/fixed.palp"));
     let start =
@@ -94,7 +94,7 @@ fn a_step_makes_no_allocation() {
 
     let before = ALLOCATIONS.get();
     for number in 0..200_u32 {
-        // New grasps, old ones, none, one that does not exist, one on the same point, a hand that is no number.
+        // New and lasting grasps, none, one that does not exist, two on one point, a position that is not finite.
         for (device, entry) in input.devices.iter_mut().enumerate() {
             let device = device as u32;
             entry.mode = match (number / 7 + device) % 7 {
@@ -117,7 +117,7 @@ fn a_step_makes_no_allocation() {
     }
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 200 steps");
 
-    // Tips, a floor, a ball that moves, two objects on one another.
+    // Tips, a floor, a moving ball, two objects on one another.
     let finger = DeviceParameters {
         tip_radius: 0.004,
         patch_radius: 0.02,
@@ -141,7 +141,7 @@ fn a_step_makes_no_allocation() {
     let finer = Arc::new(refined(&free, 3));
     let objects = [0.08, 0.2].map(|y| ModelObject::new(finer.clone(), lying(y)));
     let parameters = ModelParameters { max_contact_samples: 12, ..parameters };
-    touch(&Model::new(parameters, objects.to_vec()).expect("a good model"), "at few places");
+    touch(&Model::new(parameters, objects.to_vec()).expect("a good model"), "with contact samples");
 }
 
 /// Two fingers press the second of two objects that lie on one another while a ball comes.
@@ -162,7 +162,7 @@ fn touch(model: &Model, what: &str) {
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 600 steps {what}");
     assert!(most > 5, "{most} contacts at once");
 
-    // The counter counts.
+    // The counter works: the boxed probe is counted.
     let probe = Box::new(0_u64);
     assert!(ALLOCATIONS.get() > before, "{probe}");
 }

@@ -1,6 +1,6 @@
-//! Recording files: every released one stays readable, every damaged one is refused.
+//! Recording files: every released one is readable, every damaged one is refused with its kind of error.
 
-use palpate::Recording;
+use palpate::{Error, Recording, RecordingError, RecordingPart};
 
 const FREE: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
 const FIXED: &[u8] = include_bytes!("../../../data/recordings/v1/fixed.palp");
@@ -16,7 +16,7 @@ fn files_of_version_1_are_read_and_written_back_to_the_same_bytes() {
 }
 
 #[test]
-fn files_of_version_1_mean_what_they_meant() {
+fn content_of_version_1_files_is_unchanged() {
     let free = Recording::from_bytes(FREE).expect("a released recording");
     assert_eq!((free.surface.positions.len(), free.surface.triangles.len(), free.modes.len()), (12, 20, 12));
     // 0.2 × 0.1 × 0.1 m at 110 kg/m³.
@@ -26,14 +26,14 @@ fn files_of_version_1_mean_what_they_meant() {
 }
 
 #[test]
-fn a_file_cut_anywhere_is_refused() {
+fn truncated_file_is_refused() {
     for length in 0..FREE.len() {
         assert!(Recording::from_bytes(&FREE[..length]).is_err(), "cut to {length} bytes");
     }
 }
 
 #[test]
-fn a_changed_byte_anywhere_is_refused() {
+fn changed_byte_is_refused() {
     let mut bytes = FREE.to_vec();
     for at in 0..bytes.len() {
         bytes[at] ^= 0x11;
@@ -44,13 +44,13 @@ fn a_changed_byte_anywhere_is_refused() {
 }
 
 #[test]
-fn errors_say_what_is_wrong() {
+fn errors_have_a_kind_and_a_text() {
     let text = |bytes: &[u8]| Recording::from_bytes(bytes).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(
         text(b"").starts_with("not a usable recording: the file is damaged, truncated or of another kind")
     );
     assert!(text(b"step = 0.001\n[[object]]\n").contains("damaged, truncated or of another kind"));
-    // A header length far beyond the file must not be believed.
+    // A header length far beyond the file's size.
     let mut hostile = u64::MAX.to_le_bytes().to_vec();
     hostile.extend_from_slice(&FREE[8..]);
     assert!(text(&hostile).contains("damaged, truncated or of another kind"));
@@ -64,6 +64,20 @@ fn errors_say_what_is_wrong() {
         FREE.windows(pattern.len()).position(|w| w == pattern).expect("the version stands in the header");
     let mut newer = FREE.to_vec();
     newer[at + pattern.len() - 2] = b'9';
+    let kind = |bytes: &[u8]| match Recording::from_bytes(bytes) {
+        Err(Error::Recording(kind)) => Some(kind),
+        _ => None,
+    };
+    assert!(matches!(kind(b""), Some(RecordingError::Container { .. })));
+    assert_eq!(kind(other), Some(RecordingError::NotARecording));
+    assert_eq!(kind(&newer), Some(RecordingError::UnsupportedVersion { found: 9, supported: 1 }));
+    let mut damaged = FREE.to_vec();
+    damaged[FREE.len() - 1] ^= 1;
+    assert_eq!(kind(&damaged), Some(RecordingError::HashMismatch));
+    assert_eq!(
+        text(&damaged),
+        "not a usable recording: its content does not fit its hash: the file was damaged or changed after it was written"
+    );
     assert!(text(&newer).contains("format version 9, this palpate reads version 1"), "{}", text(&newer));
 }
 
@@ -75,6 +89,11 @@ fn inconsistent_recordings_are_refused_when_written() {
         change(&mut recording);
         recording.to_bytes().err().map(|e| e.to_string()).unwrap_or_default()
     };
+    let mut massless = good.clone();
+    massless.metadata.mass.mass_kg = 0.0;
+    let what = "mass is 0e0 kg, expected a positive number".into();
+    let kind = RecordingError::Inconsistent { part: RecordingPart::Mass, what };
+    assert_eq!(massless.validate(), Err(Error::Recording(kind)));
     assert!(refused(|r| r.modes.mode_shapes[3] = f64::NAN).ends_with("a mode shape is not finite"));
     assert!(refused(|r| r.modes.angular_frequencies.reverse()).contains("ascending"));
     assert!(refused(|r| r.modes.damping_ratios[0] = -0.1).contains("damping ratios"));

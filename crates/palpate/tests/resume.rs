@@ -1,4 +1,4 @@
-//! A state that goes on under other rules, and what pictures take of it.
+//! Resumed states under other parameters, and deformation snapshots.
 
 use glam::DVec3;
 use palpate::{
@@ -23,7 +23,7 @@ fn model(step_s: f64, gravity: DVec3) -> Model {
     Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model")
 }
 
-/// Pulled for a while at a point.
+/// State after a point was pulled for 40 steps.
 fn pulled(model: &Model) -> State {
     let grasp = Grasp { object: 0, point: SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] } };
     let recording = model.recordings().next().expect("an object");
@@ -37,19 +37,19 @@ fn pulled(model: &Model) -> State {
     state
 }
 
-fn away() -> Input {
+fn inactive() -> Input {
     Input { devices: vec![DeviceInput::inactive()], ..Input::default() }
 }
 
 #[test]
-fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
+fn state_resumed_under_equal_parameters_continues_as_after_release() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let mut state = pulled(&model);
     let mut other = State::resume(&model, &state.snapshots());
     assert_eq!(other.output().objects[0].pose, state.output().objects[0].pose);
     assert_eq!(other.modal_state(0), state.modal_state(0));
     for _ in 0..200 {
-        let (a, b) = (step(&model, &mut state, &away()).clone(), step(&model, &mut other, &away()));
+        let (a, b) = (step(&model, &mut state, &inactive()).clone(), step(&model, &mut other, &inactive()));
         assert_eq!((a.objects[0].pose, a.objects[0].twist), (b.objects[0].pose, b.objects[0].twist));
         assert_eq!(a.objects[0].energy.elastic, b.objects[0].energy.elastic);
     }
@@ -57,19 +57,19 @@ fn under_the_same_rules_a_state_goes_on_as_if_its_hands_had_let_go() {
 }
 
 #[test]
-fn a_scene_at_its_start_goes_on_as_itself() {
+fn initial_state_resumes_to_itself() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let start = State::new(&model);
     let mut other = State::resume(&model, &start.snapshots());
     assert_eq!((other.output(), other.snapshots()), (start.output(), start.snapshots()));
     let mut state = start;
     for _ in 0..100 {
-        assert_eq!(step(&model, &mut state, &away()), step(&model, &mut other, &away()));
+        assert_eq!(step(&model, &mut state, &inactive()), step(&model, &mut other, &inactive()));
     }
 }
 
 #[test]
-fn under_other_rules_it_keeps_its_motion_and_its_energy_but_for_gravity() {
+fn state_resumed_under_other_parameters_keeps_motion_and_energy_except_potential() {
     let before = model(1e-3, DVec3::ZERO);
     let state = pulled(&before);
     let after = model(5e-4, DVec3::X * 3.0);
@@ -81,35 +81,35 @@ fn under_other_rules_it_keeps_its_motion_and_its_energy_but_for_gravity() {
     let begun = new.energy.stored();
     assert!(old.energy.elastic > 1e-7 && old.energy.kinetic > 1e-6, "{:?}", old.energy);
     for _ in 0..400 {
-        let energy = step(&after, &mut other, &away()).energy;
+        let energy = step(&after, &mut other, &inactive()).energy;
         let missing = energy.stored() + energy.lost() - begun - energy.defect;
         assert!(missing.abs() < 1e-12 * begun.abs().max(1.0), "{missing} J of {begun} J");
     }
 }
 
 #[test]
-fn a_surface_is_its_modes_and_its_dents() {
+fn surface_displacement_is_modal_plus_residual_displacement() {
     let model = model(1e-3, DVec3::Y * -9.81);
     let state = pulled(&model);
     let deformation = state.deformation(0);
     let recording = model.recordings().next().expect("an object");
     let mut whole = vec![DVec3::ZERO; recording.surface.positions.len()];
-    let mut dents = whole.clone();
+    let mut residuals = whole.clone();
     deformation.surface_displacement(&model, &mut whole);
-    deformation.residual_displacements(&model, &mut ResidualFieldCache::default(), &mut dents);
-    let (q, mut deepest) = (deformation.modal_coordinates(), 0.0_f64);
+    deformation.residual_displacements(&model, &mut ResidualFieldCache::default(), &mut residuals);
+    let (q, mut largest) = (deformation.modal_coordinates(), 0.0_f64);
     assert_eq!(q.len(), recording.modes.len());
-    for (node, (u, dent)) in whole.iter().zip(&dents).enumerate() {
+    for (node, (u, residual)) in whole.iter().zip(&residuals).enumerate() {
         let row = |axis: usize| recording.modes.row(node, axis).iter().zip(q).map(|(a, b)| a * b).sum();
         let modal = DVec3::new(row(0), row(1), row(2));
-        assert!((modal + *dent - *u).length() < 1e-15, "{node}: {modal} {dent} {u}");
-        deepest = deepest.max(dent.length());
+        assert!((modal + *residual - *u).length() < 1e-15, "{node}: {modal} {residual} {u}");
+        largest = largest.max(residual.length());
     }
-    assert!(deepest > 1e-5, "the hand makes a dent: {deepest} m");
+    assert!(largest > 1e-5, "the hand causes residual displacement: {largest} m");
 }
 
 #[test]
-fn a_picture_with_a_memory_is_that_without() {
+fn cached_residual_fields_give_equal_displacements() {
     let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
     let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
     let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
@@ -117,12 +117,12 @@ fn a_picture_with_a_memory_is_that_without() {
     let parameters = ModelParameters { devices: vec![finger; 2], ..ModelParameters::default() };
     let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
     let surface = &model.recordings().next().expect("an object").surface;
-    let edge = surface.positions.iter().map(|place| place.x).fold(0.0, f64::max);
+    let edge = surface.positions.iter().map(|position| position.x).fold(0.0, f64::max);
     let mut state = State::new(&model);
-    let mut memory = ResidualFieldCache::default();
+    let mut cache = ResidualFieldCache::default();
     let mut deepest = 0.0_f64;
     for number in 0..300 {
-        // They press, and wander over patches that are new and known.
+        // Fingers press and move over new and cached patches.
         let (press, along) =
             (0.004 * (f64::from(number) / 100.0).min(1.0), 0.02 * (f64::from(number) / 40.0).sin());
         let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (edge + 0.0105 - press), along, 0.01));
@@ -130,11 +130,11 @@ fn a_picture_with_a_memory_is_that_without() {
         let mut with = vec![DVec3::ZERO; surface.positions.len()];
         let mut without = with.clone();
         let deformation = state.deformation(0);
-        deformation.surface_displacement_cached(&model, &mut memory, &mut with);
+        deformation.surface_displacement_cached(&model, &mut cache, &mut with);
         deformation.surface_displacement(&model, &mut without);
         let size = without.iter().map(|u| u.length()).fold(0.0, f64::max);
-        let off = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
-        assert!(off <= 1e-6 * size, "{number}: {off} of {size}");
+        let difference = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+        assert!(difference <= 1e-6 * size, "{number}: {difference} of {size}");
         deepest = deepest.max(size);
     }
     assert!(deepest > 1e-4, "they press: {deepest} m");

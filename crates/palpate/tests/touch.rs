@@ -1,4 +1,4 @@
-//! Touch: what contacts must do, on the released sample recordings (a block of 0.2 × 0.1 × 0.1 m).
+//! Touch: contact laws, momentum and energy, on the released recordings (a block of 0.2 × 0.1 × 0.1 m).
 
 use glam::DVec3;
 use palpate::{
@@ -42,12 +42,12 @@ fn touching(positions: &[DVec3]) -> Input {
     Input { devices: positions.iter().map(|&p| DeviceInput::touching(p)).collect(), ..Input::default() }
 }
 
-/// Half of the block's side along an axis, from its surface.
+/// Half the block's side along an axis [m], from its surface.
 fn half(recording: &Recording, axis: usize) -> f64 {
     recording.surface.positions.iter().map(|p| p[axis]).fold(0.0, f64::max)
 }
 
-/// Numbers between −1 and 1 that follow from a seed.
+/// Pseudo-random number between −1 and 1 (xorshift).
 fn random(seed: &mut u64) -> f64 {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
@@ -59,21 +59,21 @@ fn random_vector(seed: &mut u64) -> DVec3 {
     DVec3::new(random(seed), random(seed), random(seed))
 }
 
-/// What a ledger lacks to be closed [J].
+/// Imbalance of the energy ledger since the start [J].
 fn open(output: &Output, start: f64) -> f64 {
     let e = &output.energy;
     e.stored() - start - (e.input - e.lost()) - e.defect
 }
 
 #[test]
-fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
+fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
     let body = block();
-    // The node of a side face that is nearest to its middle: there a tip presses along x.
+    // Node nearest to the middle of a side face, where a tip presses along x.
     let side = half(&body, 0);
     let middle = |n: &usize| (body.surface.positions[*n] - DVec3::X * side).length_squared();
     let node =
         (0..body.surface.positions.len()).min_by(|a, b| middle(a).total_cmp(&middle(b))).expect("nodes");
-    let place = body.surface.positions[node];
+    let rest = body.surface.positions[node];
     let triangle =
         body.surface.triangles.iter().position(|t| t.contains(&(node as u32))).expect("a triangle");
     let weights = body.surface.triangles[triangle].map(|n| if n as usize == node { 1.0 } else { 0.0 });
@@ -86,17 +86,18 @@ fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
     let tip = 1e-3 * body.surface.mean_edge();
     let path = |t: f64| -DVec3::X * (0.01 * t - 0.2 * t * t * t) + DVec3::Y * (0.002 * t);
     let mut compared = 0;
-    // As long as it presses.
+    // While the tip presses.
     for number in 1..=105 {
-        let way = path(f64::from(number - 1) * H);
-        let a = step(&model, &mut touched, &touching(&[place + way + DVec3::X * tip])).clone();
-        let input = Input { devices: vec![DeviceInput::held(place + way, grasp)], ..Input::default() };
+        let displacement = path(f64::from(number - 1) * H);
+        let a = step(&model, &mut touched, &touching(&[rest + displacement + DVec3::X * tip])).clone();
+        let input =
+            Input { devices: vec![DeviceInput::held(rest + displacement, grasp)], ..Input::default() };
         let b = step(&other, &mut held, &input);
         let (touch, hold) = (a.devices[0].force_on_hand, b.devices[0].force_on_hand);
-        // Both begin where the node is.
+        // Both begin at the node.
         if number > 2 {
             let share = (touch - hold).length() / hold.length();
-            // The finger meets the surface a few micrometres beside the node, on cells of centimetres.
+            // The tip touches the surface a few micrometres beside the node, on cells of centimetres.
             assert!(share < 1e-5, "step {number}: {touch} {hold}");
             compared += 1;
         }
@@ -106,7 +107,7 @@ fn a_sticking_finger_at_a_node_feels_what_a_hand_feels_that_holds_it() {
 }
 
 #[test]
-fn the_force_of_a_coupling_is_its_stretch() {
+fn coupling_force_obeys_its_law() {
     let coupling = Coupling { stiffness: 300.0, damping: 0.4 };
     let device = DeviceParameters { coupling: Some(coupling), ..finger(0.005, 0.0, 0.8) };
     let body = block();
@@ -133,7 +134,7 @@ fn the_force_of_a_coupling_is_its_stretch() {
 }
 
 #[test]
-fn contacts_on_a_floor_carry_the_change_of_momentum() {
+fn contact_forces_on_a_floor_are_the_change_of_momentum() {
     let body = block();
     let mass = body.mass();
     let parameters =
@@ -160,7 +161,7 @@ fn contacts_on_a_floor_carry_the_change_of_momentum() {
             assert!(normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9), "in the cone");
             assert!(contact.gap > -1e-6, "no deeper than the solver leaves: {}", contact.gap);
         }
-        // It never has more than at the start, and the ledger says where the rest went.
+        // The energy never exceeds that at the start, and the ledger closes.
         assert!(output.energy.stored() <= stored + 1e-12 && open(output, stored).abs() < 1e-12);
     }
     let output = state.output();
@@ -174,8 +175,8 @@ fn contacts_on_a_floor_carry_the_change_of_momentum() {
 }
 
 #[test]
-fn a_fast_finger_does_not_pass_through() {
-    // Ten times the block's size in a step, straight through it: met on the near side.
+fn fast_tip_does_not_pass_through() {
+    // A motion of ten times the block's size in a step, through it: contact on the near side.
     let body = block();
     let side = half(&body, 1);
     let device = DeviceParameters {
@@ -193,7 +194,7 @@ fn a_fast_finger_does_not_pass_through() {
 }
 
 #[test]
-fn a_finger_that_begins_inside_touches_nothing_until_it_has_come_out() {
+fn tip_that_starts_inside_has_no_contact_until_it_has_left() {
     let body = block();
     let side = half(&body, 1);
     let parameters = ModelParameters { devices: vec![finger(0.002, 0.0, 0.5)], ..ModelParameters::default() };
@@ -209,7 +210,7 @@ fn a_finger_that_begins_inside_touches_nothing_until_it_has_come_out() {
 }
 
 #[test]
-fn whatever_fingers_do_no_energy_comes_out_and_everything_stays_finite() {
+fn random_tips_extract_no_energy_and_the_state_stays_finite() {
     for (seed, coupling) in [(1, None), (2, Some(Coupling { stiffness: 100.0, damping: 0.2 }))] {
         let mut seed: u64 = 88_172_645 + 7919 * seed;
         let device = |tip, patch, friction| DeviceParameters { coupling, ..finger(tip, patch, friction) };
@@ -253,8 +254,8 @@ fn whatever_fingers_do_no_energy_comes_out_and_everything_stays_finite() {
 }
 
 #[test]
-fn objects_push_each_other_with_opposite_forces() {
-    // Two blocks fly at each other without gravity: momentum stays, energy does not grow.
+fn colliding_objects_have_opposite_forces() {
+    // Two blocks collide without gravity: momentum is conserved, energy does not grow.
     let body = block();
     let mass = body.mass();
     let gap = 2.0 * half(&body, 0) + 0.002;
@@ -279,7 +280,7 @@ fn objects_push_each_other_with_opposite_forces() {
 }
 
 #[test]
-fn an_obstacle_that_moves_takes_an_object_along_and_its_work_is_counted() {
+fn work_of_a_moving_obstacle_is_counted() {
     let body = block();
     let ball = Obstacle {
         shape: Shape::Sphere { radius: 0.04 },
@@ -335,7 +336,7 @@ fn numbers_out_of_range_are_refused_by_name() {
 }
 
 #[test]
-fn a_body_with_fixed_nodes_is_touched_as_well() {
+fn body_with_fixed_nodes_has_contact_forces() {
     let body = fixed();
     let top = body.surface.positions.iter().copied().max_by(|a, b| a.y.total_cmp(&b.y)).expect("nodes");
     let parameters =
@@ -353,7 +354,7 @@ fn a_body_with_fixed_nodes_is_touched_as_well() {
 }
 
 #[test]
-fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
+fn scaled_fallback_of_an_unsolved_contact_gives_no_energy() {
     let body = block();
     let side = half(&body, 0);
     let parameters = ModelParameters { devices: vec![finger(0.02, 0.0, 0.5)], ..ModelParameters::default() };
@@ -361,7 +362,7 @@ fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
     let start = state.output().energy.stored();
     let beside = DVec3::new(side + 0.021, 0.03, 0.02);
     step(&model, &mut state, &touching(&[beside]));
-    // Four metres in a step, through the block.
+    // A motion of four metres in a step, through the block.
     let beyond = beside - DVec3::X * (40.0 * side);
     let output = step(&model, &mut state, &touching(&[beyond]));
     assert_eq!(output.status.unsolved_islands, 1, "otherwise this shows nothing: {:?}", output.status);
@@ -377,10 +378,10 @@ fn what_cannot_be_solved_is_met_in_part_and_gives_no_energy() {
 }
 
 #[test]
-fn a_tip_much_larger_than_the_body_meets_its_front_alone() {
+fn tip_larger_than_the_body_touches_its_front_only() {
     let body = block();
     let (side, thick) = (half(&body, 0), 2.0 * half(&body, 1));
-    // Its centre is outside; behind its edge is the back of the block.
+    // The tip's centre is outside; the back of the block is within its radius.
     let tip = 4.0 * thick;
     let parameters = ModelParameters { devices: vec![finger(tip, 0.0, 0.0)], ..ModelParameters::default() };
     let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);

@@ -1,20 +1,20 @@
 //! Held points: W·f = ρ (equation (9) of the paper), by Cholesky factors.
 //!
 //! W [m/N] is the Delassus operator of the held rows: displacement at the end of the step per held
-//! force, from modes, residual and rigid motion. ρ [m] is where the hand is minus where the point
-//! would be. A row that depends on the rows before it (two hands on one point) is left out: its
-//! force is zero.
+//! force, from modes, residual and rigid motion. ρ [m] is the position of the hand minus the free
+//! position of the point. A row that depends linearly on those before it (two hands on one point)
+//! is left out: its force is zero.
 
 use super::problem::larger;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// A row is dependent when its pivot falls below this share of its diagonal. f32 residual
-/// entries carry 6e-8; a point a thousandth of a triangle away keeps a share of about 1e-6.
+/// Ratio of pivot to diagonal below which a row is dependent [1]. Residual entries in single
+/// precision have a relative error of 6e-8; a point at a thousandth of a triangle keeps about 1e-6.
 const DEPENDENT_BELOW: f64 = 1e-9;
 
-/// Dense symmetric system of at most `capacity` points; buffers are made once.
+/// Dense symmetric system of the held points; buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) struct BilateralSystem {
     /// Lower factor, row by row, of extent 3·points.
@@ -26,6 +26,7 @@ pub(crate) struct BilateralSystem {
 }
 
 impl BilateralSystem {
+    /// System for at most `capacity` points.
     pub(crate) fn new(capacity: usize) -> Self {
         let n = 3 * capacity;
         Self { factor: vec![0.0; n * n], reciprocal: vec![0.0; n], solution: vec![0.0; n], extent: 0 }
@@ -65,7 +66,7 @@ impl BilateralSystem {
         dependent
     }
 
-    /// f = W⁻¹·ρ, with `residual` giving ρ [m] of a point; see [`Self::force`]. Gives the largest ρ.
+    /// Solve W·f = ρ, with `residual` the ρ of a point [m]. Gives the largest |ρ| [m]; forces by [`Self::force`].
     ///
     /// # Real time
     pub(crate) fn solve(&mut self, residual: impl Fn(usize) -> DVec3) -> f64 {
@@ -90,7 +91,7 @@ impl BilateralSystem {
         largest
     }
 
-    /// The last solution's force [N] of a point.
+    /// Force of a point in the last solution [N].
     pub(crate) fn force(&self, point: usize) -> DVec3 {
         DVec3::from_slice(&self.solution[3 * point..])
     }
@@ -100,7 +101,7 @@ impl BilateralSystem {
 mod tests {
     use super::*;
 
-    /// A positive definite matrix of two points, and the same with the second on the first.
+    /// Positive definite matrix of two points; `dependent` puts the second on the first.
     fn blocks(dependent: bool) -> impl Fn(usize, usize) -> DMat3 {
         let a = DMat3::from_cols_array_2d(&[[4.0, 1.0, 0.5], [1.0, 3.0, 0.2], [0.5, 0.2, 5.0]]);
         move |i, j| if i == j || dependent { a } else { a * 0.5 }
@@ -120,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_repeat_others_get_no_force() {
+    fn dependent_rows_get_no_force() {
         let mut system = BilateralSystem::new(2);
         assert_eq!(system.factorise(2, blocks(true)), 3);
         let rho = DVec3::new(1.0, -2.0, 0.3);

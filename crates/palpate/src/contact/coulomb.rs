@@ -1,27 +1,27 @@
-//! One contact's law: Signorini and Coulomb, for the force that is held over a step.
+//! Law of one contact: Signorini and Coulomb, for the force that is held over a step.
 //!
 //! In axes (−n, t₁, t₂), with n the outward normal of the object, the other side moves relative to the object's
-//! point by r = b − W·f: W [m/N] the contact's own compliance, b [m] what happens without its force. r₀ is how deep
-//! it would be, r₁ and r₂ how far it slips over the step. The force f = (λ, f₁, f₂) on the object obeys
+//! point by r = b − W·f: W [m/N] is the contact's own compliance, b [m] the relative motion without its force. r₀ is the
+//! penetration at the end of the step, (r₁, r₂) the slip over it. The force f = (λ, f₁, f₂) [N] on the object obeys
 //!
 //! ```text
 //! r₀ ≤ 0,  λ ≥ 0,  λ·r₀ = 0          |f_t| ≤ μ·λ,  f_t = μ·λ·r_t/|r_t| where r_t ≠ 0
 //! ```
 //!
-//! The slip is that over the whole step, so f_t·r_t, what friction takes, is never negative.
+//! The slip is that over the whole step, so the dissipation of friction, f_t·r_t [J], is never negative.
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// Repetitions for the direction of slip: Newton's method doubles its digits each time, from a guess that is near.
-const REPETITIONS: usize = 30;
+/// Upper limit of iterations for the direction of slip; Newton's method converges quadratically near the solution.
+const MAX_ITERATIONS: usize = 30;
 
-/// Newton's method is followed as far as this [rad] at once.
-const NEAR: f64 = 0.3;
+/// Upper limit of a Newton step [rad]; beyond it a fixed-point step is taken.
+const MAX_NEWTON_TURN: f64 = 0.3;
 
-/// A turn [rad] whose square is round-off.
-const SMALL: f64 = 3e-8;
+/// Turn [rad] whose square is round-off.
+const SMALL_TURN: f64 = 3e-8;
 
-/// The force that obeys the law; `before` is a guess, `stiffness` the inverse of W.
+/// Force that obeys the law [N], in the contact's axes. `before` is the warm start, `stiffness` the inverse of W.
 ///
 /// # Real time
 #[allow(non_snake_case)]
@@ -32,39 +32,39 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
     if friction <= 0.0 {
         return DVec3::X * (b.x / W.x_axis.x);
     }
-    // Sticks?
+    // Stick.
     let stuck = *stiffness * b;
     let across = DVec2::new(stuck.y, stuck.z);
     if stuck.x >= 0.0 && across.length() <= friction * stuck.x {
         return stuck;
     }
-    // Slips: with direction d, λ = b₀ / (W₀₀ + μ·W₀ₜ·d); d must be that of r_t.
+    // Slip along d: λ = b₀ / (W₀₀ + μ·W₀ₜ·d), where d is the direction of r_t.
     let coupling = DVec2::new(W.y_axis.x, W.z_axis.x);
-    let guess = DVec2::new(before.y, before.z);
-    let mut direction = if guess.length() > 0.1 * friction * before.x { guess } else { across };
+    let warm = DVec2::new(before.y, before.z);
+    let mut direction = if warm.length() > 0.1 * friction * before.x { warm } else { across };
     direction = direction.normalize_or(DVec2::X);
     let step = 1.0 / (W.y_axis.y + W.z_axis.z);
-    // The force that slips in a direction, and how the normal force follows from that.
+    // Force at the cone in a direction, and the denominator of λ.
     let slipping = |direction: DVec2| {
         let denominator = W.x_axis.x + friction * coupling.dot(direction);
-        // HalfSpace this the contact jams; what it can't hold shows as residual.
+        // Below this denominator the contact jams; the remainder shows as residual.
         let lambda = b.x / denominator.max(0.05 * W.x_axis.x);
         let tangent = direction * (friction * lambda);
         (DVec3::new(lambda, tangent.x, tangent.y), denominator)
     };
-    for _ in 0..REPETITIONS {
+    for _ in 0..MAX_ITERATIONS {
         let (force, denominator) = slipping(direction);
         let (lambda, tangent) = (force.x, DVec2::new(force.y, force.z));
         let moved = b - *W * force;
         let slip = DVec2::new(moved.y, moved.z);
-        // How slip and its part across the direction change as the direction turns.
+        // Derivatives of force and slip by the turn of the direction.
         let aside = direction.perp();
         let lambda_turns = -lambda * friction * coupling.dot(aside) / denominator;
         let tangent_turns = (direction * lambda_turns + aside * lambda) * friction;
         let turns = *W * DVec3::new(lambda_turns, tangent_turns.x, tangent_turns.y);
         let slip_turns = -DVec2::new(turns.y, turns.z);
         let turn = -direction.perp_dot(slip) / (aside.perp_dot(slip) + direction.perp_dot(slip_turns));
-        let newton = direction.dot(slip) > 0.0 && turn.abs() < NEAR;
+        let newton = direction.dot(slip) > 0.0 && turn.abs() < MAX_NEWTON_TURN;
         let next = if newton {
             (direction + aside * turn).normalize()
         } else {
@@ -72,15 +72,15 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         };
         let turned = (next - direction).length();
         direction = next;
-        // What Newton's method leaves is the square of that.
-        if turned < if newton { SMALL } else { SMALL * SMALL } {
+        // Newton's method leaves an error of the turn's square.
+        if turned < if newton { SMALL_TURN } else { SMALL_TURN * SMALL_TURN } {
             break;
         }
     }
     slipping(direction).0
 }
 
-/// Two unit vectors across a unit normal, right-handed with it.
+/// Two unit tangents of a unit normal, right-handed with it.
 pub(crate) fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     normal.any_orthonormal_pair()
 }

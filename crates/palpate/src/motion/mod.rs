@@ -1,4 +1,4 @@
-//! Rigid motion of the floating frame under a force that is held over the step.
+//! Rigid motion of the floating frame, under a force that is held over the step.
 //!
 //! With world force F [N], torque τ [N·m] about the centre of mass, step h [s]:
 //!
@@ -14,7 +14,7 @@
 //! velocities Ω = I⁻¹·Rᵀ·L: the implicit midpoint rule, gyroscopic term included. It conserves L
 //! and, without torque, the kinetic energy exactly, and changes the energy by exactly τ·h·ω̄
 //! (Simo & Wong 1991, Int. J. Numer. Meth. Eng. 31, 19). The orientation is second order.
-//! The paper adds up a vector θ; turning by h·θ̇⁺ each step is the same for small angles.
+//! The paper accumulates a vector θ; turning by h·θ̇⁺ each step equals it for small angles.
 
 mod increment;
 
@@ -23,7 +23,7 @@ pub(crate) use increment::RigidIncrement;
 use crate::spatial::{Pose, Twist, cayley, cross_matrix, inertia_in_world};
 use glam::{DMat3, DQuat, DVec3};
 
-/// How the rigid motion is advanced.
+/// Time integrator of the rigid motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RigidIntegrator {
     /// Exact for a held force; the rigid and the elastic part are sampled alike.
@@ -35,7 +35,7 @@ pub enum RigidIntegrator {
 }
 
 impl RigidIntegrator {
-    /// c in the displacement c·h²·F/m at the end of a step under a held force.
+    /// Factor c of the displacement c·h²·F/m at the end of a step under a held force [1].
     pub(crate) fn held_factor(self) -> f64 {
         match self {
             Self::ExactHold => 0.5,
@@ -44,7 +44,7 @@ impl RigidIntegrator {
     }
 }
 
-/// Mass and inertia about the centre of mass, in body axes.
+/// Mass [kg] and inertia about the centre of mass [kg·m²], in body axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inertia {
     pub(crate) mass: f64,
@@ -52,31 +52,34 @@ pub(crate) struct Inertia {
     inverse: DMat3,
 }
 
-/// Where a free body is and how it moves.
+/// Pose and momentum of a free body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RigidState {
     pub(crate) pose: Pose,
+    /// Velocity of the centre of mass [m/s, world].
     pub(crate) velocity: DVec3,
-    /// About the centre of mass, world axes [kg·m²/s].
+    /// Angular momentum about the centre of mass [kg·m²/s, world].
     pub(crate) angular_momentum: DVec3,
 }
 
-/// A candidate for the end of a step.
+/// Rigid step: state at its end under given forces.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RigidStep {
     pub(crate) end: RigidState,
-    /// h·ω̄ [rad]: the vector whose Cayley map turns the body over the step.
+    /// Turn h·ω̄ [rad]: vector of the Cayley map over the step.
     pub(crate) turn: DVec3,
-    /// How far the turn is from solving its equation [rad].
+    /// Residual of the turn's equation [rad].
     pub(crate) residual: f64,
 }
 
-/// Newton's method for the implicit midpoint rule doubles its digits each time from a start that is right to h·|ω|;
-/// this many reach round-off for a turn of up to two radians in a step.
-const MAX_REPETITIONS: usize = 20;
+/// Upper limit of Newton iterations of the implicit midpoint rule. They converge quadratically, to round-off for turns of up to
+/// two radians in a step.
+const MAX_ITERATIONS: usize = 20;
 
-/// A residual [rad] that one more repetition brings below round-off, and a turn [rad] that is near enough to start from.
-const SURE: f64 = 1e-9;
+/// Residual [rad] below which one more iteration reaches round-off.
+const CONVERGED: f64 = 1e-9;
+
+/// Turn [rad] below which a step under nearly equal forces is a start of the iteration.
 const SMALL_TURN: f64 = 0.3;
 
 impl Inertia {
@@ -84,12 +87,12 @@ impl Inertia {
         Self { mass, tensor, inverse: tensor.inverse() }
     }
 
-    /// I⁻¹ [1/(kg·m²)] in world axes.
+    /// Inverse inertia I⁻¹ in world axes [1/(kg·m²)].
     pub(crate) fn inverse_in_world(&self, orientation: DQuat) -> DMat3 {
         inertia_in_world(self.inverse, DMat3::from_quat(orientation))
     }
 
-    /// Angular momentum [kg·m²/s, world] of a body that turns with ω [rad/s, world].
+    /// Angular momentum [kg·m²/s, world] at an angular velocity ω [rad/s, world].
     pub(crate) fn angular_momentum(&self, orientation: DQuat, angular_velocity: DVec3) -> DVec3 {
         orientation * (self.tensor * (orientation.inverse() * angular_velocity))
     }
@@ -98,6 +101,7 @@ impl Inertia {
         self.inverse * (state.pose.orientation.inverse() * state.angular_momentum)
     }
 
+    /// Velocity of a state.
     pub(crate) fn twist(&self, state: &RigidState) -> Twist {
         Twist {
             linear: state.velocity,
@@ -105,26 +109,26 @@ impl Inertia {
         }
     }
 
-    /// Kinetic energy [J] of the rigid motion.
+    /// Kinetic energy of the rigid motion [J].
     pub(crate) fn kinetic_energy(&self, state: &RigidState) -> f64 {
         let spin = self.angular_velocity_in_body(state);
         0.5 * (self.mass * state.velocity.length_squared() + spin.dot(self.tensor * spin))
     }
 
-    /// The state after a step of `h` [s] with force F [N] (weight included) and torque τ [N·m]. A step from the same start under
-    /// nearly the same forces saves work.
+    /// Rigid step of h [s] with force F [N], weight included, and torque τ [N·m]. The iteration starts from `nearly`, a step
+    /// from the same start under nearly equal forces.
     ///
     /// # Real time
     pub(crate) fn advance(
         &self,
-        rule: RigidIntegrator,
+        integrator: RigidIntegrator,
         start: &RigidState,
         h: f64,
         (force, torque): (DVec3, DVec3),
         nearly: Option<&RigidStep>,
     ) -> RigidStep {
         let velocity = start.velocity + force * (h / self.mass);
-        match rule {
+        match integrator {
             RigidIntegrator::ExactHold => {
                 let position = start.pose.position + (start.velocity + velocity) * (0.5 * h);
                 let angular_momentum = start.angular_momentum + torque * h;
@@ -148,7 +152,7 @@ impl Inertia {
         }
     }
 
-    /// Orientation at the end of the step, h·ω̄, and how far they are off [rad], by the implicit midpoint rule.
+    /// Orientation at the end of the step, turn h·ω̄ [rad] and residual [rad], by the implicit midpoint rule.
     ///
     /// With b = Rᵀ·L⁺ and y = cay(−h·w)·b the angular momentum at the end in body axes, the mean w satisfies
     /// w = ½(Ω + I⁻¹·y); and δy = ½·h·(1 + h·ŵ/2)⁻¹·(b + y)×δw.
@@ -162,11 +166,11 @@ impl Inertia {
         let from_world = start.pose.orientation;
         let spin = self.angular_velocity_in_body(start);
         let b = from_world.inverse() * end_momentum;
-        // A turn that is large, or was not found, leads nowhere.
-        let nearly = nearly.filter(|step| step.turn.length() < SMALL_TURN && step.residual < SURE);
+        // A large or unconverged turn is no start.
+        let nearly = nearly.filter(|step| step.turn.length() < SMALL_TURN && step.residual < CONVERGED);
         let mut mean = nearly.map_or(spin, |step| from_world.inverse() * step.turn / h);
         let mut residual = f64::INFINITY;
-        for _ in 0..MAX_REPETITIONS {
+        for _ in 0..MAX_ITERATIONS {
             let y = cayley(mean * h).inverse() * b;
             let excess = mean - (spin + self.inverse * y) * 0.5;
             residual = excess.length() * h;
@@ -177,8 +181,8 @@ impl Inertia {
             let slope = half_turn.inverse() * cross_matrix(b + y) * (0.5 * h);
             let jacobian = DMat3::IDENTITY - self.inverse * slope * 0.5;
             mean -= jacobian.inverse() * excess;
-            if residual < SURE {
-                // The digits double: what is left is below round-off.
+            if residual < CONVERGED {
+                // Quadratic convergence: the remaining residual is below round-off.
                 residual *= residual;
                 break;
             }

@@ -4,13 +4,12 @@ mod state;
 
 pub(crate) use state::ObjectState;
 
-use crate::error::Error;
+use crate::error::ModelError;
 use crate::motion::{Inertia, RigidIntegrator, RigidState, RigidStep};
 use crate::recording::{Recording, Support};
 use crate::response::{Body, Response, ResponseForm, ResponseState, ResponseView};
 use crate::spatial::{Pose, Twist};
 use alloc::format;
-use alloc::string::String;
 use alloc::sync::Arc;
 use glam::{DMat3, DVec3};
 
@@ -58,32 +57,34 @@ impl Object {
         start: ObjectStart,
         friction: f64,
         rules: ObjectRules,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ModelError> {
+        let fail = |name, what| Err(ModelError::Parameter { name, what });
         let ObjectStart { mut pose, twist } = start;
         let norm = pose.orientation.length();
         if !(0.99..=1.01).contains(&norm) {
-            return Err(format!("orientation has length {norm}, expected a unit quaternion w, x, y, z"));
+            return fail(
+                "pose",
+                format!("orientation has length {norm}, expected a unit quaternion w, x, y, z"),
+            );
         }
         if !(pose.position.is_finite() && twist.linear.is_finite() && twist.angular.is_finite()) {
-            return Err("position and velocities must be finite".into());
+            return fail("start", "position and velocities must be finite".into());
         }
         pose.orientation = pose.orientation.normalize();
         let inertia = match recording.metadata.support {
             Support::Free => Some(Inertia::new(recording.mass(), recording.inertia())),
             Support::Fixed if twist != Twist::ZERO => {
-                return Err("has fixed nodes, so its velocities must be zero".into());
+                return fail("twist", "has fixed nodes, so its velocities must be zero".into());
             }
             Support::Fixed => None,
         };
-        let response =
-            Response::new(&recording, form, rules.step_s).map_err(|error: Error| format!("{error}"))?;
-        if inertia.is_none() && rules.gravity != DVec3::ZERO && !response.knows_gravity() {
-            return Err(
-                "has fixed nodes, and its impulse response does not tell how it sags under gravity".into()
-            );
+        let response = Response::new(&recording, form, rules.step_s)?;
+        if inertia.is_none() && rules.gravity != DVec3::ZERO && !response.has_gravity_response() {
+            let what = "has fixed nodes, and its impulse response does not tell how it sags under gravity";
+            return Err(ModelError::ImpulseResponse { what: what.into() });
         }
         if !(0.0..1e6).contains(&friction) {
-            return Err(format!("friction is {friction}, expected a number not below 0"));
+            return fail("friction", format!("friction is {friction}, expected a number not below 0"));
         }
         let radius = recording.surface.radius();
         let mut radii = rules.patch_radii.to_vec();

@@ -1,11 +1,11 @@
-//! The recording file `*.palp`: a safetensors container.
+//! Recording file `*.palp`: a safetensors container.
 //!
 //! Little-endian tensors with names, and one metadata entry `palpate`: JSON of [`Metadata`] and
-//! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). Footprint
+//! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). The reader
 //! checks the hash, then every length, index and number, and allocates no more than the file's size.
 
 use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
-use crate::error::Error;
+use crate::error::{Error, RecordingError};
 use crate::surface::Surface;
 use alloc::borrow::Cow;
 use alloc::boxed::Box;
@@ -19,17 +19,17 @@ use safetensors::{Dtype, SafeTensors, View};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-/// Version of the file layout that is written; every earlier one stays readable.
+/// Version of the file layout that is written; every earlier one is readable.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// The entry `palpate`. The metadata's text is kept as it stands, because the hash covers it.
+/// Metadata entry `palpate`. The metadata's text is kept verbatim, because the hash covers it.
 #[derive(Serialize, Deserialize)]
 struct Header {
     metadata: Box<RawValue>,
     content_hash: String,
 }
 
-/// One tensor to be written.
+/// Tensor to be written.
 struct Tensor {
     dtype: Dtype,
     shape: Vec<usize>,
@@ -84,10 +84,10 @@ fn content_hash<'a>(
 }
 
 impl Recording {
-    /// The bytes of a recording file. The same recording gives the same bytes.
+    /// Bytes of the recording file; equal recordings give equal bytes.
     ///
     /// # Errors
-    /// When the recording is inconsistent.
+    /// [`crate::RecordingError::Inconsistent`] for a recording that [`Self::validate`] refuses.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         self.validate()?;
         let (n, m) = (self.surface.positions.len(), self.modes.len());
@@ -127,11 +127,12 @@ impl Recording {
                 tensor_f64(&[3 * n, 3], gravity.residual_displacements.iter().copied()),
             ));
         }
-        let json = |value: serde_json::Result<String>| {
-            value.map_err(|e| Error::Recording(format!("metadata cannot be written: {e}")))
+        let not_writable = |e: serde_json::Error| RecordingError::NotWritable {
+            what: format!("metadata cannot be written: {e}"),
         };
-        let metadata = RawValue::from_string(json(serde_json::to_string(&self.metadata))?)
-            .map_err(|e| Error::Recording(format!("metadata cannot be written: {e}")))?;
+        let json = |value: serde_json::Result<String>| value.map_err(not_writable);
+        let metadata =
+            RawValue::from_string(json(serde_json::to_string(&self.metadata))?).map_err(not_writable)?;
         let content_hash = content_hash(
             metadata.get(),
             tensors.iter().map(|(name, t)| (*name, t.shape.as_slice(), t.bytes.as_slice())),
@@ -139,31 +140,27 @@ impl Recording {
         let header = Header { metadata, content_hash };
         let header = [("palpate".to_string(), json(serde_json::to_string(&header))?)];
         let views = tensors.iter().map(|(name, tensor)| (*name, tensor));
-        safetensors::serialize(views, Some(header.into_iter().collect()))
-            .map_err(|e| Error::Recording(format!("cannot be written: {e}")))
+        let bytes = safetensors::serialize(views, Some(header.into_iter().collect()));
+        bytes.map_err(|e| RecordingError::NotWritable { what: format!("cannot be written: {e}") }.into())
     }
 
-    /// Read a recording file.
+    /// Recording from the bytes of its file.
     ///
     /// # Errors
-    /// Names what is wrong with a file that is no recording, of a newer version, truncated,
-    /// damaged, or inconsistent.
+    /// [`crate::RecordingError`] with its kind for a file that is no recording, of a newer version, truncated, damaged or
+    /// inconsistent.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let container = |e: safetensors::SafeTensorError| {
-            Error::Recording(format!("the file is damaged, truncated or of another kind ({e})"))
-        };
+        let container = |e: safetensors::SafeTensorError| RecordingError::Container { reason: e.to_string() };
         let (_, raw_header) = SafeTensors::read_metadata(bytes).map_err(container)?;
         let json = raw_header.metadata().as_ref().and_then(|entries| entries.get("palpate"));
         let Some(json) = json else {
-            return Err(Error::Recording("a safetensors file, but without the metadata of palpate".into()));
+            return Err(RecordingError::NotARecording.into());
         };
         let header: Header = parse(json)?;
         let VersionOnly { format_version } = parse(header.metadata.get())?;
         if format_version != FORMAT_VERSION {
-            return Err(Error::Recording(format!(
-                "format version {format_version}, this palpate reads version {FORMAT_VERSION}: \
-                 record it again or use a newer palpate"
-            )));
+            let (found, supported) = (format_version, FORMAT_VERSION);
+            return Err(RecordingError::UnsupportedVersion { found, supported }.into());
         }
         let file = SafeTensors::deserialize(bytes).map_err(container)?;
         let views: Vec<_> = file.iter().collect();
@@ -171,17 +168,14 @@ impl Recording {
         let hash =
             content_hash(header.metadata.get(), views.iter().map(|(name, v)| (*name, v.shape(), v.data())));
         if hash != header.content_hash {
-            return Err(Error::Recording(
-                "its content does not fit its hash: the file was damaged or changed after it was written"
-                    .into(),
-            ));
+            return Err(RecordingError::HashMismatch.into());
         }
         let recording = Self::from_tensors(parse(header.metadata.get())?, &Tensors(&file))?;
         recording.validate()?;
         Ok(recording)
     }
 
-    fn from_tensors(metadata: Metadata, tensors: &Tensors) -> Result<Self, Error> {
+    fn from_tensors(metadata: Metadata, tensors: &Tensors) -> Result<Self, RecordingError> {
         let surface = Surface {
             positions: tensors.f64("surface.positions")?.chunks_exact(3).map(DVec3::from_slice).collect(),
             triangles: tensors
@@ -220,8 +214,8 @@ impl Recording {
     }
 }
 
-/// Tensors must have the extents that go together; their numbers are checked afterwards.
-fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), Error> {
+/// Check that the extents of the tensors fit together; their numbers are checked afterwards.
+fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> {
     let extents = |name: &str| views.iter().find(|(other, _)| *other == name).map(|(_, view)| view.shape());
     let count = |name: &str| extents(name).and_then(|shape| shape.first()).copied().unwrap_or(0);
     let (nodes, modes) = (count("surface.positions"), count("modes.angular_frequencies"));
@@ -242,10 +236,8 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), Error> {
             _ => continue,
         };
         if view.shape() != expected {
-            return Err(Error::Recording(format!(
-                "{name} has the shape {:?}, expected {expected:?}",
-                view.shape()
-            )));
+            let (found, expected) = (view.shape().to_vec(), expected.to_vec());
+            return Err(RecordingError::WrongShape { name: name.to_string(), found, expected });
         }
     }
     Ok(())
@@ -256,11 +248,11 @@ struct VersionOnly {
     format_version: u32,
 }
 
-fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, Error> {
-    serde_json::from_str(json).map_err(|e| Error::Recording(format!("its metadata cannot be read: {e}")))
+fn parse<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, RecordingError> {
+    serde_json::from_str(json).map_err(|e| RecordingError::Metadata { reason: e.to_string() })
 }
 
-/// Typed access to the tensors of a file.
+/// Tensors of a file, with checks of their types.
 struct Tensors<'a>(&'a SafeTensors<'a>);
 
 impl Tensors<'_> {
@@ -268,26 +260,27 @@ impl Tensors<'_> {
         self.0.tensor(name).is_ok()
     }
 
-    fn bytes(&self, name: &str, dtype: Dtype) -> Result<&[u8], Error> {
-        let tensor =
-            self.0.tensor(name).map_err(|_| Error::Recording(format!("the tensor {name} is missing")))?;
+    fn bytes(&self, name: &str, dtype: Dtype) -> Result<&[u8], RecordingError> {
+        let missing = |_| RecordingError::MissingTensor { name: name.to_string() };
+        let tensor = self.0.tensor(name).map_err(missing)?;
         if tensor.dtype() != dtype {
-            return Err(Error::Recording(format!("{name} holds {:?}, expected {dtype:?}", tensor.dtype())));
+            let (found, expected) = (format!("{:?}", tensor.dtype()), format!("{dtype:?}"));
+            return Err(RecordingError::WrongType { name: name.to_string(), found, expected });
         }
         Ok(tensor.data())
     }
 
-    fn f64(&self, name: &str) -> Result<Vec<f64>, Error> {
+    fn f64(&self, name: &str) -> Result<Vec<f64>, RecordingError> {
         let bytes = self.bytes(name, Dtype::F64)?;
         Ok(bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
     }
 
-    fn f32(&self, name: &str) -> Result<Vec<f32>, Error> {
+    fn f32(&self, name: &str) -> Result<Vec<f32>, RecordingError> {
         let bytes = self.bytes(name, Dtype::F32)?;
         Ok(bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
     }
 
-    fn u32(&self, name: &str) -> Result<Vec<u32>, Error> {
+    fn u32(&self, name: &str) -> Result<Vec<u32>, RecordingError> {
         let bytes = self.bytes(name, Dtype::U32)?;
         Ok(bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect())
     }

@@ -1,6 +1,6 @@
-//! What a recording says about itself; stored as JSON in the file.
+//! Metadata of a recording; stored as JSON in the file.
 
-use crate::error::Error;
+use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 /// Description of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
-    /// Version of the file's layout; see [`crate::FORMAT_VERSION`].
+    /// Version of the file's layout, [`crate::FORMAT_VERSION`] when written.
     pub format_version: u32,
-    /// How force and displacement are sampled: always `held force, displacement at end of step`.
+    /// Sampling of force and displacement: always `held force, displacement at end of step`.
     pub hold: String,
     /// Unit system: always `SI`.
     pub units: String,
@@ -25,48 +25,47 @@ pub struct Metadata {
     pub mesh: MeshCounts,
     /// Mass, centre and inertia.
     pub mass: MassProperties,
-    /// How far the recording is from the unreduced finite element model; absent if not measured.
+    /// Error against the unreduced finite element model; absent if not measured.
     pub certificate: Option<Certificate>,
-    /// Where it came from.
+    /// Origin of the recording.
     pub provenance: Provenance,
 }
 
-/// The only sampling that this version knows.
+/// Sampling of this format version.
 const HOLD: &str = "held force, displacement at end of step";
 
-/// The only units that this version knows.
+/// Units of this format version.
 const UNITS: &str = "SI";
 
 impl Metadata {
-    /// The value of [`Self::hold`].
+    /// Value of [`Self::hold`].
     pub fn hold() -> String {
         HOLD.into()
     }
 
-    /// The value of [`Self::units`].
+    /// Value of [`Self::units`].
     pub fn units() -> String {
         UNITS.into()
     }
 
-    pub(super) fn validate(&self) -> Result<(), Error> {
+    pub(super) fn validate(&self) -> Result<(), RecordingError> {
+        let fail = |what| Err(RecordingError::Inconsistent { part: RecordingPart::Metadata, what });
         if self.hold != HOLD || self.units != UNITS {
-            return Err(Error::Recording(format!(
+            return fail(format!(
                 "it is sampled as {:?} in units {:?}, expected {HOLD:?} in {UNITS:?}",
                 self.hold, self.units
-            )));
+            ));
         }
         let certificate = self.certificate.as_ref();
         if let Some(certificate) = certificate.filter(|certificate| !certificate.is_finite()) {
-            return Err(Error::Recording(format!(
-                "its certificate holds numbers that are not finite: {certificate:?}"
-            )));
+            return fail(format!("its certificate holds numbers that are not finite: {certificate:?}"));
         }
         Ok(())
     }
 }
 
 impl Certificate {
-    /// Whether every number is one.
+    /// Whether every number is finite.
     fn is_finite(&self) -> bool {
         [
             self.force_error_max,
@@ -81,20 +80,20 @@ impl Certificate {
     }
 }
 
-/// Whether a body may move as a whole.
+/// Support of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Support {
     /// Free in space: six rigid motions.
     Free,
-    /// Some nodes are fixed; the body frame stays where it is put.
+    /// Some nodes are fixed; the body frame does not move.
     Fixed,
 }
 
-/// A linear isotropic material.
+/// Linear isotropic material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// The region it fills; empty when there is one region.
+    /// Region of the mesh; empty when there is one region.
     pub region: String,
     /// Young's modulus [Pa].
     pub young_pa: f64,
@@ -115,12 +114,12 @@ pub enum Damping {
         /// β [s].
         beta: f64,
     },
-    /// The same ratio ζ [1] for every mode.
+    /// Equal ratio ζ [1] for every mode.
     Ratio(f64),
 }
 
 impl Damping {
-    /// ζ [1] of a mode with angular frequency ω [rad/s].
+    /// Damping ratio ζ [1] of a mode with angular frequency ω [rad/s].
     pub fn ratio(&self, angular_frequency: f64) -> f64 {
         match *self {
             Self::Rayleigh { alpha, beta } => {
@@ -158,14 +157,14 @@ pub struct MassProperties {
 /// Force-error certificate: the recording against the unreduced finite element model, measured
 /// when it was made. All errors are relative, 0.01 is 1 %.
 ///
-/// It is a measurement on samples, one place at a time, without rigid motion: not a bound. A body that rings on several
-/// held points, or a hand with kinks in its path, meets larger errors; both shrink with more modes.
+/// A measurement on samples, one location at a time, without rigid motion: not a bound. A body that rings on several
+/// held points, or a hand with kinks in its path, has larger errors; both shrink with more modes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// Largest error of the force when a sample is pressed in by a smooth ramp and held:
     /// √(Σ|f − f_fem|² / Σ|f_fem|²) over [`CertificateEvent::duration_s`].
     pub force_error_max: f64,
-    /// Median of the same over the samples.
+    /// Median over the samples of that error.
     pub force_error_median: f64,
     /// Largest error of the static compliance of a sample.
     pub static_compliance_error_max: f64,
@@ -173,39 +172,38 @@ pub struct Certificate {
     pub instantaneous_compliance_error_max: f64,
     /// Up to this frequency the dynamic compliance of every sample is within 5 % of its static size.
     pub bandwidth_hz: f64,
-    /// How far the reference itself may be off: the change when its last two spaces are left out.
+    /// Error estimate of the reference itself: its change when its last two spaces are left out.
     pub reference_error: f64,
     /// Number of samples: points and patches, three directions each.
     pub samples: u64,
-    /// Number of modes of all that the finite element model has.
+    /// Number of kept modes, and of all modes of the finite element model.
     pub modes_of: [u64; 2],
-    /// The motion that the force error is measured on.
+    /// Motion of the force error's measurement.
     pub event: CertificateEvent,
-    /// Where the largest force error was found [m, body frame], and the patch radius there [m]
-    /// (0: a point).
+    /// Position of the largest force error [m, body frame].
     pub worst_at_m: [f64; 3],
     /// Patch radius of the worst sample [m]; 0 for a point.
     pub worst_patch_radius_m: f64,
 }
 
-/// The press that the certificate's force error is measured on.
+/// Press of the force error's measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CertificateEvent {
     /// Step [s].
     pub step_s: f64,
     /// Rise time of the smooth ramp [s].
     pub rise_s: f64,
-    /// How long force is compared [s].
+    /// Duration of the comparison [s].
     pub duration_s: f64,
 }
 
-/// Where a recording came from.
+/// Origin of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// The primitive's text or the mesh file's name, without its folder.
+    /// Text of the primitive, or name of the mesh file without its folder.
     pub source: String,
     /// BLAKE3 of the mesh as computed (nodes, tetrahedra, regions), in hexadecimal.
     pub mesh_hash: String,
-    /// Version of palpate that made it.
+    /// Version of palpate that made the recording.
     pub palpate_version: String,
 }

@@ -1,4 +1,4 @@
-//! What offline work hands to the runtime: one body's responses, surface, mass and certificate.
+//! Recording: responses, surface, mass and certificate of one body, computed offline for the runtime.
 
 mod file;
 mod impulse_response;
@@ -13,36 +13,36 @@ pub use metadata::{
 };
 pub use residual::{NearField, ResidualCompliance};
 
-use crate::error::Error;
+use crate::error::{Error, RecordingError, RecordingPart};
 use crate::surface::Surface;
 use alloc::format;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// All responses of one elastic body, in modal form with residual compliance:
+/// Responses of one elastic body, in modal form with residual compliance:
 /// u = Φ·q + S·f on the surface, q by the exact recursion of each mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// Units, conventions, material, mass, certificate and where it came from.
+    /// Units, conventions, material, mass, certificate and origin.
     pub metadata: Metadata,
-    /// The free surface at rest.
+    /// Free surface at rest.
     pub surface: Surface,
-    /// The elastic modes that are kept.
+    /// Kept elastic modes.
     pub modes: ModalBasis,
-    /// Static compliance of everything that the kept modes miss.
+    /// Static compliance of the modes that are not kept.
     pub residual: ResidualCompliance,
-    /// How a body with fixed nodes sags under its weight; none for a free body, which falls.
+    /// Sag of a body with fixed nodes under its weight; none for a free body.
     pub gravity: Option<GravityResponse>,
 }
 
 /// Elastic modes, orthonormal in the mass matrix: ΦᵀMΦ = I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalBasis {
-    /// ω [rad/s], ascending, all positive; length m.
+    /// Angular frequencies ω [rad/s], ascending and positive; length m.
     pub angular_frequencies: Vec<f64>,
-    /// ζ [1], not negative; length m.
+    /// Damping ratios ζ [1], not negative; length m.
     pub damping_ratios: Vec<f64>,
-    /// Φ [1/√kg] at the surface nodes, row by row: (3·node + axis)·m + mode.
+    /// Mode shapes Φ at the surface nodes [1/√kg], row by row: (3·node + axis)·m + mode.
     pub mode_shapes: Vec<f64>,
 }
 
@@ -51,7 +51,7 @@ pub struct ModalBasis {
 pub struct GravityResponse {
     /// Modal force per unit acceleration [√kg]: axis·m + mode.
     pub modal_forces: Vec<f64>,
-    /// Static displacement that the modes miss, per unit acceleration [s²]:
+    /// Static displacement beyond the modes, per unit acceleration [s²]:
     /// (3·node + axis of displacement)·3 + axis of acceleration.
     pub residual_displacements: Vec<f64>,
 }
@@ -67,7 +67,7 @@ impl ModalBasis {
         self.angular_frequencies.is_empty()
     }
 
-    /// Φ at one surface node and axis: m numbers [1/√kg].
+    /// Row of Φ at a surface node and axis: m numbers [1/√kg].
     pub fn row(&self, node: usize, axis: usize) -> &[f64] {
         let m = self.len();
         &self.mode_shapes[(3 * node + axis) * m..][..m]
@@ -75,17 +75,17 @@ impl ModalBasis {
 }
 
 impl GravityResponse {
-    /// Displacement [m] of a node under an acceleration [m/s²], the part that modes miss.
+    /// Displacement of a node beyond the modes [m], under an acceleration [m/s²].
     pub fn residual_displacement(&self, node: usize, acceleration: DVec3) -> DVec3 {
         let row = |axis: usize| DVec3::from_slice(&self.residual_displacements[(3 * node + axis) * 3..]);
         DVec3::new(row(0).dot(acceleration), row(1).dot(acceleration), row(2).dot(acceleration))
     }
 }
 
-/// Sizes [SI] beyond this, or below its inverse, are no body's: a step could overflow.
+/// Upper limit of sizes [SI units], and inverse of the lower limit, so that a step cannot overflow.
 const LARGEST: f64 = 1e18;
 
-/// Whether a tensor is the inertia of a body: ½·tr(I)·1 − I, its second moment of mass, must be positive definite.
+/// Whether a tensor is the inertia of a body: its second moment of mass ½·tr(I)·1 − I is positive definite.
 fn is_inertia(tensor: &DMat3) -> bool {
     let trace = tensor.x_axis.x + tensor.y_axis.y + tensor.z_axis.z;
     let asymmetry =
@@ -100,7 +100,7 @@ fn is_inertia(tensor: &DMat3) -> bool {
 }
 
 impl Recording {
-    /// Whether a surface point can be moved: not when all its corners are fixed nodes.
+    /// Whether a surface point can move: not all its corners are fixed nodes.
     pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
         self.surface.corners(point).iter().any(|&(node, weight)| {
             let moves = |axis: usize| {
@@ -121,54 +121,64 @@ impl Recording {
         DMat3::from_cols_array_2d(&self.metadata.mass.inertia_kg_m2)
     }
 
-    /// Refuse what a step could trip over: lengths that don't fit, numbers that are not finite,
-    /// indices out of range, impossible physics. A recording from a file has been checked.
+    /// Check lengths, indices, finite numbers and physical ranges, so that a step cannot fail. A recording from a file has
+    /// been checked.
     ///
     /// # Errors
-    /// Says what does not fit.
+    /// [`RecordingError::Inconsistent`] with the part and the finding.
     pub fn validate(&self) -> Result<(), Error> {
-        let fail = |what| Err(Error::Recording(what));
+        use RecordingPart::{Gravity, Mass, Modes, Surface};
+        let fail = |part, what| Err(RecordingError::Inconsistent { part, what }.into());
         let (nodes, modes) = (self.surface.positions.len(), self.modes.len());
         if nodes == 0 || self.surface.triangles.is_empty() {
-            return fail("the surface is empty".into());
+            return fail(Surface, "the surface is empty".into());
         }
         if self.surface.source_nodes.len() != nodes {
-            return fail(format!("{} source nodes for {nodes} nodes", self.surface.source_nodes.len()));
+            return fail(
+                Surface,
+                format!("{} source nodes for {nodes} nodes", self.surface.source_nodes.len()),
+            );
         }
         if let Some(t) = self.surface.triangles.iter().position(|t| t.iter().any(|&n| n as usize >= nodes)) {
-            return fail(format!("triangle {t} names a node half_space the surface's {nodes} nodes"));
+            return fail(Surface, format!("triangle {t} names a node beyond the surface's {nodes} nodes"));
         }
         if self.modes.damping_ratios.len() != modes {
-            return fail(format!("{} damping ratios for {modes} modes", self.modes.damping_ratios.len()));
+            return fail(
+                Modes,
+                format!("{} damping ratios for {modes} modes", self.modes.damping_ratios.len()),
+            );
         }
         if self.modes.mode_shapes.len() != 3 * nodes * modes {
-            return fail(format!(
-                "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
-                self.modes.mode_shapes.len(),
-                3 * nodes * modes
-            ));
+            return fail(
+                Modes,
+                format!(
+                    "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
+                    self.modes.mode_shapes.len(),
+                    3 * nodes * modes
+                ),
+            );
         }
         let finite = |values: &[f64]| values.iter().all(|v| v.abs() < LARGEST);
         if !self.surface.positions.iter().all(|p| p.abs().max_element() < LARGEST) {
-            return fail("a surface position is not finite".into());
+            return fail(Surface, "a surface position is not finite".into());
         }
         if !finite(&self.modes.mode_shapes) {
-            return fail("a mode shape is not finite".into());
+            return fail(Modes, "a mode shape is not finite".into());
         }
         let frequencies = &self.modes.angular_frequencies;
         if !frequencies.iter().all(|w| (1.0 / LARGEST..LARGEST).contains(w)) || !frequencies.is_sorted() {
-            return fail("angular frequencies must be positive, finite and ascending".into());
+            return fail(Modes, "angular frequencies must be positive, finite and ascending".into());
         }
         if !self.modes.damping_ratios.iter().all(|z| (0.0..LARGEST).contains(z)) {
-            return fail("damping ratios must be finite and not negative".into());
+            return fail(Modes, "damping ratios must be finite and not negative".into());
         }
         self.residual.validate(nodes)?;
         let mass = self.mass();
         if !(1.0 / LARGEST..LARGEST).contains(&mass) {
-            return fail(format!("mass is {mass:e} kg, expected a positive number"));
+            return fail(Mass, format!("mass is {mass:e} kg, expected a positive number"));
         }
         if !is_inertia(&self.inertia()) {
-            return fail("the inertia tensor is not one of a body: symmetric, positive definite, and no principal value above the sum of the others".into());
+            return fail(Mass, "the inertia tensor is not one of a body: symmetric, positive definite, and no principal value above the sum of the others".into());
         }
         self.metadata.validate()?;
         match (&self.gravity, self.metadata.support) {
@@ -181,7 +191,7 @@ impl Recording {
             {
                 Ok(())
             }
-            _ => fail("the gravity response does not fit the support".into()),
+            _ => fail(Gravity, "the gravity response does not fit the support".into()),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Residual compliance S: static compliance of everything that the kept modes miss.
+//! Residual compliance S: static compliance of the modes that are not kept.
 //!
 //! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. It acts within
 //! a step only, as a massless spring. Whole for small surfaces; for large ones its near field
@@ -6,7 +6,7 @@
 //! is positive definite in space, so by Schur's product theorem the near field is positive
 //! semi-definite too, and its diagonal is exact (Wendland 1995, Adv. Comput. Math. 4, 389).
 
-use crate::error::Error;
+use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::vec::Vec;
 use core::cmp::Ordering;
@@ -15,9 +15,9 @@ use glam::{DMat3, DVec3};
 /// Residual compliance between surface nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ResidualCompliance {
-    /// Left out: the force is then wrong by up to several times. For comparison only.
+    /// Neglected: forces are then wrong by up to several times. For comparison only.
     None,
-    /// The lower triangle row by row, entry (i, j ≤ i) at i(i+1)/2 + j [m/N].
+    /// Lower triangle row by row, entry (i, j ≤ i) at i(i+1)/2 + j [m/N].
     Whole(Vec<f32>),
     /// Node blocks near the diagonal.
     NearField(NearField),
@@ -28,9 +28,9 @@ pub enum ResidualCompliance {
 pub struct NearField {
     /// Cut-off radius r [m].
     pub radius: f64,
-    /// For each node, where its blocks start; length nodes + 1.
+    /// Index of each node's first block; length nodes + 1.
     pub offsets: Vec<u32>,
-    /// ContactCollider node of each block, ascending within a row.
+    /// Column node of each block, ascending within a row.
     pub nodes: Vec<u32>,
     /// Nine numbers per block [m/N], row by row.
     pub blocks: Vec<f32>,
@@ -70,7 +70,7 @@ impl ResidualCompliance {
         }
     }
 
-    /// The trace of a block [m/N].
+    /// Trace of a block [m/N].
     pub(crate) fn trace(&self, i: usize, j: usize) -> f64 {
         match self {
             Self::Whole(packed) if i != j => {
@@ -82,8 +82,8 @@ impl ResidualCompliance {
         }
     }
 
-    pub(super) fn validate(&self, nodes: usize) -> Result<(), Error> {
-        let fail = |what| Err(Error::Recording(what));
+    pub(super) fn validate(&self, nodes: usize) -> Result<(), RecordingError> {
+        let fail = |what| Err(RecordingError::Inconsistent { part: RecordingPart::Residual, what });
         let values: &[f32] = match self {
             Self::None => &[],
             Self::Whole(packed) => {
@@ -125,13 +125,13 @@ impl ResidualCompliance {
 }
 
 impl NearField {
-    /// The blocks of a node's row, with the other node of each.
+    /// Blocks of a node's row, with their column nodes.
     pub(crate) fn row(&self, node: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
         let range = self.offsets[node] as usize..self.offsets[node + 1] as usize;
         range.map(|at| (self.nodes[at] as usize, self.block(at)))
     }
 
-    /// The nodes of each row; only once the offsets are known to ascend within bounds.
+    /// Column nodes of each row; valid after the check of the offsets.
     fn rows(&self) -> impl Iterator<Item = &[u32]> {
         self.offsets.windows(2).map(|pair| &self.nodes[pair[0] as usize..pair[1] as usize])
     }
@@ -143,7 +143,7 @@ impl NearField {
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
     }
 
-    /// Wendland's ψ at distance over radius s ≥ 0.
+    /// Wendland's function ψ at the ratio s ≥ 0 of distance and radius [1].
     pub fn taper(s: f64) -> f64 {
         if s >= 1.0 {
             return 0.0;

@@ -1,7 +1,7 @@
-//! A body as contacts see it: its recording, how displacement is read on it, and the tree over its surface.
+//! Elastic body in contact: its recording, contact patches and samples, and the sphere tree over its surface.
 
 use super::dot_products::{dot3, dot3_single};
-use super::patch_field::{ModalDistances, PatchField, residual_size};
+use super::patch_field::{FactoredForce, ModalDistances, PatchField, SampleSurface, residual_size};
 use crate::recording::Recording;
 use crate::surface::{
     Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, poisson_disk_sample,
@@ -11,74 +11,78 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// Levels of places: how much farther apart those of each are than those before, of more places than [`MANY`] and of fewer;
-/// and how wide their patches are beside that, for which a cube that lands bounces as high as by its nodes.
-const MOST_LEVELS: usize = 24;
-const MANY: usize = 4096;
-const COARSER: [f64; 2] = [2.0, 1.45];
-const OVERLAP: f64 = 1.5;
+/// Upper limit of levels of contact samples.
+const MAX_LEVELS: usize = 24;
 
-/// How displacement is read, and force spread, at a place.
+/// Ratio of sample spacings of successive levels: for more samples than `MANY_SAMPLES`, and for fewer.
+const SPACING_RATIOS: [f64; 2] = [2.0, 1.45];
+const MANY_SAMPLES: usize = 4096;
+
+/// Ratio of patch radius to sample spacing, with which a landing cube bounces as high as with all nodes.
+const PATCH_OVERLAP: f64 = 1.5;
+
+/// Contact footprint: average of displacement and distribution of force about a contact location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Footprint {
-    /// At the point itself, by the weights of its triangle.
+    /// Surface point, by the weights of its triangle.
     #[default]
     Point,
-    /// Over the patch of this number among the body's.
+    /// Contact patch, by its index in [`Body::patches`].
     Patch(u32),
 }
 
-/// Where a force can act on a body.
+/// Contact location on a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ContactLocation {
     pub(crate) point: SurfacePoint,
     pub(crate) footprint: Footprint,
 }
 
-/// What is known of a place at the start of a step [m, body].
+/// State of a contact location at the start of a step [m, body].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LocationState {
     /// Elastic displacement.
     pub(crate) displacement: DVec3,
-    /// The part of it that the residual compliance and the weight cause.
+    /// Part of it by the residual compliance and the body's weight.
     pub(crate) residual: DVec3,
-    /// The part that the weight causes beside the modes; lasts, since only bodies that stay where they are have one.
+    /// Part by the body's weight beyond the modes; constant, since only bodies with fixed nodes have one.
     pub(crate) sag: DVec3,
 }
 
-/// A force that acted over the last step.
+/// Force that acted over the last step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AppliedForce {
     pub(crate) location: ContactLocation,
-    /// [N, body]
+    /// Force [N, body].
     pub(crate) force: DVec3,
-    /// Where at rest [m, body].
+    /// Rest position [m, body].
     pub(crate) rest: DVec3,
-    /// For patches Aᵀ·f [√J] of the patch field's equation, and where; between places that stand for others at each corner.
-    pulls: [(DVec3, DVec3); 3],
+    /// Factored forces of a patch; those between contact samples act at each corner.
+    factored: [FactoredForce; 3],
 }
 
-/// One object's body; immutable.
+/// Elastic body of one object; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) recording: Arc<Recording>,
-    /// Those of devices, then those that stand for the nodes of faces in contact, finest first (see `contact::against`).
+    /// Patches of the devices' radii, then those of the contact samples of each level, finest first.
     pub(crate) patches: Vec<PatchField>,
-    devices: usize,
+    /// Number of patches of devices.
+    device_patches: usize,
     tree: SphereTree,
     bounds: Bounds,
-    /// Mean edge of the triangles at rest [m].
+    /// Mean edge length of the triangles at rest [m].
     pub(crate) edge: f64,
-    /// The triangles around every surface node, one after the other.
+    /// Triangles around every surface node, node after node, and the index of each node's first.
     around: Vec<u32>,
     first_around: Vec<u32>,
-    /// The box around the body at rest [m, body].
+    /// Bounding box at rest [m, body].
     low: DVec3,
     high: DVec3,
 }
 
 impl Body {
-    /// With patches of the given radii [m], and faces that meet something at so many places at most.
+    /// Body with patches of the given radii [m], and levels of contact samples down to `max_contact_samples`.
     pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], max_contact_samples: usize) -> Self {
         let tree = SphereTree::new(&recording.surface.positions, &recording.surface.triangles);
         let shapes = &recording.modes.mode_shapes;
@@ -88,17 +92,17 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
-        let mut apart = edge;
+        let mut spacing = edge;
         let mut count = recording.surface.positions.len();
-        for _ in 0..MOST_LEVELS {
+        for _ in 0..MAX_LEVELS {
             if count <= max_contact_samples {
                 break;
             }
-            apart *= COARSER[usize::from(count <= MANY)];
-            let nodes = poisson_disk_sample(&recording.surface, apart);
+            spacing *= SPACING_RATIOS[usize::from(count <= MANY_SAMPLES)];
+            let nodes = poisson_disk_sample(&recording.surface, spacing);
             if nodes.len() < count {
                 count = nodes.len();
-                patches.push(PatchField::about(&recording, &nodes, OVERLAP * apart));
+                patches.push(PatchField::at_samples(&recording, &nodes, PATCH_OVERLAP * spacing));
             }
         }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
@@ -107,29 +111,30 @@ impl Body {
             first_around.push(around.len() as u32);
         }
         let (low, high) = recording.surface.extent();
-        Self { recording, patches, devices: radii.len(), tree, bounds, edge, around, first_around, low, high }
+        let device_patches = radii.len();
+        Self { recording, patches, device_patches, tree, bounds, edge, around, first_around, low, high }
     }
 
-    /// Whether a place [m, body] is within a reach [m] of the box around the body at rest.
-    pub(crate) fn rest_box_is_within(&self, location: DVec3, reach: f64) -> bool {
-        (location - location.clamp(self.low, self.high)).length() < reach
+    /// Whether a point [m, body] is within a reach [m] of the bounding box at rest.
+    pub(crate) fn rest_box_is_within(&self, p: DVec3, reach: f64) -> bool {
+        (p - p.clamp(self.low, self.high)).length() < reach
     }
 
-    /// The triangles around a surface node.
+    /// Triangles around a surface node.
     pub(crate) fn triangles_around(&self, node: usize) -> &[u32] {
         &self.around[self.first_around[node] as usize..self.first_around[node + 1] as usize]
     }
 
-    /// The triangle on the other side of an edge; none at a border.
+    /// Triangle on the other side of an edge; none at a border.
     pub(crate) fn triangle_across(&self, triangle: u32, a: u32, b: u32) -> Option<u32> {
         let has = |t: u32| t != triangle && self.recording.surface.triangles[t as usize].contains(&b);
         self.triangles_around(a as usize).iter().copied().find(|&t| has(t))
     }
 
-    /// A node that a footprint knows as a surface point, always the same.
+    /// Node of a footprint's surface as a surface point, always the same one.
     pub(crate) fn node_point(&self, footprint: Footprint, node: usize) -> SurfacePoint {
-        if let Some(some) = self.patch(footprint).and_then(|patch| patch.some.as_ref()) {
-            return some.node_point(node);
+        if let Some(samples) = self.samples(footprint) {
+            return samples.node_point(node);
         }
         let triangle = self.triangles_around(node)[0];
         let corners = self.recording.surface.triangles[triangle as usize];
@@ -142,7 +147,7 @@ impl Body {
         self.norms_of(q.iter().copied())
     }
 
-    /// How far any surface node can go between two modal coordinates [m].
+    /// Displacement bound of any surface node between two vectors of modal coordinates [m].
     pub(crate) fn displacement_bound(&self, from: &[f64], to: &[f64]) -> f64 {
         let modal = self.norms_of(from.iter().zip(to).map(|(a, b)| b - a));
         self.bounds.max_displacement(&DeformationBound { modal, ..DeformationBound::STILL })
@@ -154,122 +159,125 @@ impl Body {
         core::array::from_fn(|at| libm::sqrt(squares.by_ref().take(band(omegas.len(), at).len()).sum()))
     }
 
-    /// The footprint for a patch of a radius [m]; the point itself for 0.
+    /// Footprint of a patch radius [m]; the point for 0.
     pub(crate) fn footprint(&self, radius: f64) -> Footprint {
         let patch = self.patches.iter().position(|patch| patch.radius == radius);
-        patch.map_or(Footprint::Point, |at| Footprint::Patch(at as u32))
+        patch.map_or(Footprint::Point, |index| Footprint::Patch(index as u32))
     }
 
-    /// How a face is read: by its nodes at level 0, then by ever fewer places.
+    /// Footprint of a level of detail: all nodes at level 0, then ever fewer contact samples.
     pub(crate) fn footprint_at_level(&self, level: usize) -> Footprint {
-        if level == 0 { Footprint::Point } else { Footprint::Patch((self.devices + level - 1) as u32) }
+        if level == 0 { Footprint::Point } else { Footprint::Patch((self.device_patches + level - 1) as u32) }
     }
 
-    /// The coarsest of these.
+    /// Coarsest level of detail.
     pub(crate) fn coarsest_level(&self) -> usize {
-        self.patches.len() - self.devices
+        self.patches.len() - self.device_patches
     }
 
-    /// The coarsest of these that, with all before it, is a surface that other objects can meet.
+    /// Coarsest level up to which every level has a decimated surface, for contact with other objects.
     pub(crate) fn coarsest_surface_level(&self) -> usize {
-        let is_surface = |patch: &&PatchField| patch.some.as_ref().is_some_and(|some| some.is_surface);
-        self.patches[self.devices..].iter().take_while(is_surface).count()
+        let is_surface =
+            |patch: &&PatchField| patch.samples.as_ref().is_some_and(|samples| samples.is_surface);
+        self.patches[self.device_patches..].iter().take_while(is_surface).count()
     }
 
-    /// The surface that a footprint knows: all of it, or a coarser one between places.
+    /// Surface of a footprint: all triangles, or the decimated surface between contact samples.
     pub(crate) fn surface(&self, footprint: Footprint) -> &Surface {
         self.patch(footprint).map_or(&self.recording.surface, |patch| patch.surface(&self.recording))
     }
 
-    /// The tree over it.
+    /// Sphere tree over the surface of a footprint.
     pub(crate) fn tree(&self, footprint: Footprint) -> &SphereTree {
-        let some = self.patch(footprint).and_then(|patch| patch.some.as_ref());
-        some.map_or(&self.tree, |some| &some.tree)
+        self.samples(footprint).map_or(&self.tree, |samples| &samples.tree)
     }
 
-    /// The corners of a place's triangle with their weights.
+    /// Corner nodes of a location's triangle with their weights.
     pub(crate) fn corners(&self, location: &ContactLocation) -> [(usize, f64); 3] {
         self.surface(location.footprint).corners(&location.point)
     }
 
-    /// The way that a place which stands for others faces at rest [body]; zero for nodes, which stand for themselves.
+    /// Outward unit normal of a contact sample at rest [body]; zero at level 0, where every node is its own sample.
     pub(crate) fn outward_normal(&self, footprint: Footprint, node: usize) -> DVec3 {
-        let some = self.patch(footprint).and_then(|patch| patch.some.as_ref());
-        some.map_or(DVec3::ZERO, |some| some.facing(node))
+        self.samples(footprint).map_or(DVec3::ZERO, |samples| samples.normal(node))
     }
 
-    /// Where a place is at rest [m, body].
+    /// Rest position of a location [m, body].
     pub(crate) fn rest_position(&self, location: &ContactLocation) -> DVec3 {
         self.surface(location.footprint).rest_position(&location.point)
     }
 
-    /// The nodes that a footprint knows.
-    pub(super) fn places(&self, footprint: Footprint) -> Vec<u32> {
-        match self.patch(footprint).and_then(|patch| patch.some.as_ref()) {
-            Some(some) => some.nodes().to_vec(),
+    /// Nodes of a footprint's surface.
+    pub(super) fn nodes(&self, footprint: Footprint) -> Vec<u32> {
+        match self.samples(footprint) {
+            Some(samples) => samples.nodes().to_vec(),
             None => (0..self.recording.surface.positions.len() as u32).collect(),
         }
     }
 
-    /// Which of these a node is.
+    /// Index of a node among them.
     ///
     /// # Real time
-    pub(super) fn number(&self, footprint: Footprint, node: usize) -> usize {
-        self.patch(footprint).map_or(node, |patch| patch.number(node))
+    pub(super) fn node_index(&self, footprint: Footprint, node: usize) -> usize {
+        self.patch(footprint).map_or(node, |patch| patch.index(node))
     }
 
     pub(super) fn patch(&self, footprint: Footprint) -> Option<&PatchField> {
         match footprint {
             Footprint::Point => None,
-            Footprint::Patch(at) => self.patches.get(at as usize),
+            Footprint::Patch(index) => self.patches.get(index as usize),
         }
     }
 
-    /// What the first few modes, or all, do to a surface node [m, body], as a footprint sees it: for patches, which are kept
-    /// and read in single precision, by `single`.
+    fn samples(&self, footprint: Footprint) -> Option<&SampleSurface> {
+        self.patch(footprint).and_then(|patch| patch.samples.as_ref())
+    }
+
+    /// Displacement of a surface node by modal coordinates of the first modes [m, body], averaged over the footprint. Patches
+    /// are stored and evaluated in single precision, with the coordinates `single`.
     ///
     /// # Real time
     pub(crate) fn displacement(&self, footprint: Footprint, node: usize, q: &[f64], single: &[f32]) -> DVec3 {
         let (m, shapes) = (self.recording.modes.len(), &self.recording.modes.mode_shapes);
-        let own = |number: usize| 3 * m * number..3 * m * (number + 1);
+        let own = |index: usize| 3 * m * index..3 * m * (index + 1);
         match self.patch(footprint) {
             None => dot3(&shapes[own(node)], q),
-            Some(patch) => dot3_single(&patch.rows[own(patch.number(node))], single),
+            Some(patch) => dot3_single(&patch.rows[own(patch.index(node))], single),
         }
     }
 
-    /// Add the mode shapes of a surface node with a weight, as a footprint sees them: three rows.
+    /// Add the mode shapes of a surface node times a weight, averaged over the footprint: three rows.
     ///
     /// # Real time
     pub(crate) fn add_rows(&self, footprint: Footprint, node: usize, weight: f64, rows: &mut [f64]) {
         let length = rows.len();
-        let own = |number: usize| length * number..length * (number + 1);
+        let own = |index: usize| length * index..length * (index + 1);
         match self.patch(footprint) {
             None => rows
                 .iter_mut()
                 .zip(&self.recording.modes.mode_shapes[own(node)])
                 .for_each(|(row, phi)| *row += weight * phi),
             Some(patch) => {
-                let pairs = rows.iter_mut().zip(&patch.rows[own(patch.number(node))]);
+                let pairs = rows.iter_mut().zip(&patch.rows[own(patch.index(node))]);
                 pairs.for_each(|(row, phi)| *row += weight * f64::from(*phi));
             }
         }
     }
 
-    /// What of a dent can change over a distance, as a share per metre; infinite where dents have no shape that is worth
-    /// looking at: between nodes, and between places that stand for others.
+    /// Largest relative change of residual displacement per distance [1/m]; infinite between nodes and between contact
+    /// samples, whose residual displacements are unrelated.
     pub(crate) fn residual_slope(&self, footprint: Footprint) -> f64 {
-        let patch = self.patch(footprint).filter(|patch| patch.some.is_none());
+        let patch = self.patch(footprint).filter(|patch| patch.samples.is_none());
         patch.map_or(f64::INFINITY, PatchField::residual_slope)
     }
 
-    /// How far the surface can go, as a footprint sees it.
+    /// Displacement bounds of the surface, averaged over the footprint.
     pub(crate) fn bounds(&self, footprint: Footprint) -> &Bounds {
         self.patch(footprint).map_or(&self.bounds, |patch| &patch.bounds)
     }
 
-    /// Residual compliance between two places [m/N]; none between different readings, whose places answer each other
-    /// by the modes alone.
+    /// Residual compliance between two locations [m/N]; zero between different footprints, which couple by the modes
+    /// alone.
     ///
     /// # Real time
     pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
@@ -291,49 +299,49 @@ impl Body {
         }
     }
 
-    /// What a force leaves of itself for the step after.
+    /// Record of a force [N, body] for the next step.
     ///
     /// # Real time
-    pub(crate) fn applied_forces(&self, location: ContactLocation, force: DVec3) -> AppliedForce {
+    pub(crate) fn applied_force(&self, location: ContactLocation, force: DVec3) -> AppliedForce {
         let rest = self.rest_position(&location);
         let patch = self.patch(location.footprint);
-        let pulls = patch.map(|patch| patch.pulls(&self.recording, &location.point, rest, force));
-        AppliedForce { location, force, rest, pulls: pulls.unwrap_or_default() }
+        let factored = patch.map(|patch| patch.factored(&self.recording, &location.point, rest, force));
+        AppliedForce { location, force, rest, factored: factored.unwrap_or_default() }
     }
 
-    /// What the residual compliance moves a surface node [m, body], read as the force's place is. Up to a distance
-    /// `flat` [m] from the force a patch's dent is as deep as there.
+    /// Residual displacement of a surface node under a force [m, body], averaged over the force's footprint. That of a patch
+    /// is constant up to a distance `flat_radius` [m] from the force.
     ///
     /// # Real time
     pub(crate) fn residual_displacement(
         &self,
         node: usize,
-        applied_forces: &AppliedForce,
-        flat: f64,
+        applied: &AppliedForce,
+        flat_radius: f64,
     ) -> DVec3 {
-        match self.patch(applied_forces.location.footprint) {
-            Some(patch) => patch.residual_displacement(&self.recording, node, &applied_forces.pulls, flat),
-            None => self.residual_of_node(node, &applied_forces.location) * applied_forces.force,
+        match self.patch(applied.location.footprint) {
+            Some(patch) => patch.residual_displacement(&self.recording, node, &applied.factored, flat_radius),
+            None => self.residual_of_node(node, &applied.location) * applied.force,
         }
     }
 
-    /// The nodes that a force at a place acts on, with their weights; a node may come more than once.
-    pub(super) fn spread(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
+    /// Distribution of a force at a location to nodes, with weights; a node may come more than once.
+    pub(super) fn distribute(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
         for (corner, weight) in self.corners(location) {
             match self.patch(location.footprint) {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),
                 Some(patch) => {
-                    patch.weights.of(patch.number(corner)).for_each(|(node, w)| give(node, w * weight))
+                    patch.weights.of(patch.index(corner)).for_each(|(node, w)| give(node, w * weight))
                 }
             }
         }
     }
 
-    /// Residual compliance from a place to the surface node itself [m/N].
+    /// Residual compliance of a surface node [m/N]: its displacement per force at a location.
     pub(super) fn residual_of_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
         let mut sum = DMat3::ZERO;
-        self.spread(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
+        self.distribute(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
         sum
     }
 }

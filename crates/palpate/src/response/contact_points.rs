@@ -1,32 +1,32 @@
-//! The contact points of one object, and their compliance within a step.
+//! Contact points of one object, and their compliance within a step.
 //!
-//! C [m/N] in body axes, R_cc[0] of equation (9), depends on where the points are, not on time: it is computed when
-//! a point is new and kept while it lasts.
+//! C [m/N] in body axes, R_cc[0] of equation (9), depends on the locations of the points, not on time: a block is computed
+//! when a point gets its location.
 
 use super::{ContactLocation, Footprint, LocationState, ResponseView, dot};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// A place on an object where a contact acts, during a step.
+/// Contact point of an object during a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ContactPoint {
     pub(crate) location: ContactLocation,
-    /// Its rows in the response; stays the same while the point lasts.
+    /// Slot of its rows in the response; constant while the point lasts.
     pub(crate) slot: usize,
-    /// The surface node that it is, if it is one.
+    /// Surface node at the location, if it is one.
     pub(crate) node: Option<usize>,
-    /// Whether it came to its place in this step.
+    /// Whether its location is new in this step.
     pub(crate) is_new: bool,
     /// Rest position [m, body].
     pub(crate) rest: DVec3,
-    /// Where it is at the start of the step.
+    /// State of the location at the start of the step.
     pub(crate) state: LocationState,
     /// Displacement at the end of the step without contact force [m, body].
     pub(crate) free: DVec3,
     /// Displacement at the end of the step [m, body].
     pub(crate) displacement: DVec3,
-    /// Force on the object, held over the step [N, world], and the same in body axes.
+    /// Force on the object, held over the step [N, world], and in body axes.
     pub(crate) force: DVec3,
     pub(crate) force_in_body: DVec3,
     /// Arm from the centre of mass at the start and at the end of the step [m, world].
@@ -35,26 +35,26 @@ pub(crate) struct ContactPoint {
 }
 
 impl ContactPoint {
-    /// The node that it reads, if it is a node and no patch.
-    pub(crate) fn known_node(&self) -> Option<usize> {
+    /// Surface node of a point without patch, if the location is a node.
+    pub(crate) fn single_node(&self) -> Option<usize> {
         self.node.filter(|_| self.location.footprint == Footprint::Point)
     }
 }
 
-/// All contact points of one object; buffers are made once.
+/// Contact points of one object; buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactPoints {
     pub(crate) points: Vec<ContactPoint>,
-    /// C, row by row, `stride` numbers apart.
+    /// C, row-major, with rows `stride` numbers apart.
     compliance: Vec<f64>,
     stride: usize,
-    /// Forces g in body axes and C·g, three numbers per point.
+    /// Forces g [N, body] and displacements C·g [m, body], three numbers per point.
     forces: Vec<f64>,
     moved: Vec<f64>,
-    /// Changes of force that move their point by less than this [m] wait until they have added up.
+    /// Displacement [m] below which a change of force is postponed.
     pub(crate) least_move: f64,
     unused: Vec<usize>,
-    /// Where the point of a slot stands in `points`.
+    /// Index in `points` of each slot's point.
     at: Vec<usize>,
 }
 
@@ -73,12 +73,12 @@ impl ContactPoints {
         }
     }
 
-    /// Room for points.
+    /// Upper limit of points.
     pub(crate) fn capacity(&self) -> usize {
         self.at.len()
     }
 
-    /// Where the point of a slot stands.
+    /// Index of a slot's point.
     pub(crate) fn index(&self, slot: usize) -> usize {
         self.at[slot]
     }
@@ -87,7 +87,7 @@ impl ContactPoints {
         &self.points[self.at[slot]]
     }
 
-    /// Take in a place; gives its slot, or none when there is no room.
+    /// Add a point at a location. Gives its slot, or none at capacity.
     ///
     /// # Real time
     /// Costs modes × points.
@@ -115,17 +115,17 @@ impl ContactPoints {
         Some(slot)
     }
 
-    /// Move a point to another place.
+    /// Move a point to another location.
     ///
     /// # Real time
     /// Costs modes × points.
     pub(crate) fn set_location(&mut self, view: &mut ResponseView, slot: usize, location: ContactLocation) {
         let at = self.at[slot];
         self.drop_force(at);
-        let state_at = view.assign(slot, &location);
+        let start = view.assign(slot, &location);
         let rest = view.body.rest_position(&location);
         let point = &mut self.points[at];
-        (point.location, point.rest, point.state, point.is_new) = (location, rest, state_at, true);
+        (point.location, point.rest, point.state, point.is_new) = (location, rest, start, true);
         let corners = view.body.corners(&location);
         point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
         let Self { points, compliance, stride, .. } = self;
@@ -142,7 +142,7 @@ impl ContactPoints {
         }
     }
 
-    /// Let a point go.
+    /// Remove a point.
     ///
     /// # Real time
     pub(crate) fn remove(&mut self, view: &mut ResponseView, slot: usize) {
@@ -150,7 +150,7 @@ impl ContactPoints {
         let (at, last) = (self.at[slot], self.points.len() - 1);
         self.drop_force(at);
         if at != last {
-            // The last point takes the free place.
+            // The last point takes the free index.
             for other in 0..last {
                 if other != at {
                     let block = self.block(last, other);
@@ -168,7 +168,7 @@ impl ContactPoints {
         self.unused.push(slot);
     }
 
-    /// C between two points, by where they stand.
+    /// Block of C between two points, by their indices [m/N].
     pub(crate) fn block(&self, row: usize, column: usize) -> DMat3 {
         let part =
             |axis: usize| DVec3::from_slice(&self.compliance[(3 * row + axis) * self.stride + 3 * column..]);
@@ -196,7 +196,7 @@ impl ContactPoints {
         }
     }
 
-    /// No force anywhere.
+    /// Set all forces to zero.
     ///
     /// # Real time
     pub(crate) fn release_forces(&mut self) {
@@ -213,7 +213,7 @@ impl ContactPoints {
         self.push(at, DVec3::ZERO);
     }
 
-    /// Displacement of a point under the forces that are set [m, body].
+    /// Displacement of a point under the present forces [m, body].
     ///
     /// # Real time
     pub(crate) fn displaced(&self, at: usize) -> DVec3 {
@@ -233,7 +233,7 @@ impl ContactPoints {
         }
     }
 
-    /// What every point would do without contact force.
+    /// Predict the displacement of every point without contact force.
     ///
     /// # Real time
     pub(crate) fn predict(&mut self, view: &mut ResponseView) {
@@ -242,7 +242,7 @@ impl ContactPoints {
         }
     }
 
-    /// The same for those that are new since then.
+    /// Predict the displacement of points that are new since then.
     ///
     /// # Real time
     pub(crate) fn predict_new(&mut self, view: &mut ResponseView) {
@@ -253,7 +253,7 @@ impl ContactPoints {
     }
 }
 
-/// Write the block of a row and a column of points.
+/// Write the block of a row and a column.
 fn write(compliance: &mut [f64], stride: usize, (row, column): (usize, usize), block: &DMat3) {
     for axis in 0..3 {
         block.row(axis).write_to_slice(&mut compliance[(3 * row + axis) * stride + 3 * column..]);

@@ -1,14 +1,16 @@
-//! Sums of products with several running sums, which the compiler turns into vector instructions; the order of
-//! addition is fixed, so the bits are.
+//! Dot products with several running sums, which the compiler vectorises. The order of addition is fixed, so results are
+//! reproducible to the bit.
 
 use glam::{DMat3, DVec3};
 
-/// Running sums per product.
+/// Running sums per product, in double precision.
 const LANES: usize = 8;
 
-/// The same in single precision, and where nine products run side by side.
-const SINGLE: usize = 16;
-const NINE: usize = 2;
+/// Running sums per product, in single precision.
+const SINGLE_LANES: usize = 16;
+
+/// Running sums per product of three rows, of which three to nine run side by side.
+const ROW_LANES: usize = 2;
 
 /// Σ a·b over the shorter length; a in either precision.
 ///
@@ -26,15 +28,16 @@ pub(crate) fn dot<X: Copy + Into<f64>>(a: &[X], b: &[f64]) -> f64 {
     rest + ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
 }
 
-/// Σ a·b over the shorter length in single precision, which is twice as fast.
+/// Σ a·b over the shorter length in single precision, at half the time.
 ///
 /// # Real time
 fn dot_single(a: &[f32], b: &[f32]) -> f32 {
     let n = a.len().min(b.len());
-    let ((heads, rest_a), (tails, rest_b)) = (a[..n].as_chunks::<SINGLE>(), b[..n].as_chunks::<SINGLE>());
-    let mut sums = [0.0; SINGLE];
+    let ((heads, rest_a), (tails, rest_b)) =
+        (a[..n].as_chunks::<SINGLE_LANES>(), b[..n].as_chunks::<SINGLE_LANES>());
+    let mut sums = [0.0; SINGLE_LANES];
     for (x, y) in heads.iter().zip(tails) {
-        for lane in 0..SINGLE {
+        for lane in 0..SINGLE_LANES {
             sums[lane] += x[lane] * y[lane];
         }
     }
@@ -42,7 +45,7 @@ fn dot_single(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
-/// Three rows, one after the other, times the first few of q, in single precision.
+/// Products of three rows, stored one after the other, with the first entries q, in single precision.
 ///
 /// # Real time
 pub(super) fn dot3_single(rows: &[f32], q: &[f32]) -> DVec3 {
@@ -51,30 +54,30 @@ pub(super) fn dot3_single(rows: &[f32], q: &[f32]) -> DVec3 {
     DVec3::new(part(0), part(1), part(2))
 }
 
-/// Three rows, one after the other, times q.
+/// Products of three rows, stored one after the other, with q.
 ///
 /// # Real time
 pub(crate) fn dot3(rows: &[f64], q: &[f64]) -> DVec3 {
     dots(rows, [q])[0]
 }
 
-/// Three rows, one after the other, times each of several q, in one pass.
+/// Products of three rows, stored one after the other, with each of several q, in one pass.
 ///
 /// # Real time
 pub(super) fn dots<const N: usize>(rows: &[f64], several: [&[f64]; N]) -> [DVec3; N] {
     let m = several.iter().fold(rows.len() / 3, |m, q| m.min(q.len()));
     let row = chunks(rows, rows.len() / 3);
-    let tails = several.map(|q| q.as_chunks::<NINE>().0);
-    let mut sums = [[[0.0; NINE]; 3]; N];
-    for k in 0..m / NINE {
+    let tails = several.map(|q| q.as_chunks::<ROW_LANES>().0);
+    let mut sums = [[[0.0; ROW_LANES]; 3]; N];
+    for k in 0..m / ROW_LANES {
         let row = row.map(|row| row[k]);
         for (sums, q) in sums.iter_mut().zip(tails) {
             for (sums, x) in sums.iter_mut().zip(&row) {
-                (0..NINE).for_each(|lane| sums[lane] += x[lane] * q[k][lane]);
+                (0..ROW_LANES).for_each(|lane| sums[lane] += x[lane] * q[k][lane]);
             }
         }
     }
-    let (length, rest) = (rows.len() / 3, m / NINE * NINE);
+    let (length, rest) = (rows.len() / 3, m / ROW_LANES * ROW_LANES);
     core::array::from_fn(|of| {
         let part = |axis: usize| {
             let tail = (rest..m).map(|k| rows[axis * length + k] * several[of][k]);
@@ -84,27 +87,27 @@ pub(super) fn dots<const N: usize>(rows: &[f64], several: [&[f64]; N]) -> [DVec3
     })
 }
 
-/// Three rows of m in chunks, without what is left of each.
-fn chunks(rows: &[f64], m: usize) -> [&[[f64; NINE]]; 3] {
+/// Three rows of m numbers in whole chunks, without remainders.
+fn chunks(rows: &[f64], m: usize) -> [&[[f64; ROW_LANES]]; 3] {
     core::array::from_fn(|axis| rows[axis * m..(axis + 1) * m].as_chunks().0)
 }
 
-/// Three rows times three others: the matrix of all nine products, its rows by the first.
+/// Matrix of the nine products of three rows with three others, its rows by the first.
 ///
 /// # Real time
 pub(crate) fn dot9(a: &[f64], b: &[f64]) -> DMat3 {
     let m = (a.len() / 3).min(b.len() / 3);
     let (x, y) = (chunks(a, m), chunks(b, m));
-    let mut sums = [[[0.0; NINE]; 3]; 3];
-    for k in 0..m / NINE {
+    let mut sums = [[[0.0; ROW_LANES]; 3]; 3];
+    for k in 0..m / ROW_LANES {
         let (x, y) = (x.map(|row| row[k]), y.map(|row| row[k]));
         for (sums, x) in sums.iter_mut().zip(&x) {
             for (sums, y) in sums.iter_mut().zip(&y) {
-                (0..NINE).for_each(|lane| sums[lane] += x[lane] * y[lane]);
+                (0..ROW_LANES).for_each(|lane| sums[lane] += x[lane] * y[lane]);
             }
         }
     }
-    let rest = m / NINE * NINE;
+    let rest = m / ROW_LANES * ROW_LANES;
     let product = |i: usize, j: usize| {
         let tail = (rest..m).map(|k| a[i * m + k] * b[j * m + k]);
         sums[i][j].into_iter().chain(tail).sum()

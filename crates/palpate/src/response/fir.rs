@@ -5,15 +5,14 @@
 //! u[t]   = Σ_{s=0}^{T−1} R[s]·f[t−s]           O(n·n_c·T), all observed nodes, on demand
 //! ```
 //!
-//! The history keeps, for each of the last T steps, which surface points a force acted on, so contacts may come,
-//! go and move over the surface. In the table two samples of one number lie far apart (all observed degrees of
-//! freedom lie between), so the series R[0], R[1], … between a point in contact and a point where forces acted are
-//! copied together when the two first meet, weighted with their corners. When no room is left for a copy the table
-//! itself is read: the same numbers, more slowly.
+//! The history holds the loaded surface points of each of the last T steps, so contacts may appear, vanish and move over the
+//! surface. In the table, successive samples of one number lie far apart (all observed degrees of freedom lie between).
+//! The series R[0], R[1], … between a point in contact and a loaded point is therefore copied into one block when the two
+//! first meet, weighted with their corners. Without room for a copy the table itself is read: equal numbers, more slowly.
 
 use super::ContactPoint;
 use super::force_history::ForceHistory;
-use crate::error::Error;
+use crate::error::ModelError;
 use crate::recording::{ImpulseResponse, Recording};
 use crate::surface::SurfacePoint;
 use alloc::format;
@@ -22,32 +21,32 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// A table as one object of a scene uses it; immutable.
+/// Recorded table in use by one object of a scene; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct Fir {
     recording: Arc<Recording>,
     table: Arc<ImpulseResponse>,
-    /// For each surface node, its three columns of the table.
+    /// Columns of each surface node's three axes.
     touchable: Vec<Option<[u32; 3]>>,
-    /// For each surface node, its three places among the observed degrees of freedom.
+    /// Rows of each surface node's three axes among the observed degrees of freedom.
     observed: Vec<Option<[u32; 3]>>,
-    /// Displacement [s²] per unit acceleration that has acted since the start, like `ImpulseResponse::gravity`.
+    /// Displacement per unit acceleration since the start [s²], laid out like `ImpulseResponse::gravity`.
     gravity: Option<Arc<[f64]>>,
 }
 
-/// Room for copies of series between two points, per object [bytes].
+/// Memory for copies of series between two points, per object [bytes].
 const COPIES_BYTES: usize = 64 << 20;
 
-/// Marks an empty place.
+/// Mark of an entry without copy.
 const NONE: u32 = u32::MAX;
 
-/// The state of one object; buffers are made once.
+/// State of one object; buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) struct FirState {
     pub(super) history: ForceHistory,
-    /// The point that each slot stands for.
+    /// Surface point of each slot.
     contacts: Vec<Option<SurfacePoint>>,
-    /// Copies of series, T 3×3 blocks each, and which of them belongs to (slot, source).
+    /// Copies of series, T 3×3 blocks each; free copies; the copy of each (slot, source).
     copies: Vec<[f64; 9]>,
     unused: Vec<u32>,
     copy_of: Vec<u32>,
@@ -60,16 +59,18 @@ impl Fir {
         recording: Arc<Recording>,
         table: Arc<ImpulseResponse>,
         step_s: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, ModelError> {
         table.validate(&recording.surface)?;
         if libm::fabs(table.step_s - step_s) > 1e-9 * step_s {
-            return Err(Error::Model(format!(
-                "the impulse response was recorded with a step of {} s, the scene's step is {step_s} s",
-                table.step_s
-            )));
+            let recorded_s = table.step_s;
+            return Err(ModelError::ImpulseResponse {
+                what: format!(
+                    "the impulse response was recorded with a step of {recorded_s} s, the scene's step is {step_s} s"
+                ),
+            });
         }
-        let touchable = ImpulseResponse::places(&recording.surface, &table.touchable_dofs);
-        let observed = ImpulseResponse::places(&recording.surface, &table.observed_dofs);
+        let touchable = ImpulseResponse::dof_indices(&recording.surface, &table.touchable_dofs);
+        let observed = ImpulseResponse::dof_indices(&recording.surface, &table.observed_dofs);
         let gravity = table.gravity.as_ref().map(|response| {
             let mut sums = response.clone();
             let n = table.observed_dofs.len();
@@ -83,8 +84,8 @@ impl Fir {
         Ok(Self { recording, table, touchable, observed, gravity })
     }
 
-    /// Whether the table answers to acceleration of the whole body.
-    pub(crate) fn knows_gravity(&self) -> bool {
+    /// Whether the table holds the response to acceleration of the whole body.
+    pub(crate) fn has_gravity_response(&self) -> bool {
         self.gravity.is_some()
     }
 
@@ -141,7 +142,7 @@ impl Fir {
         }
     }
 
-    /// A node's part of all rows; none where it is not observed.
+    /// Displacement of a node by all rows; zero where it is not observed.
     pub(super) fn observed(&self, node: usize, rows: &[f64]) -> DVec3 {
         let own = self.observed[node];
         own.map_or(DVec3::ZERO, |own| DVec3::from_array(own.map(|row| rows[row as usize])))
@@ -178,24 +179,24 @@ impl FirState {
         }
     }
 
-    /// Let a slot stand for a point; gives where the point is now [m, body].
+    /// Assign a surface point to a slot. Gives its displacement at the start of the step [m, body].
     ///
     /// # Real time
     /// Copies the series between the point and all sources, T samples each.
-    pub(crate) fn hold(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, gravity: DVec3) -> DVec3 {
+    pub(crate) fn assign(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, gravity: DVec3) -> DVec3 {
         self.contacts[slot] = Some(*point);
         self.convolve(fir, slot, point, 0) + fir.sag_of_point(point, gravity, self.history.steps())
     }
 
-    /// Let a slot stand for nothing.
+    /// Release a slot.
     ///
     /// # Real time
     pub(crate) fn release(&mut self, slot: usize) {
         self.contacts[slot] = None;
-        (0..self.history.sources()).for_each(|source| self.forget(slot, source));
+        (0..self.history.sources()).for_each(|source| self.drop_copy(slot, source));
     }
 
-    fn forget(&mut self, slot: usize, source: usize) {
+    fn drop_copy(&mut self, slot: usize, source: usize) {
         let copy = &mut self.copy_of[slot * self.history.sources() + source];
         if *copy != NONE {
             self.unused.push(*copy);
@@ -203,7 +204,7 @@ impl FirState {
         }
     }
 
-    /// Where the copy of the series between a slot's point and a source begins, made now if there is room.
+    /// Start of the copy of the series between a slot's point and a source, made now if there is memory.
     fn copy(&mut self, fir: &Fir, slot: usize, point: &SurfacePoint, source: usize) -> Option<usize> {
         let samples = fir.table.samples;
         let entry = slot * self.history.sources() + source;
@@ -264,28 +265,27 @@ impl FirState {
         self.convolve(fir, slot, &point, 1) + fir.sag_of_point(&point, gravity, self.history.steps() + 1)
     }
 
-    /// Write the step's forces into the history; what is older than T steps is forgotten.
+    /// Write the step's forces into the history, and drop those older than T steps.
     ///
     /// # Real time
-    pub(crate) fn advance(&mut self, applied_forces: &[ContactPoint]) {
+    pub(crate) fn advance(&mut self, points: &[ContactPoint]) {
         let (sources, slots) = (self.history.sources(), self.contacts.len());
         for source in 0..sources {
             if self.history.ages(source) {
-                (0..slots).for_each(|slot| self.forget(slot, source));
+                (0..slots).for_each(|slot| self.drop_copy(slot, source));
             }
         }
         self.history.begin_step();
-        for applied_forces in applied_forces {
-            let force = applied_forces.force_in_body;
-            self.work += force.dot(applied_forces.displacement - applied_forces.state.displacement);
+        for point in points {
+            let force = point.force_in_body;
+            self.work += force.dot(point.displacement - point.state.displacement);
             if force != DVec3::ZERO {
-                self.history.add(&applied_forces.location.point, force);
+                self.history.add(&point.location.point, force);
             }
         }
     }
 
-    /// Energy [J] that went into the deformation and has not come back: stored or dissipated, which a table
-    /// can't tell apart.
+    /// Net work on the deformation since the start [J]: stored or dissipated energy, which a table does not separate.
     pub(crate) fn work(&self) -> f64 {
         self.work
     }

@@ -1,4 +1,4 @@
-//! The forces of the last T steps on one object, that the paper's convolution runs over: buffers are made once.
+//! Force history of one object over the last T steps, for the paper's convolution; buffers are made once.
 
 use super::fir::Fir;
 use crate::surface::SurfacePoint;
@@ -6,49 +6,50 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Stands in places that are not used.
+/// Point of unused entries.
 const NOWHERE: SurfacePoint = SurfacePoint { triangle: u32::MAX, weights: [0.0; 3] };
 
-/// A point that forces of the last T steps acted on.
+/// Surface point that was loaded in the last T steps.
 #[derive(Debug, Clone, Copy)]
 struct Source {
     point: SurfacePoint,
-    /// Steps since a force first acted on it; `None` for a free place.
+    /// Age of its first force [steps]; none for a free entry.
     oldest: Option<usize>,
-    /// Steps since one last did.
+    /// Age of its last force [steps].
     newest: usize,
 }
 
-/// A force of the past on a point that had no room among the sources.
+/// Past force on a point for which no source was free.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stray {
     pub(super) point: SurfacePoint,
-    /// [N, body].
+    /// Force [N, body].
     pub(super) force: DVec3,
 }
 
-/// Forces by the points that they acted on, the newest first.
+/// Past forces by loaded point, newest first.
 #[derive(Debug, Clone)]
 pub(crate) struct ForceHistory {
-    /// T, and how many forces a step has at most.
+    /// Number of samples T.
     samples: usize,
+    /// Upper limit of forces in a step.
     width: usize,
     steps: u64,
     sources: Vec<Source>,
-    /// For each source the forces [N, body] of the last T steps, the newest first: a ring of length T that is
-    /// written twice, so that T of them always lie one after the other, from `head` on.
+    /// Forces of each source in the last T steps [N, body], newest first: a ring buffer of length T, written twice, so that T
+    /// successive entries always begin at `head`.
     forces: Vec<DVec3>,
     head: usize,
-    /// T steps of at most one stray force per slot, a ring that begins at `head`.
+    /// Ring buffer of T steps with at most one stray force per slot; it begins at `head`.
     strays: Vec<Stray>,
     stray_counts: Vec<u32>,
-    any_stray: usize,
+    stray_total: usize,
 }
 
 impl ForceHistory {
-    /// Of T samples, with at most so many forces a step.
+    /// History of T samples, with at most `width` forces in a step.
     pub(super) fn new(samples: usize, width: usize) -> Self {
-        // Some more sources than can be in contact at once: a contact that moves leaves some behind.
+        // More sources than simultaneous contacts: a moving contact leaves some behind.
         let sources = (4 * width).max(32).min(width * samples);
         Self {
             samples,
@@ -59,15 +60,15 @@ impl ForceHistory {
             head: 0,
             strays: vec![Stray { point: NOWHERE, force: DVec3::ZERO }; samples * width],
             stray_counts: vec![0; samples],
-            any_stray: 0,
+            stray_total: 0,
         }
     }
 
-    /// Take over another one of the same size.
+    /// Copy another history of equal size.
     ///
     /// # Real time
     pub(super) fn copy_from(&mut self, other: &Self) {
-        (self.steps, self.head, self.any_stray) = (other.steps, other.head, other.any_stray);
+        (self.steps, self.head, self.stray_total) = (other.steps, other.head, other.stray_total);
         self.sources.copy_from_slice(&other.sources);
         self.forces.copy_from_slice(&other.forces);
         self.strays.copy_from_slice(&other.strays);
@@ -79,26 +80,26 @@ impl ForceHistory {
         self.steps
     }
 
-    /// Places for sources, used or not.
+    /// Number of sources, used or free.
     pub(super) fn sources(&self) -> usize {
         self.sources.len()
     }
 
-    /// Where a source is.
+    /// Surface point of a source.
     pub(super) fn point(&self, source: usize) -> SurfacePoint {
         self.sources[source].point
     }
 
-    /// The forces of a source, the newest first, and the ages between which they are not all zero.
+    /// Forces of a source [N, body], newest first, and the range of ages outside of which they are zero.
     pub(super) fn window(&self, source: usize) -> Option<(&[DVec3], core::ops::Range<usize>)> {
         let Source { oldest, newest, .. } = self.sources[source];
         let forces = &self.forces[2 * self.samples * source + self.head..][..self.samples];
         Some((forces, newest..(oldest? + 1).min(self.samples)))
     }
 
-    /// The stray forces with their ages.
+    /// Stray forces with their ages [steps].
     pub(super) fn strays(&self) -> impl Iterator<Item = (usize, &Stray)> {
-        let ages = if self.any_stray > 0 { self.samples } else { 0 };
+        let ages = if self.stray_total > 0 { self.samples } else { 0 };
         (0..ages).flat_map(move |age| {
             let step = (self.head + age) % self.samples;
             let count = self.stray_counts[step] as usize;
@@ -106,7 +107,7 @@ impl ForceHistory {
         })
     }
 
-    /// Let a source grow older by a step. Says whether its place is free from now on.
+    /// Age a source by a step. Gives whether it becomes free.
     ///
     /// # Real time
     pub(super) fn ages(&mut self, source: usize) -> bool {
@@ -122,15 +123,15 @@ impl ForceHistory {
         free
     }
 
-    /// Begin a step, without force; what is older than T steps is forgotten.
+    /// Begin a step without force, and drop forces older than T steps.
     ///
     /// # Real time
     pub(super) fn begin_step(&mut self) {
         self.steps += 1;
         self.head = (self.head + self.samples - 1) % self.samples;
         (0..self.sources.len()).for_each(|source| self.write(source, DVec3::ZERO));
-        let displacement_since_build = core::mem::take(&mut self.stray_counts[self.head]) as usize;
-        self.any_stray -= displacement_since_build;
+        let dropped = core::mem::take(&mut self.stray_counts[self.head]) as usize;
+        self.stray_total -= dropped;
     }
 
     /// Add a force [N, body] to the step.
@@ -145,7 +146,7 @@ impl ForceHistory {
                 source.newest = 0;
                 source.oldest = source.oldest.or(Some(0));
                 let before = self.forces[2 * self.samples * at + self.head];
-                // Two slots may stand for one point; a new source's place holds nothing yet.
+                // Two slots may share a point; the entry of a new source is stale.
                 let shared = if found.is_some() { before } else { DVec3::ZERO };
                 self.write(at, shared + force);
             }
@@ -153,7 +154,7 @@ impl ForceHistory {
                 let count = &mut self.stray_counts[self.head];
                 self.strays[self.head * self.width + *count as usize] = Stray { point: *point, force };
                 *count += 1;
-                self.any_stray += 1;
+                self.stray_total += 1;
             }
         }
     }
@@ -164,7 +165,7 @@ impl ForceHistory {
         ring[self.head + self.samples] = force;
     }
 
-    /// Displacement of every surface node [m, body], equation (6); nodes that are not observed stay at rest.
+    /// Displacement of every surface node [m, body], equation (6); zero for nodes that are not observed.
     pub(super) fn surface_displacement(&self, fir: &Fir, gravity: DVec3, out: &mut [DVec3]) {
         let mut sum = vec![0.0; fir.observed_dofs()];
         let mut add = |age: usize, point: &SurfacePoint, force: DVec3| fir.add(age, point, force, &mut sum);

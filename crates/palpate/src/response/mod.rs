@@ -1,5 +1,5 @@
-//! How a body answers forces, in one of two forms behind one small interface: modal with residual compliance,
-//! or the paper's recorded table.
+//! Impulse response of a body: displacement under contact forces, in modal form with residual compliance, or by direct
+//! convolution of the paper's recorded table.
 
 mod body;
 mod contact_points;
@@ -20,7 +20,7 @@ pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
 pub(crate) use residual_fields::ResidualFields;
 
-use crate::error::Error;
+use crate::error::ModelError;
 use crate::recording::{ImpulseResponse, Recording};
 use crate::surface::SurfacePoint;
 use alloc::boxed::Box;
@@ -29,33 +29,33 @@ use fir::{Fir, FirState};
 use force_history::ForceHistory;
 use glam::{DMat3, DVec3};
 use modal::{ModalDeformation, ModalState, SampledModes};
-use nodal_compliance::NodeCompliance;
+use nodal_compliance::NodalCompliance;
 
-/// Which form of its response an object uses.
+/// Form of an object's response.
 #[derive(Debug, Clone, Default)]
 pub enum ResponseForm {
-    /// The recording's modes and residual compliance: no window, cost by the modes.
+    /// Modes and residual compliance of the recording: no time window; a step costs the modes.
     #[default]
     Modal,
-    /// The paper's direct convolution with a recorded table: cost by its samples.
+    /// Direct convolution of the paper's recorded table; a step costs its samples.
     Fir(Arc<ImpulseResponse>),
 }
 
-/// The response of one object at the scene's step; immutable.
+/// Response of one object at the scene's step; immutable.
 #[derive(Debug, Clone)]
 pub(crate) enum Response {
     Modal(SampledModes),
     Fir(Fir),
 }
 
-/// What the response remembers.
+/// State of a response between steps.
 #[derive(Debug, Clone)]
 pub(crate) enum ResponseState {
     Modal(ModalState),
     Fir(FirState),
 }
 
-/// Energies [J] that a response knows of.
+/// Energies of a response [J].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ResponseEnergy {
     pub(crate) kinetic: f64,
@@ -64,14 +64,18 @@ pub(crate) struct ResponseEnergy {
 }
 
 impl Response {
-    pub(crate) fn new(recording: &Arc<Recording>, form: ResponseForm, step_s: f64) -> Result<Self, Error> {
+    pub(crate) fn new(
+        recording: &Arc<Recording>,
+        form: ResponseForm,
+        step_s: f64,
+    ) -> Result<Self, ModelError> {
         Ok(match form {
             ResponseForm::Modal => Self::Modal(SampledModes::new(&recording.modes, step_s)),
             ResponseForm::Fir(table) => Self::Fir(Fir::new(recording.clone(), table, step_s)?),
         })
     }
 
-    /// Modes that it computes with.
+    /// Number of modes; 0 for a table.
     pub(crate) fn modes(&self) -> usize {
         match self {
             Self::Modal(modes) => modes.len(),
@@ -79,11 +83,11 @@ impl Response {
         }
     }
 
-    /// Whether it can tell how a body with fixed nodes sags.
-    pub(crate) fn knows_gravity(&self) -> bool {
+    /// Whether the sag of a body with fixed nodes is known.
+    pub(crate) fn has_gravity_response(&self) -> bool {
         match self {
             Self::Modal(_) => true,
-            Self::Fir(fir) => fir.knows_gravity(),
+            Self::Fir(fir) => fir.has_gravity_response(),
         }
     }
 
@@ -95,8 +99,8 @@ impl Response {
         }
     }
 
-    /// Know R[0] between all surface nodes, or the places that stand for them, before the first step, where there are not too
-    /// many; `others` are objects that may know it already.
+    /// Precompute R[0] between all surface nodes and between the contact samples of each level, up to a number of nodes.
+    /// `others` are earlier objects: those of the same recording share theirs.
     pub(crate) fn precompute_nodal_compliance<'r>(
         &mut self,
         body: &Body,
@@ -104,18 +108,17 @@ impl Response {
     ) {
         let Self::Modal(modes) = self else { return };
         let same = others.filter(|(other, _)| Arc::ptr_eq(&other.recording, &body.recording));
-        let known = |response: &Self| match response {
-            Self::Modal(modes) => Some(modes.known.clone()),
+        let precomputed = |response: &Self| match response {
+            Self::Modal(modes) => Some(modes.nodal_compliance.clone()),
             Self::Fir(_) => None,
         };
-        let same = same.filter_map(|(_, response)| known(response)).next();
+        let same = same.filter_map(|(_, response)| precomputed(response)).next();
         let levels = (0..=body.coarsest_level()).map(|level| body.footprint_at_level(level));
-        let find = |footprint| NodeCompliance::new(body, modes, footprint).map(Arc::new);
-        let all = same.unwrap_or_else(|| levels.filter_map(find).collect());
-        modes.known = all;
+        let compute = |footprint| NodalCompliance::new(body, modes, footprint).map(Arc::new);
+        modes.nodal_compliance = same.unwrap_or_else(|| levels.filter_map(compute).collect());
     }
 
-    /// The state at rest of a body with so many surface nodes, with room for so many contact points.
+    /// State at rest, for the body's number of surface nodes and a capacity of contact points.
     pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
             Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), nodes, capacity)),
@@ -124,7 +127,7 @@ impl Response {
     }
 }
 
-/// An object's response with its state, for one step.
+/// Response of an object with its state, for one step.
 pub(crate) struct ResponseView<'a> {
     pub(crate) response: &'a Response,
     pub(crate) body: &'a Body,
@@ -134,10 +137,10 @@ pub(crate) struct ResponseView<'a> {
 }
 
 impl ResponseView<'_> {
-    /// Let a slot stand for a place; gives where the place is now.
+    /// Assign a contact location to a slot. Gives its state at the start of the step.
     ///
     /// # Real time
-    /// Costs modes, or for a table samples × sources of force; only when the place is new.
+    /// Costs modes, or for a table samples × sources of force.
     pub(crate) fn assign(&mut self, slot: usize, location: &ContactLocation) -> LocationState {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
@@ -145,15 +148,15 @@ impl ResponseView<'_> {
             }
             (Response::Fir(fir), ResponseState::Fir(state)) => {
                 state.release(slot);
-                let displacement = state.hold(fir, slot, &location.point, self.gravity);
+                let displacement = state.assign(fir, slot, &location.point, self.gravity);
                 LocationState { displacement, ..LocationState::default() }
             }
             _ => LocationState::default(),
         }
     }
 
-    /// R[0] [m/N, body] between the place of a slot and every contact point: displacement there per force on the point.
-    /// Given with where the point stands.
+    /// R[0] [m/N, body] between the location of a slot and every contact point: displacement at the location per force on
+    /// the point. `give` takes the index of the point and the block.
     ///
     /// # Real time
     pub(crate) fn compliance(
@@ -167,15 +170,16 @@ impl ResponseView<'_> {
                 modes.compliance(self.body, state, (slot, location), points, give);
             }
             (Response::Fir(fir), _) => {
-                for (at, point) in points.iter().enumerate() {
-                    give(at, fir.compliance(&location.point, &point.location.point));
+                for (index, point) in points.iter().enumerate() {
+                    give(index, fir.compliance(&location.point, &point.location.point));
                 }
             }
             _ => {}
         }
     }
 
-    /// Prepare the step: what happens without contact force. Says whether the last step has done so, for its points too.
+    /// Prediction of the step without contact force. Gives whether the last step has computed it already, for its points
+    /// too.
     ///
     /// # Real time
     pub(crate) fn predict(&mut self) -> bool {
@@ -187,27 +191,28 @@ impl ResponseView<'_> {
         }
     }
 
-    /// ũ of a slot's place: where it is at the end of the step without contact force [m, body].
+    /// Free displacement ũ of a slot's location at the end of the step without contact force [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&mut self, slot: usize, state_at: &LocationState) -> DVec3 {
+    pub(crate) fn free(&mut self, slot: usize, start: &LocationState) -> DVec3 {
         match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + state_at.sag,
+            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + start.sag,
             (Response::Fir(fir), ResponseState::Fir(state)) => state.free(fir, slot, self.gravity),
             _ => DVec3::ZERO,
         }
     }
 
-    /// Hold forces over the step, with gravity at its end; gives the energy [J] that is known to be lost in it.
+    /// Advance over the step under the held forces of the contact points, with gravity at its end. Gives the energy [J] that
+    /// is dissipated.
     ///
     /// # Real time
-    pub(crate) fn advance(&mut self, applied_forces: &mut [ContactPoint]) -> f64 {
+    pub(crate) fn advance(&mut self, points: &mut [ContactPoint]) -> f64 {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                modes.advance(self.body, state, applied_forces, self.gravity)
+                modes.advance(self.body, state, points, self.gravity)
             }
             (Response::Fir(_), ResponseState::Fir(state)) => {
-                state.advance(applied_forces);
+                state.advance(points);
                 0.0
             }
             _ => 0.0,
@@ -216,7 +221,7 @@ impl ResponseView<'_> {
 }
 
 impl ResponseState {
-    /// Let a slot stand for nothing.
+    /// Release a slot.
     ///
     /// # Real time
     pub(crate) fn release(&mut self, slot: usize) {
@@ -225,7 +230,7 @@ impl ResponseState {
         }
     }
 
-    /// q of the modes at the start of the step; none where a table is used.
+    /// Modal coordinates q at the start of the step; none with a table.
     pub(crate) fn coordinates(&self) -> &[f64] {
         match self {
             Self::Modal(state) => &state.q,
@@ -233,7 +238,7 @@ impl ResponseState {
         }
     }
 
-    /// q at the end of the step without contact force.
+    /// Modal coordinates at the end of the step without contact force; none with a table.
     pub(crate) fn free_coordinates(&self) -> &[f64] {
         match self {
             Self::Modal(state) => &state.free,
@@ -241,7 +246,7 @@ impl ResponseState {
         }
     }
 
-    /// Forces [N, body] of the last step with their places.
+    /// Forces of the last step with their locations; none with a table.
     pub(crate) fn applied_forces(&self) -> &[AppliedForce] {
         match self {
             Self::Modal(state) => &state.applied_forces,
@@ -249,7 +254,7 @@ impl ResponseState {
         }
     }
 
-    /// Those of them that act at points, as forces on nodes; none where a table is used.
+    /// Forces of the last step at points, distributed to nodes; none with a table.
     pub(crate) fn nodal(&self) -> Option<&NodalForces> {
         match self {
             Self::Modal(state) => Some(&state.nodal),
@@ -257,7 +262,7 @@ impl ResponseState {
         }
     }
 
-    /// Energy [J] of the residual compliance.
+    /// Elastic energy of the residual compliance [J].
     pub(crate) fn residual_energy(&self) -> f64 {
         match self {
             Self::Modal(state) => state.residual_energy,
@@ -265,8 +270,7 @@ impl ResponseState {
         }
     }
 
-    /// Energies [J]. A table does not tell what is stored from what is lost: all the work that went in and has not
-    /// come back counts as elastic.
+    /// Energies [J]. A table does not separate stored from dissipated energy: all net work counts as elastic.
     ///
     /// # Real time
     pub(crate) fn energy(&self, response: &Response) -> ResponseEnergy {
@@ -280,7 +284,7 @@ impl ResponseState {
         }
     }
 
-    /// Whether it has as many modes, and if so let them move so.
+    /// Resume from modal states [m·√kg], if their number fits. Gives whether it does.
     pub(crate) fn resume_from(&mut self, modes: &[OscillatorState]) -> bool {
         match self {
             Self::Modal(own) if own.modes.len() == modes.len() => {
@@ -291,7 +295,7 @@ impl ResponseState {
         }
     }
 
-    /// Modal coordinates; none where a table is used.
+    /// Modal states; none with a table.
     pub(crate) fn modes(&self) -> &[OscillatorState] {
         match self {
             Self::Modal(state) => &state.modes,
@@ -299,7 +303,7 @@ impl ResponseState {
         }
     }
 
-    /// Copy of all data that the deformation follows from.
+    /// Copy of the data that determine the deformation.
     pub(crate) fn deformation(&self) -> DeformationData {
         match self {
             Self::Modal(state) => DeformationData::Modal(ModalDeformation::new(state)),
@@ -308,7 +312,7 @@ impl ResponseState {
     }
 }
 
-/// What deforms an object: all that its surface takes; buffers are made once.
+/// Data that determine the displacement of an object's surface; buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) enum DeformationData {
     Modal(ModalDeformation),
@@ -316,7 +320,7 @@ pub(crate) enum DeformationData {
 }
 
 impl DeformationData {
-    /// Take over what deforms the same object now.
+    /// Copy the present data of the same object.
     ///
     /// # Real time
     /// Costs modes and contacts; for a table the forces of the last T steps.
@@ -328,7 +332,7 @@ impl DeformationData {
         }
     }
 
-    /// q [m·√kg] of the modes; none where a table is used.
+    /// Modal coordinates q [m·√kg]; none with a table.
     pub(crate) fn coordinates(&self) -> &[f64] {
         match self {
             Self::Modal(deformed) => deformed.coordinates(),
@@ -336,7 +340,7 @@ impl DeformationData {
         }
     }
 
-    /// The part of the surface's displacement that is not the modes' [m, body].
+    /// Displacement of every surface node beyond the modes [m, body]; with a table, all of it.
     pub(crate) fn residual_displacements(
         &self,
         (response, body): (&Response, &Body),

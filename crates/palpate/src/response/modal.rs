@@ -1,11 +1,11 @@
-//! The modal form of a body's response: u = Φ·q + S·f.
+//! Modal form of a body's response: u = Φ·q + S·f.
 //!
-//! Each modal coordinate q [m·√kg] is an oscillator under a held force (see `oscillator`); the residual compliance S
-//! stands for everything that the kept modes miss, as a massless spring within the step.
+//! Each modal coordinate q [m·√kg] is an oscillator under a held force (`oscillator`). The residual compliance S [m/N] is the
+//! static compliance of the modes that are not kept: a massless spring within the step.
 
 use super::ContactPoint;
 use super::dot_products::{dot, dot3, dot9, dots};
-use super::nodal_compliance::NodeCompliance;
+use super::nodal_compliance::NodalCompliance;
 use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
@@ -19,35 +19,35 @@ use glam::{DMat3, DVec3};
 /// States below this size [√J] are set to zero: denormal numbers cost 40 times as much.
 const FLUSH_BELOW: f64 = 1e-150;
 
-/// All modes of one object at one step size.
+/// Modes of one object at the scene's step.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
     step_s: f64,
     oscillators: Vec<SampledOscillator>,
-    /// R[0] between the places of readings, where it is known.
-    pub(super) known: Vec<Arc<NodeCompliance>>,
+    /// Precomputed R[0] between nodes, by footprint.
+    pub(super) nodal_compliance: Vec<Arc<NodalCompliance>>,
 }
 
 /// State of one object in modal form.
 #[derive(Debug, Clone)]
 pub(crate) struct ModalState {
     pub(crate) modes: Vec<OscillatorState>,
-    /// q now and at the end of the step without new force.
+    /// Modal coordinates at the start of the step, and at its end without contact force.
     pub(super) q: Vec<f64>,
     pub(super) free: Vec<f64>,
-    /// With which gravity [m/s², body] and step [s] the latter was found.
+    /// Gravity [m/s², body] and step [s] of the latter; none before the prediction.
     predicted: Option<(DVec3, f64)>,
     /// Modal forces of the step [N/√kg].
     forces: Vec<f64>,
     /// Three rows J·Φ per contact point, by its slot.
     rows: Vec<f64>,
-    /// Three rows times B.
+    /// Three rows J·Φ·B.
     weighted: Vec<f64>,
-    /// Forces [N, body] of the last step with their places, for the residual compliance.
+    /// Forces of the last step with their locations, for the residual compliance.
     pub(super) applied_forces: Vec<AppliedForce>,
-    /// Those that act at points, by nodes.
+    /// Forces of the last step at points, distributed to nodes.
     pub(super) nodal: NodalForces,
-    /// Energy [J] of the residual compliance, ½·fᵀ·S·f.
+    /// Elastic energy of the residual compliance [J], ½·fᵀ·S·f.
     pub(super) residual_energy: f64,
 }
 
@@ -67,21 +67,21 @@ impl ModalState {
         }
     }
 
-    /// Displacement of a place by the residual compliance under the forces of the last step [m, body].
+    /// Residual displacement of a location under the forces of the last step [m, body].
     fn residual_displacement(&mut self, body: &Body, location: &ContactLocation) -> DVec3 {
         if location.footprint == Footprint::Point {
             let corners = body.recording.surface.corners(&location.point).into_iter();
             let used = corners.filter(|(_, weight)| *weight != 0.0);
             return used
                 .map(|(node, weight)| {
-                    self.nodal.find_residual_displacement(&body.recording.residual, node) * weight
+                    self.nodal.cached_residual_displacement(&body.recording.residual, node) * weight
                 })
                 .sum();
         }
         self.applied_forces.iter().map(|other| body.residual(location, &other.location) * other.force).sum()
     }
 
-    /// Let the modes move so.
+    /// Set the modal states.
     pub(super) fn resume_from(&mut self, modes: &[OscillatorState]) {
         self.modes.copy_from_slice(modes);
         self.q.iter_mut().zip(modes).for_each(|(q, mode)| *q = mode.q);
@@ -97,7 +97,7 @@ impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
-        Self { step_s, oscillators, known: Vec::new() }
+        Self { step_s, oscillators, nodal_compliance: Vec::new() }
     }
 
     /// Number of modes.
@@ -105,7 +105,7 @@ impl SampledModes {
         self.oscillators.len()
     }
 
-    /// Three rows times B.
+    /// Multiply three rows by B.
     pub(super) fn weigh(&self, rows: &[f64], weighted: &mut [f64]) {
         let m = self.len().max(1);
         for (weighted, row) in weighted.chunks_exact_mut(m).zip(rows.chunks_exact(m)) {
@@ -115,8 +115,7 @@ impl SampledModes {
         }
     }
 
-    /// Let a slot stand for a place; gives where the place is now and the part of it that the residual compliance and
-    /// the body's weight cause [m, body].
+    /// Assign a contact location to a slot. Gives its state at the start of the step [m, body].
     ///
     /// # Real time
     pub(crate) fn assign(
@@ -142,10 +141,10 @@ impl SampledModes {
         LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }
 
-    /// J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the place of a slot and every contact point.
+    /// R[0] = J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the location of a slot and every contact point.
     ///
     /// # Real time
-    /// Costs modes × points; points where what places do to one another is known.
+    /// Costs modes × points, or points where it is precomputed.
     pub(crate) fn compliance(
         &self,
         body: &Body,
@@ -157,23 +156,23 @@ impl SampledModes {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        let known = self.known.iter().find(|known| known.footprint == location.footprint);
+        let precomputed = self.nodal_compliance.iter().find(|nodal| nodal.footprint == location.footprint);
         let own = body.corners(location);
         let mut weighed = false;
-        for (at, point) in points.iter().enumerate() {
-            if let Some(known) = known.filter(|known| known.footprint == point.location.footprint) {
-                give(at, known.between(body, &own, &body.corners(&point.location)));
+        for (index, point) in points.iter().enumerate() {
+            if let Some(nodal) = precomputed.filter(|nodal| nodal.footprint == point.location.footprint) {
+                give(index, nodal.between(body, &own, &body.corners(&point.location)));
                 continue;
             }
             if !weighed {
                 self.weigh(of(slot), weighted);
                 weighed = true;
             }
-            give(at, dot9(weighted, of(point.slot)) + body.residual(location, &point.location));
+            give(index, dot9(weighted, of(point.slot)) + body.residual(location, &point.location));
         }
     }
 
-    /// Modal coordinates at the end of the step if no contact force acts. Says whether they were known already.
+    /// Predict the modal coordinates at the end of the step without contact force. Gives whether they were computed already.
     ///
     /// # Real time
     pub(crate) fn predict(&self, recording: &Recording, state: &mut ModalState, gravity: DVec3) -> bool {
@@ -198,28 +197,27 @@ impl SampledModes {
         false
     }
 
-    /// Displacement of a slot's place at the end of the step if no contact force acts, the residual compliance's
-    /// part apart [m, body].
+    /// Modal displacement of a slot's location at the end of the step without contact force [m, body].
     ///
     /// # Real time
     pub(crate) fn free(&self, state: &ModalState, slot: usize) -> DVec3 {
         dot3(state.rows(slot), &state.free)
     }
 
-    /// Hold forces over the step that was predicted, and predict the next one with its gravity, so that a pass over the
-    /// points serves both; gives the energy [J] that is lost.
+    /// Advance over the predicted step under the held forces of the contact points, and predict the next step with its
+    /// gravity in the same pass over the points. Gives the dissipated energy [J].
     ///
     /// # Real time
     pub(crate) fn advance(
         &self,
         body: &Body,
         state: &mut ModalState,
-        applied_forces: &mut [ContactPoint],
+        points: &mut [ContactPoint],
         next_gravity: DVec3,
     ) -> f64 {
         let m = self.len();
         // p = Φᵀ·Jᵀ·g.
-        for point in applied_forces.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
+        for point in points.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let g = point.force_in_body;
             let (x, rest) = rows.split_at(m);
@@ -240,11 +238,11 @@ impl SampledModes {
         state.predicted = None;
         self.predict(&body.recording, state, next_gravity);
 
-        // The residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g, the rest is lost.
+        // Residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g; the difference is dissipated.
         let (mut work, mut energy) = (0.0, 0.0);
         state.applied_forces.clear();
         state.nodal.clear();
-        for point in applied_forces.iter_mut() {
+        for point in points.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let [modal, free] = dots(rows, [&state.q, &state.free]);
             point.free = free + point.state.sag;
@@ -252,11 +250,11 @@ impl SampledModes {
             work += point.force_in_body.dot(residual - point.state.residual);
             energy += 0.5 * point.force_in_body.dot(residual - point.state.sag);
             point.state.residual = residual;
-            if let Some(node) = point.known_node() {
-                state.nodal.know(node, residual - point.state.sag);
+            if let Some(node) = point.single_node() {
+                state.nodal.store(node, residual - point.state.sag);
             }
             if point.force_in_body != DVec3::ZERO {
-                state.applied_forces.push(body.applied_forces(point.location, point.force_in_body));
+                state.applied_forces.push(body.applied_force(point.location, point.force_in_body));
                 if point.location.footprint == Footprint::Point {
                     let corners = body.recording.surface.corners(&point.location.point);
                     state.nodal.add(corners, point.force_in_body);
@@ -298,7 +296,7 @@ impl SampledModes {
         }
     }
 
-    /// The part of it that is not the modes', S·f with what the body's weight adds.
+    /// Displacement of every surface node beyond the modes [m, body]: S·f, and the sag of a fixed body.
     pub(crate) fn residual_displacements(
         &self,
         body: &Body,
@@ -317,9 +315,9 @@ impl SampledModes {
         }
         let mut loads = deformed.loaded.clone();
         if !residual_fields.add(body, &deformed.patches, out) {
-            // All forces as forces on nodes: patches share theirs.
+            // All forces as nodal forces, since patches overlap.
             for AppliedForce { location, force, .. } in &deformed.patches {
-                body.spread(location, |node, weight| loads.push((node as u32, *force * weight)));
+                body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
             }
             loads.sort_unstable_by_key(|(node, _)| *node);
             loads.dedup_by(|next, kept| {
@@ -334,17 +332,18 @@ impl SampledModes {
     }
 }
 
-/// What deforms an object in modal form; buffers are made once.
+/// Data that determine the displacement of an object in modal form; buffers are made once.
 #[derive(Debug)]
 pub(crate) struct ModalDeformation {
     q: Vec<f64>,
-    /// Forces [N, body] on nodes, and on patches.
+    /// Forces on nodes [N, body].
     loaded: Vec<(u32, DVec3)>,
+    /// Forces on patches.
     patches: Vec<AppliedForce>,
 }
 
 impl Clone for ModalDeformation {
-    /// With as much room: copies are made of it without allocation.
+    /// Clone of equal capacity: later copies into it do not allocate.
     fn clone(&self) -> Self {
         let mut loaded = Vec::with_capacity(self.loaded.capacity());
         loaded.extend_from_slice(&self.loaded);
@@ -365,21 +364,21 @@ impl ModalDeformation {
         new
     }
 
-    /// q [m·√kg].
+    /// Modal coordinates q [m·√kg].
     pub(super) fn coordinates(&self) -> &[f64] {
         &self.q
     }
 
+    /// Copy the present data of the same object.
+    ///
     /// # Real time
     pub(super) fn copy_from(&mut self, state: &ModalState) {
         self.q.copy_from_slice(&state.q);
         self.loaded.clear();
         self.loaded.extend_from_slice(state.nodal.loaded());
         self.patches.clear();
-        let patches = state
-            .applied_forces
-            .iter()
-            .filter(|applied_forces| applied_forces.location.footprint != Footprint::Point);
+        let patches =
+            state.applied_forces.iter().filter(|applied| applied.location.footprint != Footprint::Point);
         self.patches.extend(patches.copied());
     }
 }

@@ -1,7 +1,7 @@
-//! R[0] between all surface nodes of a body, or the places that stand for them, known before the first step.
+//! Precomputed nodal compliance: R[0] between all surface nodes of a body, or between its contact samples.
 //!
-//! A face that lands on the floor makes contacts of all its nodes at once. What they do to one another is the paper's
-//! R_cc[0] of equation (9): for a mesh of some size it is computed with the model, and a step looks it up.
+//! A face that lands on the floor brings all its nodes into contact at once. Their R_cc[0] of equation (9) is computed with
+//! the model, up to a number of nodes, and looked up in a step.
 
 use super::dot_products::dot9;
 use super::modal::SampledModes;
@@ -10,40 +10,40 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DMat3;
 
-/// A place by its surface nodes and their weights.
+/// Location by its surface nodes and their weights.
 type Corners = [(usize, f64); 3];
 
-/// Up to so many surface nodes all pairs are kept, 36 bytes times the square of their number.
-const MOST_NODES: usize = 1024;
+/// Upper limit of nodes whose pairs are precomputed: 36 bytes times the square of their number.
+const MAX_NODES: usize = 1024;
 
-/// R[0] [m/N, body] between the nodes of a footprint: those not after the row, row by row.
+/// R[0] between the nodes of a footprint [m/N, body]: lower triangle of blocks, row by row.
 #[derive(Debug)]
-pub(crate) struct NodeCompliance {
+pub(crate) struct NodalCompliance {
     pub(super) footprint: Footprint,
     blocks: Vec<DMat3>,
 }
 
-impl NodeCompliance {
-    /// Of a body with its modes; none where there are too many nodes.
+impl NodalCompliance {
+    /// Nodal compliance of a body with its modes; none beyond the limit of nodes.
     pub(super) fn new(body: &Body, modes: &SampledModes, footprint: Footprint) -> Option<Self> {
-        let places = body.places(footprint);
-        let nodes = places.len();
-        if nodes > MOST_NODES {
+        let nodes = body.nodes(footprint);
+        let count = nodes.len();
+        if count > MAX_NODES {
             return None;
         }
         let width = 3 * modes.len();
-        let mut rows = vec![0.0; nodes * width];
-        for (node, rows) in places.iter().zip(rows.chunks_exact_mut(width.max(1))) {
+        let mut rows = vec![0.0; count * width];
+        for (node, rows) in nodes.iter().zip(rows.chunks_exact_mut(width.max(1))) {
             body.add_rows(footprint, *node as usize, 1.0, rows);
         }
-        let location = |number: usize| ContactLocation {
-            point: body.node_point(footprint, places[number] as usize),
+        let location = |index: usize| ContactLocation {
+            point: body.node_point(footprint, nodes[index] as usize),
             footprint,
         };
-        let of = |number: usize| &rows[number * width..(number + 1) * width];
+        let of = |index: usize| &rows[index * width..(index + 1) * width];
         let mut weighted = vec![0.0; width];
-        let mut blocks = Vec::with_capacity(nodes * (nodes + 1) / 2);
-        for a in 0..nodes {
+        let mut blocks = Vec::with_capacity(count * (count + 1) / 2);
+        for a in 0..count {
             modes.weigh(of(a), &mut weighted);
             let residual = |b: usize| body.residual(&location(a), &location(b));
             blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + residual(b)));
@@ -51,15 +51,15 @@ impl NodeCompliance {
         Some(Self { footprint, blocks })
     }
 
-    /// Displacement at a place per force at another, both by the weights of surface nodes.
+    /// Displacement at one location per force at another [m/N], both by the weights of surface nodes.
     ///
     /// # Real time
     pub(super) fn between(&self, body: &Body, a: &Corners, b: &Corners) -> DMat3 {
-        let number = |node: usize| body.number(self.footprint, node);
+        let index = |node: usize| body.node_index(self.footprint, node);
         let mut sum = DMat3::ZERO;
         for &(a, of_a) in a.iter().filter(|corner| corner.1 != 0.0) {
             for &(b, of_b) in b.iter().filter(|corner| corner.1 != 0.0) {
-                sum += self.of(number(a), number(b)) * (of_a * of_b);
+                sum += self.of(index(a), index(b)) * (of_a * of_b);
             }
         }
         sum
@@ -82,13 +82,13 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn what_is_looked_up_is_what_modes_and_residual_compliance_give() {
+    fn precomputed_compliance_is_that_of_modes_and_residual_compliance() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
         let body = Body::new(recording.clone(), &[], usize::MAX);
         let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
-        let mut looked_up = computed.clone();
-        looked_up.precompute_nodal_compliance(&body, core::iter::empty());
+        let mut precomputed = computed.clone();
+        precomputed.precompute_nodal_compliance(&body, core::iter::empty());
         let blocks = |response: &Response| {
             let mut state = response.at_rest(recording.surface.positions.len(), 4);
             let mut points = ContactPoints::new(4);
@@ -100,10 +100,10 @@ mod tests {
             }
             (0..16).map(|k| points.block(k / 4, k % 4)).collect::<Vec<_>>()
         };
-        for (a, b) in blocks(&computed).iter().zip(blocks(&looked_up)) {
+        for (a, b) in blocks(&computed).iter().zip(blocks(&precomputed)) {
             assert!(a.abs_diff_eq(b, 1e-14 * a.x_axis.length()), "{a} {b}");
         }
-        let of = |response: &Response| matches!(response, Response::Modal(modes) if !modes.known.is_empty());
-        assert!(of(&looked_up) && !of(&computed));
+        let of = |response: &Response| matches!(response, Response::Modal(modes) if !modes.nodal_compliance.is_empty());
+        assert!(of(&precomputed) && !of(&computed));
     }
 }

@@ -1,19 +1,20 @@
-//! The forces of the last step as forces on surface nodes.
+//! Nodal forces of the last step, and their residual displacements.
 
 use crate::recording::ResidualCompliance;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Forces [N, body] that act at points, by the weights of the nodes around them: many points share their nodes.
+/// Forces at points [N, body], distributed to the nodes of their triangles and summed.
 #[derive(Debug, Clone)]
 pub(crate) struct NodalForces {
+    /// Loaded nodes and their forces.
     loaded: Vec<(u32, DVec3)>,
-    /// Where every surface node stands among them, from 1; 0 where it does not.
+    /// Index of each surface node in `loaded`, from 1; 0 for unloaded nodes.
     at: Vec<u32>,
-    /// What they do to a node by the residual compliance [m], and those nodes of which it is known.
+    /// Cached residual displacements of surface nodes [m, body], and the nodes that have one.
     displacements: Vec<Option<DVec3>>,
-    known: Vec<u32>,
+    cached: Vec<u32>,
 }
 
 impl NodalForces {
@@ -22,22 +23,23 @@ impl NodalForces {
             loaded: Vec::with_capacity(nodes.min(3 * points)),
             at: vec![0; nodes],
             displacements: vec![None; nodes],
-            known: Vec::with_capacity(nodes),
+            cached: Vec::with_capacity(nodes),
         }
     }
 
-    /// The nodes where a force acts, with it [N, body], and the most that there can be.
+    /// Loaded nodes with their forces [N, body].
     pub(super) fn loaded(&self) -> &[(u32, DVec3)] {
         &self.loaded
     }
 
+    /// Upper limit of loaded nodes.
     pub(super) fn capacity(&self) -> usize {
         self.loaded.capacity()
     }
 
     pub(super) fn clear(&mut self) {
         self.loaded.drain(..).for_each(|(node, _)| self.at[node as usize] = 0);
-        self.known.drain(..).for_each(|node| self.displacements[node as usize] = None);
+        self.cached.drain(..).for_each(|node| self.displacements[node as usize] = None);
     }
 
     pub(super) fn add(&mut self, corners: [(usize, f64); 3], force: DVec3) {
@@ -50,32 +52,37 @@ impl NodalForces {
         }
     }
 
-    /// What they do to a node by the residual compliance [m, body].
+    /// Residual displacement of a node [m, body].
     ///
     /// # Real time
-    /// Costs the nodes where a force acts, unless it is known.
+    /// Costs the loaded nodes, unless it is cached.
     pub(crate) fn residual_displacement(&self, residual: &ResidualCompliance, node: usize) -> DVec3 {
         let sum =
             || self.loaded.iter().map(|&(other, force)| residual.block(node, other as usize) * force).sum();
         self.displacements[node].unwrap_or_else(sum)
     }
 
-    /// The same, known from then on.
-    pub(super) fn find_residual_displacement(&mut self, residual: &ResidualCompliance, node: usize) -> DVec3 {
+    /// Residual displacement of a node [m, body], cached until the forces change.
+    pub(super) fn cached_residual_displacement(
+        &mut self,
+        residual: &ResidualCompliance,
+        node: usize,
+    ) -> DVec3 {
         let displacement = self.residual_displacement(residual, node);
-        self.know(node, displacement);
+        self.store(node, displacement);
         displacement
     }
 
-    pub(super) fn know(&mut self, node: usize, displacement: DVec3) {
+    /// Cache the residual displacement of a node [m, body].
+    pub(super) fn store(&mut self, node: usize, displacement: DVec3) {
         if self.displacements[node].replace(displacement).is_none() {
-            self.known.push(node as u32);
+            self.cached.push(node as u32);
         }
     }
 }
 
-/// Add what forces [N] on nodes do to all nodes by the residual compliance [m]. Costs nodes × forces, of a near field the blocks
-/// around the forces.
+/// Add the residual displacements of all nodes under nodal forces [N] to `out` [m]. Costs nodes × forces, or for a near field
+/// the blocks of the loaded nodes.
 pub(super) fn add_residual_displacements(
     residual: &ResidualCompliance,
     loads: &[(u32, DVec3)],
@@ -84,7 +91,7 @@ pub(super) fn add_residual_displacements(
     for &(node, force) in loads {
         let node = node as usize;
         match residual {
-            // S is symmetric: what a row's node feels of others is what they feel of it, transposed.
+            // S is symmetric: the blocks of a column are those of the row, transposed.
             ResidualCompliance::NearField(near) => {
                 near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
             }
@@ -99,11 +106,11 @@ mod tests {
     use crate::recording::{NearField, Recording};
 
     #[test]
-    fn dents_are_the_sums_of_blocks() {
+    fn residual_displacements_are_the_sums_of_blocks() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Recording::from_bytes(bytes).expect("a released recording");
         let (whole, n) = (recording.residual, recording.surface.positions.len());
-        // The same as rows of blocks, of which every third is missing.
+        // A near field of rows of blocks without every third one.
         let kept = |i: usize, j: usize| (i + j) % 3 != 1;
         let mut near = NearField { radius: 1.0, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
         for i in 0..n {

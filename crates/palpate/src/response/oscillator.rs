@@ -17,19 +17,19 @@
 pub struct OscillatorState {
     /// Modal coordinate [m·√kg].
     pub q: f64,
-    /// Its rate [m·√kg/s].
+    /// Modal velocity [m·√kg/s].
     pub v: f64,
 }
 
 /// Exact one-step map of one mode under a held force.
 ///
 /// ```
-/// use palpate::{SampledOscillator, Oscillation};
+/// use palpate::{OscillatorState, SampledOscillator};
 ///
 /// // A mode of 10 Hz without damping, pushed from rest by 1 N/√kg for 1 ms.
 /// let omega = 10.0 * std::f64::consts::TAU;
 /// let mode = SampledOscillator::new(omega, 0.0, 1e-3);
-/// let pushed = mode.advance(Oscillation::default(), 1.0);
+/// let pushed = mode.advance(OscillatorState::default(), 1.0);
 /// assert!((pushed.q - (1.0 - (omega * 1e-3_f64).cos()) / omega.powi(2)).abs() < 1e-18);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,12 +47,12 @@ pub struct SampledOscillator {
     stiffness: f64,
 }
 
-/// Below this |ωd·h| the quotient sin(ωd·h)/ωd is summed from its series: its next term, the
+/// Upper limit of |ωd·h| for the series of sin(ωd·h)/ωd: its next term, the
 /// sixth power over 5040, is then below half an ulp.
 const SERIES_BELOW: f64 = 1e-2;
 
 impl SampledOscillator {
-    /// The map for a step of `step_s` [s]; ω > 0 [rad/s], ζ ≥ 0.
+    /// Map for a step [s] of a mode with ω > 0 [rad/s] and ζ ≥ 0 [1].
     pub fn new(angular_frequency: f64, damping_ratio: f64, step_s: f64) -> Self {
         let (omega, zeta, h) = (angular_frequency, damping_ratio, step_s);
         let sigma = zeta * omega;
@@ -95,13 +95,13 @@ impl SampledOscillator {
         Self { a11, a12, a21, a22, b: gain / stiffness, d11, d12, d22, stiffness }
     }
 
-    /// Displacement at the end of a step in which a unit force is held [s²]: its square-root-of-mass
-    /// gains at two points times this are the mode's part of R[0] [m/N].
+    /// Modal coordinate at the end of a step per unit of held modal force [s²]. Times the mode shape [1/√kg] at two points it
+    /// is the mode's part of R[0] [m/N].
     pub fn instantaneous_compliance(&self) -> f64 {
         self.b
     }
 
-    /// The state after a step with held modal force p [N/√kg].
+    /// State after a step with held modal force p [N/√kg].
     pub fn advance(&self, state: OscillatorState, p: f64) -> OscillatorState {
         OscillatorState {
             q: self.a11 * state.q + self.a12 * state.v + self.b * p,
@@ -109,7 +109,7 @@ impl SampledOscillator {
         }
     }
 
-    /// Energy [J] that damping takes in the step that starts from `state` under held force p.
+    /// Energy [J] dissipated in a step from `state` under held modal force p [N/√kg].
     pub fn dissipation(&self, state: OscillatorState, p: f64) -> f64 {
         let shifted = state.q - p / self.stiffness;
         (self.d11 * shifted + 2.0 * self.d12 * state.v) * shifted + self.d22 * state.v * state.v
@@ -125,7 +125,7 @@ impl SampledOscillator {
 mod tests {
     use super::*;
 
-    /// Fourth-order Runge-Kutta with many small steps: the second route.
+    /// Reference solution: fourth-order Runge-Kutta with 40,000 steps.
     fn integrated(omega: f64, zeta: f64, h: f64, start: OscillatorState, p: f64) -> (OscillatorState, f64) {
         let n = 40_000;
         let dt = h / f64::from(n);

@@ -1,114 +1,127 @@
-//! What contact patches of one radius see of a body: mode shapes averaged over the patch about every surface node, or
-//! about some that stand for all, and the residual compliance between patches.
+//! Contact patches of one radius on a body: mode shapes averaged over the patch about every surface node, or about every
+//! contact sample, and the residual compliance between patches.
 //!
 //! ```text
 //! G_c = Σᵢ wᵢ·Φᵢ        D_c = Σᵢⱼ wᵢ·Sᵢⱼ·wⱼ = A_c·A_cᵀ        K(x, y) = A(x)·ψ(|x − y|/L)·A(y)ᵀ
 //! ```
 //!
-//! w are the weights of the patch about node c; between nodes G and A are interpolated. D is exact at the nodes.
-//! K carries it to other places with Wendland's function ψ, whose range L is fitted to S: so K is positive
-//! semi-definite for any set of patches (Schur's product theorem), and costs the same on every mesh.
+//! w are the weights of the patch about node c; G [1/√kg] and A [√(m/N)] are interpolated between nodes. D [m/N] is exact at
+//! the nodes. The kernel K [m/N] extends it to pairs of patches by Wendland's function ψ, whose range L [m] is fitted to S.
+//! K is positive semi-definite for any set of patches (Schur's product theorem), and its cost does not depend on the mesh.
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
 use crate::surface::{
-    Bands, Bounds, PatchWeights, SphereTree, Surface, SurfacePoint, band, decimate, facing,
+    Bands, Bounds, PatchWeights, SphereTree, Surface, SurfacePoint, band, decimate, node_normals,
 };
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 
-/// Patches of one radius on one body; immutable.
+/// Contact patches of one radius on one body; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct PatchField {
-    /// a [m].
+    /// Patch radius a [m].
     pub(crate) radius: f64,
     pub(crate) weights: PatchWeights,
-    /// G [1/√kg], laid out as the mode shapes: (3·patch + axis)·m + mode. Single precision is what a search on a fine
-    /// mesh reads in half the time.
+    /// Averaged mode shapes G [1/√kg]: (3·patch + axis)·m + mode. Single precision halves the time of queries on a fine
+    /// mesh.
     pub(crate) rows: Vec<f32>,
-    /// A [√(m/N)], lower triangular, per patch.
-    roots: Vec<DMat3>,
-    /// L [m].
+    /// Factor A of each patch [√(m/N)], lower triangular.
+    factors: Vec<DMat3>,
+    /// Range L of the kernel [m].
     range: f64,
     pub(crate) bounds: Bounds,
-    /// The nodes that have a patch, where not all have one.
-    pub(crate) some: Option<SampleSurface>,
+    /// Contact samples; none where every surface node has a patch.
+    pub(crate) samples: Option<SampleSurface>,
 }
 
-/// Some of the surface nodes.
+/// Factored force Aᵀ·f of a patch.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FactoredForce {
+    /// Rest position [m, body].
+    rest: DVec3,
+    /// Aᵀ·f [√J].
+    value: DVec3,
+}
+
+/// Contact samples of a surface, with the decimated surface between them.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleSurface {
-    /// Which of them every surface node is; [`NONE`] for the others.
-    numbers: Vec<u32>,
+    /// Sample index of each surface node; [`NONE`] for the others.
+    indices: Vec<u32>,
+    /// Surface node of each sample.
     nodes: Vec<u32>,
-    /// Triangles between them; each as a triangle without extent where they make no surface.
+    /// Decimated surface; a degenerate triangle per sample where decimation fails.
     pub(crate) surface: Surface,
+    /// Whether decimation succeeded.
     pub(crate) is_surface: bool,
-    /// Outward directions at rest; zero where there is none.
-    facing: Vec<DVec3>,
-    /// One of its triangles for each.
+    /// Outward unit normal of each sample at rest; zero where it has none.
+    normals: Vec<DVec3>,
+    /// One triangle of each sample.
     triangle: Vec<u32>,
     pub(crate) tree: SphereTree,
 }
 
-/// No patch.
+/// Sample index of a surface node without sample.
 const NONE: u32 = u32::MAX;
 
 impl SampleSurface {
     pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
-        let mut numbers = vec![NONE; surface.positions.len()];
-        nodes.iter().enumerate().for_each(|(number, &node)| numbers[node as usize] = number as u32);
-        let between = decimate(surface, nodes);
-        let is_surface = between.is_some();
-        let triangles = between.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
+        let mut indices = vec![NONE; surface.positions.len()];
+        nodes.iter().enumerate().for_each(|(index, &node)| indices[node as usize] = index as u32);
+        let decimated = decimate(surface, nodes);
+        let is_surface = decimated.is_some();
+        let triangles = decimated.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
         let mut triangle = vec![0; nodes.len()];
         for (t, corners) in triangles.iter().enumerate() {
-            corners.iter().for_each(|node| triangle[numbers[*node as usize] as usize] = t as u32);
+            corners.iter().for_each(|node| triangle[indices[*node as usize] as usize] = t as u32);
         }
-        let facing = facing(surface);
-        let facing = nodes.iter().map(|&node| facing[node as usize]).collect();
+        let normals = node_normals(surface);
+        let normals = nodes.iter().map(|&node| normals[node as usize]).collect();
         let tree = SphereTree::new(&surface.positions, &triangles);
         let surface = Surface { triangles, ..surface.clone() };
-        Self { numbers, nodes: nodes.to_vec(), surface, is_surface, facing, triangle, tree }
+        Self { indices, nodes: nodes.to_vec(), surface, is_surface, normals, triangle, tree }
     }
 
-    /// Their nodes.
+    /// Surface nodes of the samples.
     pub(super) fn nodes(&self) -> &[u32] {
         &self.nodes
     }
 
-    pub(super) fn facing(&self, node: usize) -> DVec3 {
-        self.facing[self.numbers[node] as usize]
+    /// Outward unit normal of a sample at rest.
+    pub(super) fn normal(&self, node: usize) -> DVec3 {
+        self.normals[self.indices[node] as usize]
     }
 
-    /// A node as a point of the surface between them.
+    /// Sample as a point of the decimated surface.
     pub(super) fn node_point(&self, node: usize) -> SurfacePoint {
-        let triangle = self.triangle[self.numbers[node] as usize];
+        let triangle = self.triangle[self.indices[node] as usize];
         let corners = self.surface.triangles[triangle as usize];
         let first = corners.iter().position(|corner| *corner as usize == node);
         SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
     }
 }
 
-/// Pairs of nodes that the range is fitted to.
+/// Number of patches whose residual compliance with others determines the kernel's range.
 const FIT_CENTRES: usize = 24;
 
 impl PatchField {
-    /// About all surface nodes, over whose triangles there is a tree.
+    /// Patches about all surface nodes, with the sphere tree over the surface.
     pub(crate) fn new(recording: &Recording, tree: &SphereTree, radius: f64) -> Self {
         let all: Vec<u32> = (0..recording.surface.positions.len() as u32).collect();
         let field = Self::without_bounds(recording, &all, radius);
-        let bounds = field.find_bounds(recording, tree, &recording.surface.triangles);
+        let bounds = field.bounds(recording, tree, &recording.surface.triangles);
         Self { bounds, ..field }
     }
 
-    /// About some of them.
-    pub(crate) fn about(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
-        let some = SampleSurface::new(&recording.surface, nodes);
-        let field = Self { some: Some(some), ..Self::without_bounds(recording, nodes, radius) };
-        let some = field.some.as_ref();
-        let bounds = some.map(|some| field.find_bounds(recording, &some.tree, &some.surface.triangles));
+    /// Patches about contact samples.
+    pub(crate) fn at_samples(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
+        let samples = SampleSurface::new(&recording.surface, nodes);
+        let field = Self { samples: Some(samples), ..Self::without_bounds(recording, nodes, radius) };
+        let samples = field.samples.as_ref();
+        let bounds =
+            samples.map(|samples| field.bounds(recording, &samples.tree, &samples.surface.triangles));
         Self { bounds: bounds.unwrap_or_default(), ..field }
     }
 
@@ -126,18 +139,18 @@ impl PatchField {
             }
             rows.extend(sums.iter().map(|&sum| sum as f32));
         }
-        let mut spread = vec![0.0; surface.positions.len()];
+        let mut dense = vec![0.0; surface.positions.len()];
         let own: Vec<DMat3> = (0..n)
             .map(|c| match &recording.residual {
-                // Row by row: most nodes of a large patch are too far apart to answer each other.
+                // Row by row: most node pairs of a large patch lie beyond the near field.
                 ResidualCompliance::NearField(near) => {
-                    weights.of(c).for_each(|(node, w)| spread[node] = w);
+                    weights.of(c).for_each(|(node, w)| dense[node] = w);
                     let mut sum = DMat3::ZERO;
                     for (i, wi) in weights.of(c) {
-                        let row = near.row(i).filter(|(j, _)| spread[*j] != 0.0);
-                        sum += row.map(|(j, block)| block * spread[j]).fold(DMat3::ZERO, |a, b| a + b) * wi;
+                        let row = near.row(i).filter(|(j, _)| dense[*j] != 0.0);
+                        sum += row.map(|(j, block)| block * dense[j]).fold(DMat3::ZERO, |a, b| a + b) * wi;
                     }
-                    weights.of(c).for_each(|(node, _)| spread[node] = 0.0);
+                    weights.of(c).for_each(|(node, _)| dense[node] = 0.0);
                     sum
                 }
                 residual => {
@@ -152,95 +165,96 @@ impl PatchField {
                 }
             })
             .collect();
-        let roots = own.iter().map(root).collect();
-        let places: Vec<DVec3> = nodes.iter().map(|&node| surface.positions[node as usize]).collect();
+        let factors = own.iter().map(semidefinite_cholesky).collect();
+        let centres: Vec<DVec3> = nodes.iter().map(|&node| surface.positions[node as usize]).collect();
         let mut field = vec![0.0; surface.positions.len()];
-        let shares = |c: usize, others: &[usize]| -> Vec<f64> {
-            answer(&recording.residual, weights.of(c), &mut field);
+        let correlations = |c: usize, others: &[usize]| -> Vec<f64> {
+            residual_trace_field(&recording.residual, weights.of(c), &mut field);
             let scale = |d: usize| libm::sqrt(trace(&own[c]) * trace(&own[d]));
             let between = |d: usize| weights.of(d).map(|(j, w)| field[j] * w).sum::<f64>();
             others.iter().map(|&d| between(d) / scale(d)).collect()
         };
-        let range = fit_range(&places, surface.mean_edge(), radius, shares);
-        Self { radius, weights, rows, roots, range, bounds: Bounds::default(), some: None }
+        let range = fit_kernel_range(&centres, surface.mean_edge(), radius, correlations);
+        Self { radius, weights, rows, factors, range, bounds: Bounds::default(), samples: None }
     }
 
-    fn find_bounds(&self, recording: &Recording, tree: &SphereTree, triangles: &[[u32; 3]]) -> Bounds {
+    fn bounds(&self, recording: &Recording, tree: &SphereTree, triangles: &[[u32; 3]]) -> Bounds {
         let distances = ModalDistances::new(recording, &self.rows);
         tree.bounds(
             triangles,
-            |i, c| distances.between(self.number(i), c.map(|c| self.number(c))),
+            |i, c| distances.between(self.index(i), c.map(|c| self.index(c))),
             |i| {
-                let root = self.roots[self.number(i)];
-                libm::sqrt(trace(&(root * root.transpose())))
+                let factor = self.factors[self.index(i)];
+                libm::sqrt(trace(&(factor * factor.transpose())))
             },
         )
     }
 
-    /// The patch about a surface node that has one.
+    /// Index of the patch about a surface node that has one.
     ///
     /// # Real time
-    pub(crate) fn number(&self, node: usize) -> usize {
-        self.some.as_ref().map_or(node, |some| some.numbers[node] as usize)
+    pub(crate) fn index(&self, node: usize) -> usize {
+        self.samples.as_ref().map_or(node, |samples| samples.indices[node] as usize)
     }
 
-    /// The surface between the nodes that have a patch.
+    /// Surface between the nodes that have a patch.
     ///
     /// # Real time
     pub(crate) fn surface<'a>(&'a self, recording: &'a Recording) -> &'a Surface {
-        self.some.as_ref().map_or(&recording.surface, |some| &some.surface)
+        self.samples.as_ref().map_or(&recording.surface, |samples| &samples.surface)
     }
 
-    /// A at a surface point.
+    /// Factor A at a surface point [√(m/N)].
     ///
     /// # Real time
-    pub(crate) fn root_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
+    pub(crate) fn factor_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
         let corners = self.surface(recording).corners(point);
         let used = corners.iter().filter(|corner| corner.1 != 0.0);
-        used.map(|&(node, w)| self.roots[self.number(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
+        used.map(|&(node, w)| self.factors[self.index(node)] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// K·f [m] at the patch about a node, for pulls Aᵀ·f with their places at rest, around which it is flat.
+    /// Residual displacement K·f of the patch about a node [m, body], constant within `flat_radius` [m] of each force.
     ///
     /// # Real time
     pub(crate) fn residual_displacement(
         &self,
         recording: &Recording,
         node: usize,
-        pulls: &[(DVec3, DVec3); 3],
-        flat: f64,
+        forces: &[FactoredForce; 3],
+        flat_radius: f64,
     ) -> DVec3 {
         let mut sum = DVec3::ZERO;
-        for &(rest, pull) in pulls.iter().filter(|(_, pull)| *pull != DVec3::ZERO) {
-            let distance = ((recording.surface.positions[node] - rest).length() - flat).max(0.0);
+        for force in forces.iter().filter(|force| force.value != DVec3::ZERO) {
+            let distance = ((recording.surface.positions[node] - force.rest).length() - flat_radius).max(0.0);
             if distance < self.range {
-                sum += self.roots[self.number(node)] * pull * NearField::taper(distance / self.range);
+                sum += self.factors[self.index(node)] * force.value * NearField::taper(distance / self.range);
             }
         }
         sum
     }
 
-    /// Aᵀ·f for a force at a point with this rest position, and where: of a surface between some nodes at its corners.
+    /// Factored forces Aᵀ·f of a force at a surface point with this rest position; on a decimated surface at the corners.
     ///
     /// # Real time
-    pub(super) fn pulls(
+    pub(super) fn factored(
         &self,
         recording: &Recording,
         point: &SurfacePoint,
         rest: DVec3,
         force: DVec3,
-    ) -> [(DVec3, DVec3); 3] {
-        if let Some(some) = &self.some {
-            return some.surface.corners(point).map(|(node, weight)| {
-                let pull = self.roots[self.number(node)].transpose() * (force * weight);
-                (some.surface.positions[node], pull)
+    ) -> [FactoredForce; 3] {
+        if let Some(samples) = &self.samples {
+            return samples.surface.corners(point).map(|(node, weight)| {
+                let value = self.factors[self.index(node)].transpose() * (force * weight);
+                FactoredForce { rest: samples.surface.positions[node], value }
             });
         }
-        let none = (rest, DVec3::ZERO);
-        [(rest, self.root_at(recording, point).transpose() * force), none, none]
+        let value = self.factor_at(recording, point).transpose() * force;
+        let none = FactoredForce { rest, value: DVec3::ZERO };
+        [FactoredForce { rest, value }, none, none]
     }
 
-    /// Steepest slope of ψ [1/m].
+    /// Steepest slope of ψ(r/L) [1/m].
     pub(crate) fn residual_slope(&self) -> f64 {
         // ψ′ = −20·s·(1 − s)³ is steepest at a quarter.
         2.11 / self.range
@@ -252,15 +266,16 @@ impl PatchField {
         if distance >= self.range {
             return DMat3::ZERO;
         }
-        let root = |node| self.roots[self.number(node)];
-        root(a) * root(b).transpose() * NearField::taper(distance / self.range)
+        let factor = |node| self.factors[self.index(node)];
+        factor(a) * factor(b).transpose() * NearField::taper(distance / self.range)
     }
 
-    /// K [m/N] between two places. Between some nodes a place is its corners, as far as the modes go as well.
+    /// K [m/N] between the patches about two surface points; on a decimated surface interpolated between its corners, as the
+    /// modes are.
     ///
     /// # Real time
     pub(crate) fn residual(&self, recording: &Recording, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
-        if let Some(SampleSurface { surface, .. }) = &self.some {
+        if let Some(SampleSurface { surface, .. }) = &self.samples {
             let used = |point| surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
             let mut sum = DMat3::ZERO;
             for (i, wi) in used(a) {
@@ -274,12 +289,12 @@ impl PatchField {
         if distance >= self.range {
             return DMat3::ZERO;
         }
-        let (a, b) = (self.root_at(recording, a), self.root_at(recording, b));
+        let (a, b) = (self.factor_at(recording, a), self.factor_at(recording, b));
         a * b.transpose() * NearField::taper(distance / self.range)
     }
 }
 
-/// How differently surface nodes can move, by rows laid out as the mode shapes.
+/// Distances of surface nodes in the norm of the elastic energy, by rows laid out as the mode shapes.
 pub(crate) struct ModalDistances<'a, X> {
     rows: &'a [X],
     /// 1/ω² [s²].
@@ -292,7 +307,7 @@ impl<'a, X: Copy + Into<f64>> ModalDistances<'a, X> {
         Self { rows, weights: omegas.iter().map(|omega| 1.0 / (omega * omega)).collect() }
     }
 
-    /// √(Σ|rowᵢ − row_c|²/ω²) over axes and the modes of every band, or of row i alone.
+    /// √(Σ|rowᵢ − row_c|²/ω²) over axes and the modes of each band, or √(Σ|rowᵢ|²/ω²) without c [m/√J].
     pub(crate) fn between(&self, i: usize, c: Option<usize>) -> Bands {
         let m = self.weights.len();
         let row = |node: usize, axis: usize| &self.rows[(3 * node + axis) * m..][..m];
@@ -311,7 +326,7 @@ impl<'a, X: Copy + Into<f64>> ModalDistances<'a, X> {
     }
 }
 
-/// √tr(Sᵢᵢ) of a node.
+/// √tr(Sᵢᵢ) of a node [√(m/N)].
 pub(crate) fn residual_size(recording: &Recording, node: usize) -> f64 {
     libm::sqrt(trace(&recording.residual.block(node, node)))
 }
@@ -320,8 +335,8 @@ fn trace(matrix: &DMat3) -> f64 {
     matrix.diagonal().element_sum()
 }
 
-/// Lower Cholesky factor of a positive semi-definite matrix; directions without compliance get none.
-fn root(matrix: &DMat3) -> DMat3 {
+/// Lower Cholesky factor of a positive semi-definite matrix; zero in directions without compliance.
+fn semidefinite_cholesky(matrix: &DMat3) -> DMat3 {
     let mut lower = [[0.0; 3]; 3];
     let entry = |i: usize, j: usize| matrix.col(j)[i];
     let small = 1e-12 * trace(matrix);
@@ -339,9 +354,12 @@ fn root(matrix: &DMat3) -> DMat3 {
     DMat3::from_cols_array_2d(&lower).transpose()
 }
 
-/// What a force that is spread over a patch does to every node by the residual compliance, on average over its directions,
-/// times three: Σᵢ wᵢ·tr Sᵢⱼ.
-fn answer(residual: &ResidualCompliance, patch: impl Iterator<Item = (usize, f64)>, field: &mut [f64]) {
+/// Trace of the residual compliance between a patch and every node [m/N]: Σᵢ wᵢ·tr Sᵢⱼ.
+fn residual_trace_field(
+    residual: &ResidualCompliance,
+    patch: impl Iterator<Item = (usize, f64)>,
+    field: &mut [f64],
+) {
     field.fill(0.0);
     for (i, w) in patch {
         match residual {
@@ -353,34 +371,36 @@ fn answer(residual: &ResidualCompliance, patch: impl Iterator<Item = (usize, f64
     }
 }
 
-/// The range with which ψ comes nearest to how S falls off between patches about places: `shares(c, others)` tells it of
-/// patch c and others, as shares of what it is in their own places.
-fn fit_range(
-    places: &[DVec3],
+/// Range L [m] of the least-squares fit of ψ(r/L) to the correlation of patches: `correlations(c, others)` gives
+/// tr S_cd/√(tr S_cc·tr S_dd) of patch c and others.
+fn fit_kernel_range(
+    centres: &[DVec3],
     edge: f64,
     radius: f64,
-    mut shares: impl FnMut(usize, &[usize]) -> Vec<f64>,
+    mut correlations: impl FnMut(usize, &[usize]) -> Vec<f64>,
 ) -> f64 {
     let widest = 6.0 * (radius + edge);
-    let n = places.len();
+    let n = centres.len();
     let mut samples = Vec::new();
     for c in (0..n).step_by((n / FIT_CENTRES).max(1)) {
-        // A few places at growing distances.
-        let distance = |d: usize| (places[d] - places[c]).length();
-        let mut wanted = 0.5 * edge;
+        // A few patches at growing distances.
+        let distance = |d: usize| (centres[d] - centres[c]).length();
+        let mut least = 0.5 * edge;
         let mut others = Vec::new();
         for d in (0..n).filter(|&d| d != c && distance(d) < widest) {
-            if distance(d) > wanted {
+            if distance(d) > least {
                 others.push(d);
-                wanted = if distance(d) > 0.9 * widest { 0.5 * edge } else { distance(d) };
+                least = if distance(d) > 0.9 * widest { 0.5 * edge } else { distance(d) };
             }
         }
-        let shares = shares(c, &others).into_iter().zip(others).filter(|(share, _)| share.is_finite());
-        samples.extend(shares.map(|(share, d)| (distance(d), share)));
+        let found = correlations(c, &others).into_iter().zip(others);
+        let finite = found.filter(|(correlation, _)| correlation.is_finite());
+        samples.extend(finite.map(|(correlation, d)| (distance(d), correlation)));
     }
     let error = |range: f64| -> f64 {
-        let miss = |&(distance, share): &(f64, f64)| NearField::taper(distance / range) - share;
-        samples.iter().map(|sample| miss(sample) * miss(sample)).sum()
+        let residual =
+            |&(distance, correlation): &(f64, f64)| NearField::taper(distance / range) - correlation;
+        samples.iter().map(|sample| residual(sample) * residual(sample)).sum()
     };
     let candidates = (1..=48).map(|k| f64::from(k) / 48.0 * 2.0 * widest);
     let least = (radius + edge).max(f64::MIN_POSITIVE);

@@ -1,11 +1,11 @@
-//! What unit forces over patches do to every surface node by the residual compliance, remembered.
+//! Cache of residual displacement fields: displacement of every surface node per unit force on a contact patch.
 //!
 //! ```text
 //! A_c = Σᵢ wᵢ·S_·ᵢ        S·f = Σ_c A_c·f_c
 //! ```
 //!
-//! w are the weights of the patch about node c. Where a face lies the same patches press from picture to picture, and each of
-//! them loads dozens of nodes of a whole S.
+//! w are the weights of the patch about node c, S [m/N] the residual compliance. The patches of a resting face press in every
+//! rendered frame, and each loads dozens of nodes of a whole S.
 
 use super::body::{AppliedForce, Body, Footprint};
 use crate::recording::ResidualCompliance;
@@ -13,30 +13,32 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// So many patches are remembered: faces of several objects' contacts, and a finger on its way.
-const MOST: usize = 256;
+/// Number of cached patches above which unused ones are dropped: some faces in contact, and a moving finger.
+const MAX_CACHED: usize = 256;
 
-/// Patches by their number among the body's and their node; each with a 3×3 matrix [m/N] for every surface node, column by
-/// column, and when it was asked for last.
+/// Cached fields by patch index and node: a 3×3 matrix [m/N] for every surface node, column by column, and the frame of the
+/// last use.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ResidualFields {
-    known: BTreeMap<(u32, u32), (Vec<f32>, u64)>,
-    pictures: u64,
+    fields: BTreeMap<(u32, u32), (Vec<f32>, u64)>,
+    /// Number of frames so far.
+    frame: u64,
 }
 
 impl ResidualFields {
-    /// Add what forces over patches do. Says whether it did: only a whole S is worth remembering.
+    /// Add the residual displacements under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
     pub(super) fn add(&mut self, body: &Body, patches: &[AppliedForce], out: &mut [DVec3]) -> bool {
         if !matches!(body.recording.residual, ResidualCompliance::Whole(_)) {
             return false;
         }
-        self.pictures += 1;
+        self.frame += 1;
         for AppliedForce { location, force, .. } in patches {
-            let Footprint::Patch(number) = location.footprint else { continue };
+            let Footprint::Patch(index) = location.footprint else { continue };
             for (corner, weight) in body.corners(location).into_iter().filter(|(_, weight)| *weight != 0.0) {
-                let entry = self.known.entry((number, corner as u32));
-                let (field, used) = entry.or_insert_with(|| (answer(body, location.footprint, corner), 0));
-                *used = self.pictures;
+                let entry = self.fields.entry((index, corner as u32));
+                let (field, used) =
+                    entry.or_insert_with(|| (compliance_field(body, location.footprint, corner), 0));
+                *used = self.frame;
                 let force = (*force * weight).as_vec3();
                 let (blocks, _) = field.as_chunks::<9>();
                 for (u, [a, b, c, d, e, f, g, h, i]) in out.iter_mut().zip(blocks) {
@@ -46,20 +48,20 @@ impl ResidualFields {
                 }
             }
         }
-        if self.known.len() > MOST {
-            let now = self.pictures;
-            self.known.retain(|_, (_, used)| *used == now);
+        if self.fields.len() > MAX_CACHED {
+            let now = self.frame;
+            self.fields.retain(|_, (_, used)| *used == now);
         }
         true
     }
 }
 
-/// A_c of the patch about a node.
-fn answer(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32> {
+/// Field A_c of the patch about a node [m/N].
+fn compliance_field(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32> {
     let nodes = body.recording.surface.positions.len();
     let mut field = Vec::with_capacity(9 * nodes);
     let Some(patch) = body.patch(footprint) else { return field };
-    let weights: Vec<(usize, f64)> = patch.weights.of(patch.number(corner)).collect();
+    let weights: Vec<(usize, f64)> = patch.weights.of(patch.index(corner)).collect();
     for node in 0..nodes {
         let block = |(other, weight): &(usize, f64)| body.recording.residual.block(node, *other) * *weight;
         let sum: DMat3 = weights.iter().map(block).sum();
@@ -79,7 +81,7 @@ mod tests {
     use alloc::vec;
 
     #[test]
-    fn patches_that_are_remembered_do_what_their_nodes_do() {
+    fn cached_fields_give_the_displacements_of_nodal_forces() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
         let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
@@ -97,7 +99,8 @@ mod tests {
             let mut displacements = vec![DVec3::ZERO; body.recording.surface.positions.len()];
             assert!(residual_fields.add(body, applied_forces, &mut displacements));
             for (node, displacement) in displacements.into_iter().enumerate() {
-                let by_nodes = |at: &AppliedForce| body.residual_of_node(node, &at.location) * at.force;
+                let by_nodes =
+                    |applied: &AppliedForce| body.residual_of_node(node, &applied.location) * applied.force;
                 let expected: DVec3 = applied_forces.iter().map(by_nodes).sum();
                 assert!(
                     (displacement - expected).length() <= 1e-6 * expected.length() + 1e-12,

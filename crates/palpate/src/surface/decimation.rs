@@ -1,34 +1,35 @@
-//! A coarser surface between some of a surface's nodes.
+//! Decimation: a surface between some of a surface's nodes, by edge collapse.
 //!
-//! The other nodes are merged, one after the other, into a neighbour: the one for which the triangles around keep their
-//! directions and get good shapes. So a closed surface stays closed, and edges stay where nodes stand on them.
+//! The other nodes are merged into a neighbour, one after the other: the one for which the surrounding triangles best keep
+//! their directions and shapes. A closed surface stays closed, and sharp edges with samples are preserved.
 
 use super::{Surface, area_normal, triangles_around};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// A triangle may not turn by more than this cosine when one of its nodes is merged into another, nor get a worse shape,
-/// where an equilateral one has 1.
-const TURNS: f64 = 0.3;
-const SLENDER: f64 = 0.02;
+/// Lower limit of the cosine by which a collapse turns a triangle [1].
+const MIN_TURN_COSINE: f64 = 0.3;
 
-/// How much more a triangle's direction counts than its shape.
-const STRAIGHT: i32 = 8;
+/// Lower limit of a triangle's shape quality after a collapse [1]; 1 for an equilateral one.
+const MIN_SHAPE: f64 = 0.02;
 
-/// Triangles between the nodes that stay; none where the surface does not let all others go.
+/// Exponent of the turn's cosine in the quality of a collapse, relative to the shape.
+const TURN_EXPONENT: i32 = 8;
+
+/// Triangles between the nodes that stay; none where not all others can be collapsed.
 pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>> {
     let mut stays = vec![false; surface.positions.len()];
     nodes.iter().for_each(|&node| stays[node as usize] = true);
-    let mut coarse = Coarse {
+    let mut mesh = CollapsingMesh {
         positions: &surface.positions,
         triangles: surface.triangles.clone(),
         around: triangles_around(surface),
     };
-    let is_used = |node: &u32| !coarse.around[*node as usize].is_empty();
+    let is_used = |node: &u32| !mesh.around[*node as usize].is_empty();
     let mut left: Vec<u32> =
         (0..stays.len() as u32).filter(|n| !stays[*n as usize]).filter(is_used).collect();
-    // Evenly: of neighbours only one a pass.
+    // One node of a neighbourhood in a pass, for even triangles.
     let mut waits = vec![0; stays.len()];
     let mut pass = 0;
     while !left.is_empty() {
@@ -38,8 +39,8 @@ pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>
             if waits[node as usize] == pass {
                 return true;
             }
-            let ring = coarse.ring(node);
-            let merged = coarse.merge(node, &ring);
+            let ring = mesh.ring(node);
+            let merged = mesh.collapse(node, &ring);
             if merged {
                 ring.iter().for_each(|&other| waits[other as usize] = pass);
             }
@@ -49,22 +50,22 @@ pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>
             return None;
         }
     }
-    let whole = (0..coarse.triangles.len()).filter(|&t| coarse.triangles[t] != GONE);
-    Some(whole.map(|t| coarse.triangles[t]).collect())
+    let whole = (0..mesh.triangles.len()).filter(|&t| mesh.triangles[t] != REMOVED);
+    Some(whole.map(|t| mesh.triangles[t]).collect())
 }
 
-/// A triangle that is no more.
-const GONE: [u32; 3] = [u32::MAX; 3];
+/// Corners of a removed triangle.
+const REMOVED: [u32; 3] = [u32::MAX; 3];
 
-/// A surface that gets coarser.
-struct Coarse<'a> {
+/// Surface during decimation.
+struct CollapsingMesh<'a> {
     positions: &'a [DVec3],
     triangles: Vec<[u32; 3]>,
     around: Vec<Vec<u32>>,
 }
 
-impl Coarse<'_> {
-    /// The nodes around a node, one after the other; none where the triangles around it are no fan.
+impl CollapsingMesh<'_> {
+    /// Nodes around a node in order; none where the triangles around it are no fan.
     fn ring(&self, node: u32) -> Vec<u32> {
         let own = &self.around[node as usize];
         let side = |t: &u32| {
@@ -86,15 +87,15 @@ impl Coarse<'_> {
         if next == first && ring.len() == sides.len() { ring } else { Vec::new() }
     }
 
-    /// Merge a node into the best one of its ring; says whether there is one.
-    fn merge(&mut self, node: u32, ring: &[u32]) -> bool {
-        let worth = |&into: &u32| self.worth(node, into, ring);
-        let best = ring.iter().filter_map(|into| worth(into).map(|worth| (worth, *into)));
+    /// Collapse the best edge of a node. Gives whether there is one.
+    fn collapse(&mut self, node: u32, ring: &[u32]) -> bool {
+        let quality = |&into: &u32| self.collapse_quality(node, into, ring);
+        let best = ring.iter().filter_map(|into| quality(into).map(|quality| (quality, *into)));
         let Some((_, into)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
         for t in core::mem::take(&mut self.around[node as usize]) {
             let corners = &mut self.triangles[t as usize];
             if corners.contains(&into) {
-                for corner in core::mem::replace(corners, GONE) {
+                for corner in core::mem::replace(corners, REMOVED) {
                     self.around[corner as usize].retain(|other| *other != t);
                 }
             } else {
@@ -105,9 +106,9 @@ impl Coarse<'_> {
         true
     }
 
-    /// What it is worth to merge a node into one of its ring; none where that is not possible.
-    fn worth(&self, node: u32, into: u32, ring: &[u32]) -> Option<f64> {
-        // Both have two neighbours in common, else the surface would fold together.
+    /// Quality of the collapse of a node into one of its ring; none where it is not possible.
+    fn collapse_quality(&self, node: u32, into: u32, ring: &[u32]) -> Option<f64> {
+        // Link condition: the two nodes have exactly two common neighbours.
         let beside = |other: &&u32| {
             **other != into
                 && self.around[**other as usize].iter().any(|t| self.triangles[*t as usize].contains(&into))
@@ -128,10 +129,10 @@ impl Coarse<'_> {
             let [a, b, c] = moved.map(|n| self.positions[n as usize]);
             let sides = (a - b).length_squared() + (b - c).length_squared() + (c - a).length_squared();
             let shape = libm::sqrt(12.0) * after.length() / sides;
-            if turn < TURNS || shape < SLENDER {
+            if turn < MIN_TURN_COSINE || shape < MIN_SHAPE {
                 return None;
             }
-            least = least.min(libm::pow(turn, f64::from(STRAIGHT)) * shape);
+            least = least.min(libm::pow(turn, f64::from(TURN_EXPONENT)) * shape);
         }
         Some(least)
     }
@@ -194,38 +195,38 @@ mod tests {
     fn a_closed_surface_stays_closed_and_keeps_its_sides() {
         let block = block();
         let whole = volume(&block.positions, &block.triangles);
-        for (surface, aparts) in [(&block, [0.02, 0.035, 0.06, 0.09]), (&ball(), [0.15, 0.25, 0.4, 0.6])] {
-            for apart in aparts {
-                let nodes = poisson_disk_sample(surface, apart);
+        for (surface, spacings) in [(&block, [0.02, 0.035, 0.06, 0.09]), (&ball(), [0.15, 0.25, 0.4, 0.6])] {
+            for spacing in spacings {
+                let nodes = poisson_disk_sample(surface, spacing);
                 let triangles = decimate(surface, &nodes).expect("a surface");
                 let mut sides = BTreeMap::new();
                 for [a, b, c] in &triangles {
                     for side in [(a, b), (b, c), (c, a)] {
-                        assert!(sides.insert(side, ()).is_none(), "twice the same side: {apart}");
+                        assert!(sides.insert(side, ()).is_none(), "side occurs twice: {spacing}");
                     }
                 }
-                assert!(sides.keys().all(|(a, b)| sides.contains_key(&(*b, *a))), "closed: {apart}");
+                assert!(sides.keys().all(|(a, b)| sides.contains_key(&(*b, *a))), "closed: {spacing}");
                 let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
                 used.sort_unstable();
                 used.dedup();
-                assert_eq!(used.len(), nodes.len(), "{apart}");
+                assert_eq!(used.len(), nodes.len(), "{spacing}");
                 // Euler: one piece, without holes.
-                assert_eq!(used.len() + triangles.len(), sides.len() / 2 + 2, "{apart}");
+                assert_eq!(used.len() + triangles.len(), sides.len() / 2 + 2, "{spacing}");
                 let left = volume(&surface.positions, &triangles);
                 if surface.positions.len() == block.positions.len() {
-                    assert!((left - whole).abs() < 1e-9 * whole, "flat sides, straight edges: {apart}");
+                    assert!((left - whole).abs() < 1e-9 * whole, "flat sides, straight edges: {spacing}");
                 } else {
-                    // Chords: between places d apart a ball of radius 1 sinks by some d²/8 on each of its sides.
+                    // Chords: between samples at distance d the surface of a unit ball recedes by about d²/8.
                     let ball = 4.0 / 3.0 * core::f64::consts::PI;
                     let sunk = 1.0 - left / ball;
-                    assert!(sunk > 0.0 && sunk < 3.0 * (1.6 * apart).powi(2) / 6.0, "{apart}: {sunk}");
+                    assert!(sunk > 0.0 && sunk < 3.0 * (1.6 * spacing).powi(2) / 6.0, "{spacing}: {sunk}");
                 }
             }
         }
     }
 
     #[test]
-    fn a_sheet_of_no_thickness_has_no_coarser_surface() {
+    fn a_sheet_of_no_thickness_has_no_decimated_surface() {
         let positions: Vec<DVec3> =
             (0..25).map(|k| DVec3::new(f64::from(k % 5), f64::from(k / 5), 0.0)).collect();
         let cells = (0..16_u32).map(|k| k % 4 + k / 4 * 5);

@@ -1,8 +1,7 @@
-//! The free surface of a body: rest positions, triangles, and points on them.
+//! Free surface of a body: rest positions, triangles, and points on them.
 //!
-//! A point on a triangle with corners i, j, k and barycentric weights w moves by
-//! Σ w·u over its corners; a force at the point enters the corners with the same weights, so
-//! that work is the same on both sides and reciprocity holds.
+//! A point on a triangle with corners i, j, k and barycentric weights w has the displacement Σ w·u of its corners. A force at
+//! the point is distributed to the corners with the same weights, so that work is preserved and reciprocity holds.
 
 mod decimation;
 mod patch_weights;
@@ -13,7 +12,7 @@ mod triangle;
 
 pub(crate) use decimation::decimate;
 pub(crate) use patch_weights::{PatchWeights, triangles_around};
-pub(crate) use poisson_disk::{facing, poisson_disk_sample};
+pub(crate) use poisson_disk::{node_normals, poisson_disk_sample};
 pub(crate) use sphere_tree::{
     Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
     low_modes,
@@ -30,22 +29,22 @@ pub struct Surface {
     pub positions: Vec<DVec3>,
     /// Three surface nodes per triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// For each surface node, its number in the finite element model: first the nodes of the
-    /// input mesh in their order, then the mid-edge nodes of quadratic elements.
+    /// Number of each surface node in the finite element model: first the nodes of the input mesh in their order, then the
+    /// mid-edge nodes of quadratic elements.
     pub source_nodes: Vec<u32>,
 }
 
 /// A material point on the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// Position in [`Surface::triangles`].
+    /// Index in [`Surface::triangles`].
     pub triangle: u32,
     /// Barycentric weights of the triangle's corners; they sum to 1.
     pub weights: [f64; 3],
 }
 
 impl Surface {
-    /// The three corner nodes of the point's triangle with their weights.
+    /// Corner nodes of the point's triangle with their weights.
     pub fn corners(&self, point: &SurfacePoint) -> [(usize, f64); 3] {
         let [i, j, k] = self.triangles[point.triangle as usize];
         let [wi, wj, wk] = point.weights;
@@ -92,9 +91,9 @@ impl Surface {
         sum / (3 * self.triangles.len().max(1)) as f64
     }
 
-    /// The point of the surface at rest nearest to a body point, and its distance [m].
+    /// Nearest point of the surface at rest to a body point [m], and its distance [m]; none without triangles.
     ///
-    /// Looks at every triangle: for setting up, not for a step. `None` without triangles.
+    /// Costs all triangles: for setup, not for a step.
     pub fn nearest(&self, point_in_body: DVec3) -> Option<(SurfacePoint, f64)> {
         let mut best: Option<(SurfacePoint, f64)> = None;
         for (triangle, corners) in self.triangles.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Contact patches: a touch is spread over the surface around it, so that its feel does not show the mesh.
+//! Contact patches: distribution of a touch over the surrounding surface, so that its force does not depend on the mesh.
 //!
 //! About a surface node c with normal n_c, the weight of node i is the integral over the surface at rest
 //!
@@ -6,8 +6,8 @@
 //! wᵢ = ∫ k(|x − x_c|/a)·max(0, n·n_c)·Nᵢ(x) dA / ∫ k·max(0, n·n_c) dA,        k(s) = (1 − s²)² for s < 1
 //! ```
 //!
-//! with the shape functions Nᵢ of the finite elements, over the part of the surface that hangs together with c. Displacement is
-//! averaged and force is spread with the same weights. As a → 0 the patch becomes the node.
+//! with the patch radius a [m] and the shape functions Nᵢ of the finite elements, over the part of the surface that is connected
+//! with c. Displacement is averaged and force distributed with the same weights. As a → 0 the patch becomes the node.
 
 use super::quadratic_face::QuadraticFaces;
 use super::{Surface, area_normal, at_weights};
@@ -23,15 +23,15 @@ pub(crate) struct PatchWeights {
     weights: Vec<f64>,
 }
 
-/// A triangle is cut in four until its edges are below this share of the radius: the kernel is then integrated to
-/// about a thousandth by the middles of the edges.
-const FINE: f64 = 0.25;
+/// Ratio of edge to patch radius up to which triangles are subdivided: the rule of edge midpoints then integrates the kernel
+/// to about a thousandth.
+const MAX_EDGE_RATIO: f64 = 0.25;
 
-/// Never finer than this many halvings: a patch a hundred times smaller than its triangle is its node.
-const MOST_HALVINGS: u32 = 7;
+/// Upper limit of subdivisions: a patch a hundred times smaller than its triangle is its node.
+const MAX_HALVINGS: u32 = 7;
 
 impl PatchWeights {
-    /// About some nodes of a surface of finite elements of an order.
+    /// Patches of a radius [m] about nodes of a surface, with finite elements of an order.
     pub(crate) fn new(surface: &Surface, order: u32, radius: f64, centres: &[u32]) -> Self {
         let faces = QuadraticFaces::new(surface, order);
         let n = surface.positions.len();
@@ -40,7 +40,7 @@ impl PatchWeights {
         let mut patches = Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() };
         let mut weight = vec![0.0; n];
         let mut seen = vec![u32::MAX; surface.triangles.len()];
-        let mut known = vec![u32::MAX; n];
+        let mut is_touched = vec![u32::MAX; n];
         let (mut queue, mut touched) = (Vec::new(), Vec::new());
         for c in centres.iter().map(|&c| c as usize) {
             let centre = surface.positions[c];
@@ -48,8 +48,8 @@ impl PatchWeights {
             queue.clear();
             touched.clear();
             let mut add = |node: u32, w: f64, weight: &mut Vec<f64>| {
-                if known[node as usize] != c as u32 {
-                    known[node as usize] = c as u32;
+                if is_touched[node as usize] != c as u32 {
+                    is_touched[node as usize] = c as u32;
                     touched.push(node);
                 }
                 weight[node as usize] += w;
@@ -64,10 +64,10 @@ impl PatchWeights {
                 if facing <= 0.0 || radius <= 0.0 {
                     continue;
                 }
-                let places = corners.map(|node| surface.positions[node as usize]);
+                let positions = corners.map(|node| surface.positions[node as usize]);
                 let area = 0.5 * normals[t as usize].length() * facing;
                 let mut reached = false;
-                integrate(places, centre, radius, |w, share| {
+                integrate(positions, centre, radius, |w, share| {
                     reached = true;
                     faces.shapes(surface, t as usize, w, |node, w| add(node, w * share * area, &mut weight));
                 });
@@ -99,9 +99,9 @@ impl PatchWeights {
         patches
     }
 
-    /// Nodes and weights of the patch of this number; the weights sum to 1.
-    pub(crate) fn of(&self, number: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
-        let range = self.offsets[number] as usize..self.offsets[number + 1] as usize;
+    /// Nodes and weights of a patch; the weights sum to 1.
+    pub(crate) fn of(&self, patch: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
+        let range = self.offsets[patch] as usize..self.offsets[patch + 1] as usize;
         self.nodes[range.clone()].iter().map(|&n| n as usize).zip(self.weights[range].iter().copied())
     }
 }
@@ -115,23 +115,23 @@ pub(crate) fn triangles_around(surface: &Surface) -> Vec<Vec<u32>> {
     around
 }
 
-/// Twice the area of a triangle, along its normal [m²].
+/// Normal of a triangle with twice its area as length [m²].
 pub(super) fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
     area_normal(surface.triangles[triangle].map(|node| surface.positions[node as usize]))
 }
 
-/// Give weights of the corners and shares of the area, times the kernel, at points that integrate over a triangle.
-fn integrate(places: [DVec3; 3], centre: DVec3, radius: f64, mut add: impl FnMut([f64; 3], f64)) {
-    let [a, b, c] = places;
+/// Quadrature over a triangle: `add` takes the barycentric weights of a point, and its fraction of the area times the kernel.
+fn integrate(corners: [DVec3; 3], centre: DVec3, radius: f64, mut add: impl FnMut([f64; 3], f64)) {
+    let [a, b, c] = corners;
     let longest = (a - b).length().max((b - c).length()).max((c - a).length());
     let mut halvings = 0;
-    while longest / f64::from(1_u32 << halvings) > FINE * radius && halvings < MOST_HALVINGS {
+    while longest / f64::from(1_u32 << halvings) > MAX_EDGE_RATIO * radius && halvings < MAX_HALVINGS {
         halvings += 1;
     }
     let n = 1_u32 << halvings;
     let share = 1.0 / (f64::from(n) * f64::from(n));
     let mut point = |w: [f64; 3], share: f64| {
-        let s = (at_weights(places, w) - centre).length_squared() / (radius * radius);
+        let s = (at_weights(corners, w) - centre).length_squared() / (radius * radius);
         if s < 1.0 {
             add(w, share * (1.0 - s) * (1.0 - s));
         }
@@ -165,8 +165,9 @@ mod tests {
             triangles.push([node(i, j), node(i + 1, j), node(i + 1, j + 1)]);
             triangles.push([node(i, j), node(i + 1, j + 1), node(i, j + 1)]);
         }
-        let place = |k: u32| DVec3::new(f64::from(k / (n + 1)), f64::from(k % (n + 1)), 0.0) / f64::from(n);
-        let positions: Vec<DVec3> = (0..(n + 1) * (n + 1)).map(place).collect();
+        let position =
+            |k: u32| DVec3::new(f64::from(k / (n + 1)), f64::from(k % (n + 1)), 0.0) / f64::from(n);
+        let positions: Vec<DVec3> = (0..(n + 1) * (n + 1)).map(position).collect();
         let source_nodes = (0..positions.len() as u32).collect();
         Surface { positions, triangles, source_nodes }
     }
@@ -201,7 +202,7 @@ mod tests {
         }
     }
 
-    /// The same sheet as the surface of quadratic elements: faces of 2 × 2 cells, numbered so.
+    /// Sheet as the surface of quadratic elements: faces of 2 × 2 cells, with mid-edge nodes numbered last.
     fn quadratic_sheet(n: u32) -> Surface {
         let mut surface = sheet(n);
         let node = |i: u32, j: u32| i * (n + 1) + j;
@@ -227,9 +228,9 @@ mod tests {
         let n = 8;
         let surface = quadratic_sheet(n);
         let all: Vec<u32> = (0..surface.positions.len() as u32).collect();
-        for (a, place) in [(0.4, [4, 4]), (0.3, [4, 5]), (0.25, [5, 4]), (0.2, [5, 5])] {
+        for (a, centre) in [(0.4, [4, 4]), (0.3, [4, 5]), (0.25, [5, 4]), (0.2, [5, 5])] {
             let patches = PatchWeights::new(&surface, 2, a, &all);
-            let c = (place[0] * (n + 1) + place[1]) as usize;
+            let c = (centre[0] * (n + 1) + centre[1]) as usize;
             let centre = surface.positions[c];
             let field = |of: fn(DVec3) -> f64| -> f64 {
                 patches.of(c).map(|(node, w)| w * of(surface.positions[node] - centre)).sum()

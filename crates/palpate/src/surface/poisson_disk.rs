@@ -1,4 +1,4 @@
-//! Some of a surface's nodes that stand for all.
+//! Poisson-disk subsampling of surface nodes: contact samples of an even spacing.
 
 use super::patch_weights::area_vector;
 use super::{Surface, triangles_around};
@@ -6,41 +6,41 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Cosines between a node's normal and those of its triangles: below the first a corner, below the second an edge.
-const CORNER: f64 = 0.65;
-const EDGE: f64 = 0.85;
+/// Smallest cosine between a node's normal and those of its triangles below which it is a corner, or an edge.
+const CORNER_COSINE: f64 = 0.65;
+const EDGE_COSINE: f64 = 0.85;
 
-/// The mean of the directions of the triangles around every node; zero where they have none together.
-pub(crate) fn facing(surface: &Surface) -> Vec<DVec3> {
+/// Outward unit normal of every node at rest: mean of the normals of its triangles; zero where they cancel.
+pub(crate) fn node_normals(surface: &Surface) -> Vec<DVec3> {
     let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
     let sum = |own: &Vec<u32>| own.iter().map(unit).sum::<DVec3>().normalize_or_zero();
     triangles_around(surface).iter().map(sum).collect()
 }
 
-/// Nodes that are at least so far apart [m], and no node is farther from one of them: corners first, then edges, so that
-/// what stands on them stands as the whole surface does. The two sides of a thin part have nodes of their own;
-/// a side that has no direction counts for both.
-pub(crate) fn poisson_disk_sample(surface: &Surface, apart: f64) -> Vec<u32> {
+/// Poisson-disk sample of the nodes: samples keep a spacing [m], and every node lies within it of a sample. Corners come
+/// first, then edges, so that a body rests on its samples as on its whole surface. The two sides of a thin part are sampled
+/// separately; a node without normal counts for both.
+pub(crate) fn poisson_disk_sample(surface: &Surface, spacing: f64) -> Vec<u32> {
     let around = triangles_around(surface);
     let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
-    let normals = facing(surface);
+    let normals = node_normals(surface);
     let rank = |node: &u32| {
         let (own, normal) = (&around[*node as usize], normals[*node as usize]);
         let least = own.iter().map(|t| unit(t).dot(normal)).fold(1.0, f64::min);
-        (u32::from(least >= CORNER) + u32::from(least >= EDGE), *node)
+        (u32::from(least >= CORNER_COSINE) + u32::from(least >= EDGE_COSINE), *node)
     };
     let mut nodes: Vec<u32> =
         (0..surface.positions.len() as u32).filter(|n| !around[*n as usize].is_empty()).collect();
     nodes.sort_by_cached_key(rank);
-    let cell = |p: DVec3| (p / apart).floor().to_array().map(|x| x as i64);
+    let cell = |p: DVec3| (p / spacing).floor().to_array().map(|x| x as i64);
     let mut taken: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
     nodes.retain(|&node| {
-        let (place, normal) = (surface.positions[node as usize], normals[node as usize]);
-        let [x, y, z] = cell(place);
+        let (position, normal) = (surface.positions[node as usize], normals[node as usize]);
+        let [x, y, z] = cell(position);
         let beside = |[dx, dy, dz]: [i64; 3]| taken.get(&[x + dx, y + dy, z + dz]).into_iter().flatten();
         let blocks = |other: &u32| {
             let (other, its) = (surface.positions[*other as usize], normals[*other as usize]);
-            (other - place).length() < apart && its.dot(normal) >= 0.0
+            (other - position).length() < spacing && its.dot(normal) >= 0.0
         };
         let mut offsets = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
         let stays = !offsets.any(|offset| beside(offset).any(blocks));
@@ -56,7 +56,7 @@ pub(crate) fn poisson_disk_sample(surface: &Surface, apart: f64) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// A slab of n × n cells with side 1 and this thickness: its two large faces alone.
+    /// Two large faces of a slab with side 1, n × n cells and a thickness.
     fn slab(n: u32, thickness: f64) -> Surface {
         let side = (n + 1) * (n + 1);
         let node = |i: u32, j: u32, face: u32| face * side + i * (n + 1) + j;
@@ -66,44 +66,44 @@ mod tests {
             let ([a, b, c, d], [e, f, g, h]) = (corners(0), corners(1));
             triangles.extend([[a, c, b], [a, d, c], [e, f, g], [e, g, h]]);
         }
-        let place = |k: u32| {
+        let position = |k: u32| {
             let (face, k) = (k / side, k % side);
             DVec3::new(f64::from(k / (n + 1)), f64::from(k % (n + 1)), 0.0) / f64::from(n)
                 + DVec3::Z * (f64::from(face) * thickness)
         };
-        let positions: Vec<DVec3> = (0..2 * side).map(place).collect();
+        let positions: Vec<DVec3> = (0..2 * side).map(position).collect();
         Surface { source_nodes: (0..positions.len() as u32).collect(), positions, triangles }
     }
 
     #[test]
-    fn places_are_apart_and_leave_nothing_out_on_both_sides_of_a_thin_part() {
+    fn samples_keep_their_spacing_and_cover_both_sides_of_a_thin_part() {
         let surface = slab(20, 0.01);
-        for apart in [0.07, 0.15, 0.4] {
-            let nodes = poisson_disk_sample(&surface, apart);
-            let place = |node: &u32| surface.positions[*node as usize];
+        for spacing in [0.07, 0.15, 0.4] {
+            let nodes = poisson_disk_sample(&surface, spacing);
+            let position = |node: &u32| surface.positions[*node as usize];
             let same_side = |a: DVec3, b: DVec3| (a.z - b.z).abs() < 1e-9;
-            for (at, a) in nodes.iter().map(place).enumerate() {
-                let others = nodes[..at].iter().map(place).filter(|b| same_side(a, *b));
-                assert!(others.map(|b| (a - b).length()).fold(1.0, f64::min) >= apart);
+            for (at, a) in nodes.iter().map(position).enumerate() {
+                let others = nodes[..at].iter().map(position).filter(|b| same_side(a, *b));
+                assert!(others.map(|b| (a - b).length()).fold(1.0, f64::min) >= spacing);
             }
             for p in &surface.positions {
-                let near = nodes.iter().map(place).filter(|b| same_side(*p, *b));
-                assert!(near.map(|b| (*p - b).length()).fold(1.0, f64::min) < apart, "{p}");
+                let near = nodes.iter().map(position).filter(|b| same_side(*p, *b));
+                assert!(near.map(|b| (*p - b).length()).fold(1.0, f64::min) < spacing, "{p}");
             }
         }
     }
 
     #[test]
-    fn a_sheet_of_no_thickness_is_thinned_too() {
+    fn a_sheet_of_no_thickness_is_subsampled() {
         let mut surface = slab(10, 0.0);
-        // Both faces over the same nodes: none of them has a side.
+        // Both faces share their nodes: no node has a normal.
         let nodes = surface.positions.len() as u32 / 2;
         surface.triangles.iter_mut().flatten().for_each(|node| *node %= nodes);
         assert!(poisson_disk_sample(&surface, 0.3).len() < 30);
     }
 
     #[test]
-    fn the_corners_of_a_block_are_among_its_places() {
+    fn samples_include_the_corners_of_a_block() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let surface = crate::recording::Recording::from_bytes(bytes).expect("a released recording").surface;
         let nodes = poisson_disk_sample(&surface, 0.099);

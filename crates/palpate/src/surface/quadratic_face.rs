@@ -1,38 +1,38 @@
-//! How displacement goes over a surface triangle: linearly, or, where it is a fourth of a quadratic element's face,
-//! quadratically over that face.
+//! Shape functions on surface triangles: linear, or quadratic over the face of a quadratic element that the triangle is a
+//! quarter of.
 //!
-//! A quadratic face stands in the surface as four triangles: one about its middle, with the three mid-edge nodes, and
-//! one at each corner. Mid-edge nodes have larger numbers in the finite element model than corners.
+//! A quadratic face is stored in the surface as four triangles: one of its three mid-edge nodes, and one at each corner.
+//! Mid-edge nodes have larger numbers in the finite element model than corners.
 
 use super::Surface;
 use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A triangle as a part of a quadratic face.
+/// Triangle as a part of a quadratic face.
 #[derive(Debug, Clone, Copy)]
 struct Part {
-    /// Nodes of the face: corners, and the middle of the edge that begins at each.
+    /// Corner nodes of the face, and the mid-edge node after each.
     corners: [u32; 3],
     middles: [u32; 3],
-    /// Barycentric weights on the face of the triangle's own corners.
+    /// Barycentric weights of the triangle's corners on the face.
     vertices: [[f64; 3]; 3],
 }
 
-/// The faces that the triangles of a surface are or belong to.
+/// Quadratic faces of a surface's triangles.
 #[derive(Debug, Clone)]
 pub(crate) struct QuadraticFaces {
     parts: Vec<Option<Part>>,
 }
 
 impl QuadraticFaces {
-    /// Of a surface of finite elements of an order. Triangles that belong to no whole face count for themselves.
+    /// Faces of a surface with finite elements of an order. Triangles outside of whole faces are linear.
     pub(crate) fn new(surface: &Surface, order: u32) -> Self {
         let mut faces = Self { parts: vec![None; surface.triangles.len()] };
         if order != 2 {
             return faces;
         }
-        // Every triangle of a quadratic face has at least two middles, and the smallest of all is second in one.
+        // Every triangle of a quadratic face has at least two mid-edge nodes; the smallest of all is second in some triangle.
         let second = |corners: &[u32; 3]| {
             let mut numbers = corners.map(|node| surface.source_nodes[node as usize]);
             numbers.sort_unstable();
@@ -40,7 +40,7 @@ impl QuadraticFaces {
         };
         let least = surface.triangles.iter().map(second).min().unwrap_or_default();
         let is_middle = |node: u32| surface.source_nodes[node as usize] >= least;
-        // The corner triangles, by their edge between two middles.
+        // Corner triangles, by their edge between two mid-edge nodes.
         let mut at_corners = BTreeMap::new();
         for (t, nodes) in surface.triangles.iter().enumerate() {
             if let Some(k) = (0..3).find(|&k| !is_middle(nodes[k])) {
@@ -51,16 +51,15 @@ impl QuadraticFaces {
             if middles.iter().all(|&node| is_middle(node)) {
                 let over = |k: usize| at_corners.get(&(middles[k], middles[(k + 1) % 3])).copied();
                 if let (Some(a), Some(b), Some(c)) = (over(0), over(1), over(2)) {
-                    faces.take(surface, t, *middles, [a, b, c]);
+                    faces.insert(surface, t, *middles, [a, b, c]);
                 }
             }
         }
         faces
     }
 
-    /// A face of the triangle in its middle and those at its corners, the first over the first edge of the one in the
-    /// middle.
-    fn take(&mut self, surface: &Surface, middle: usize, nodes: [u32; 3], around: [(usize, u32); 3]) {
+    /// Insert the face of a middle triangle and the triangles at its corners, in the order of the middle one's edges.
+    fn insert(&mut self, surface: &Surface, middle: usize, nodes: [u32; 3], around: [(usize, u32); 3]) {
         let corners = around.map(|(_, corner)| corner);
         // Between the first two corners lies the node that the first two edges share.
         let middles = [nodes[1], nodes[2], nodes[0]];
@@ -81,7 +80,7 @@ impl QuadraticFaces {
         }
     }
 
-    /// Give the nodes and their shape functions at a point of a triangle with barycentric weights.
+    /// Nodes and shape functions at a point of a triangle with barycentric weights, passed to `give`.
     pub(crate) fn shapes(
         &self,
         surface: &Surface,

@@ -1,4 +1,4 @@
-//! Bounding-sphere tree over the surface that follows the deformation without being refitted.
+//! Bounding-sphere tree over the surface, valid under deformation without refitting.
 //!
 //! The sphere of a tree node is centred at a surface node c. With the mode shapes φ, ω [rad/s] and the elastic
 //! energy E of the modes, Cauchy and Schwarz bound the displacement of any surface node i below:
@@ -21,13 +21,15 @@ use glam::DVec3;
 /// Upper limit of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// Number of bands of modes, and of the low ones, which place a centre nearly and cheaply.
+/// Number of bands of modes, and of the low bands, which approximate the position of a centre.
 pub(crate) const BANDS: usize = 8;
-const LOW: usize = 5;
+const LOW_BANDS: usize = 5;
 
-/// Depth of a traversal's stack, enough for 2³¹ triangles; flag of a sphere whose subtree was visited.
+/// Depth of a traversal's stack, enough for 2³¹ triangles.
 const MAX_DEPTH: usize = 128;
-const DONE: u32 = 1 << 31;
+
+/// Flag of a sphere whose subtree was visited.
+const VISITED: u32 = 1 << 31;
 
 /// Ratio of radii from which the sphere about the deformed centre, which costs all modes, is worth computing.
 const REFINE_RATIO: f64 = 1.3;
@@ -51,18 +53,18 @@ impl Traversal {
     }
 }
 
-/// One number per band of modes.
+/// Number per band of modes.
 pub(crate) type Bands = [f64; BANDS];
 
-/// Modes of a band, of so many in all.
+/// Modes of a band, by the number of modes.
 pub(crate) fn band(modes: usize, at: usize) -> Range<usize> {
     let end = |at: usize| modes.div_ceil(1 << (BANDS - 1 - at));
     if at == 0 { 0..end(0) } else { end(at - 1)..end(at) }
 }
 
-/// Number of low modes, which place a centre nearly.
+/// Number of low modes, which approximate the position of a centre.
 pub(crate) fn low_modes(modes: usize) -> usize {
-    band(modes, LOW - 1).end
+    band(modes, LOW_BANDS - 1).end
 }
 
 /// Sphere tree over the triangles; immutable.
@@ -74,14 +76,14 @@ pub(crate) struct SphereTree {
 
 #[derive(Debug, Clone, Copy)]
 struct TreeNode {
-    /// The surface node at the centre.
+    /// Surface node at the centre.
     centre: u32,
     /// Largest distance [m] at rest of a surface node below from the centre.
     radius: f64,
     /// Triangles below, in [`SphereTree::triangles`].
     first: u32,
     count: u32,
-    /// The second child; the first comes right after its parent. 0 for a leaf.
+    /// Second child; the first follows its parent. 0 for a leaf.
     second: u32,
 }
 
@@ -96,10 +98,10 @@ struct SubtreeBound {
     apart: [f32; BANDS],
 }
 
-/// Spreads of all tree nodes, for one contact footprint.
+/// Displacement bounds of all subtrees, for one contact footprint.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bounds {
-    spreads: Vec<SubtreeBound>,
+    subtrees: Vec<SubtreeBound>,
 }
 
 /// Norms of a deformation that bound the displacement of surface nodes.
@@ -119,33 +121,33 @@ impl DeformationBound {
     pub(crate) const STILL: Self =
         Self { modal: [0.0; BANDS], residual: 0.0, max_residual: 0.0, slope: f64::INFINITY };
 
-    fn residual_of(&self, spread: &SubtreeBound) -> f64 {
-        (f64::from(spread.residual) * self.residual).min(self.max_residual)
+    fn residual_of(&self, subtree: &SubtreeBound) -> f64 {
+        (f64::from(subtree.residual) * self.residual).min(self.max_residual)
     }
 
     /// Displacement bound from rest [m].
-    fn reach(&self, spread: &SubtreeBound) -> f64 {
-        self.sum(&spread.modal, 0..BANDS) + self.residual_of(spread)
+    fn reach(&self, subtree: &SubtreeBound) -> f64 {
+        self.sum(&subtree.modal, 0..BANDS) + self.residual_of(subtree)
     }
 
-    /// Distance bound from the centre placed by the low modes, less the radius at rest [m].
-    fn beside_low(&self, spread: &SubtreeBound, radius: f64) -> f64 {
-        let modal = self.sum(&spread.apart, 0..LOW) + self.sum(&spread.modal, LOW..BANDS);
-        modal + self.residual_apart(spread, radius)
+    /// Distance bound from the centre by the low modes, less the radius at rest [m].
+    fn beside_low(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
+        let modal = self.sum(&subtree.apart, 0..LOW_BANDS) + self.sum(&subtree.modal, LOW_BANDS..BANDS);
+        modal + self.residual_apart(subtree, radius)
     }
 
     /// Distance bound from the deformed centre, less the radius at rest [m].
-    fn apart(&self, spread: &SubtreeBound, radius: f64) -> f64 {
-        self.sum(&spread.apart, 0..BANDS) + self.residual_apart(spread, radius)
+    fn apart(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
+        self.sum(&subtree.apart, 0..BANDS) + self.residual_apart(subtree, radius)
     }
 
-    fn residual_apart(&self, spread: &SubtreeBound, radius: f64) -> f64 {
+    fn residual_apart(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
         let change = self.max_residual * (self.slope * radius).min(1.0);
-        (f64::from(spread.residual) * self.residual).min(change)
+        (f64::from(subtree.residual) * self.residual).min(change)
     }
 
-    fn sum(&self, spread: &[f32; BANDS], bands: Range<usize>) -> f64 {
-        bands.map(|at| f64::from(spread[at]) * self.modal[at]).sum()
+    fn sum(&self, subtree: &[f32; BANDS], bands: Range<usize>) -> f64 {
+        bands.map(|at| f64::from(subtree[at]) * self.modal[at]).sum()
     }
 }
 
@@ -154,21 +156,21 @@ impl DeformationBound {
 pub(crate) enum Centre {
     /// Rest position of a surface node.
     Rest,
-    /// Surface node placed by the low modes.
+    /// Position of a surface node by the low modes.
     LowModes(usize),
-    /// Deformed surface node.
+    /// Deformed position of a surface node.
     Deformed(usize),
 }
 
 /// Node positions of a deforming surface at a moment, and radii of its spheres as far as traversals have refitted them.
 pub(crate) trait DeformingNodes {
     fn rest(&self, node: usize) -> DVec3;
-    /// Position by the low modes; none where all modes are known.
+    /// Position by the low modes; none where the position by all modes is cached.
     fn low_mode_position(&self, node: usize) -> Option<DVec3>;
     fn position(&mut self, node: usize) -> DVec3;
     /// Whether refitted radii are kept.
     fn keeps_radii(&self) -> bool;
-    /// Position of a node, if it is known already.
+    /// Cached position of a node.
     fn known_position(&self, node: usize) -> Option<DVec3>;
     fn refitted_radius(&self, sphere: usize) -> Option<f64>;
     fn set_refitted_radius(&mut self, sphere: usize, radius: f64);
@@ -191,7 +193,7 @@ impl DeformingNodes for RigidNodes<'_> {
         self.rest(node)
     }
 
-    /// Its spheres are tight from the beginning.
+    /// False: spheres of a rigid surface are tight.
     fn keeps_radii(&self) -> bool {
         false
     }
@@ -219,7 +221,7 @@ fn raise(of: &mut [f32; BANDS], by: impl Fn(usize) -> f64) {
 }
 
 impl SphereTree {
-    /// Tree over triangles between positions [m]; a single node is a triangle of three times itself.
+    /// Tree over triangles between positions [m]; a single node is a degenerate triangle.
     pub(crate) fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let count = triangles.len();
         let mut tree = Self { nodes: Vec::new(), triangles: (0..count as u32).collect() };
@@ -244,7 +246,7 @@ impl SphereTree {
         let centre = nodes.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_default();
         let at = positions[centre as usize];
         let radius = points().map(|p| (p - at).length()).fold(0.0, f64::max);
-        let place = self.nodes.len();
+        let index = self.nodes.len();
         self.nodes.push(TreeNode { centre, radius, first: first as u32, count: count as u32, second: 0 });
         if count > LEAF {
             // Halves along the longest side.
@@ -254,12 +256,12 @@ impl SphereTree {
             let key = |t: &u32| centres[*t as usize][axis];
             below.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
             self.build(surface, centres, first, half);
-            self.nodes[place].second = self.nodes.len() as u32;
+            self.nodes[index].second = self.nodes.len() as u32;
             self.build(surface, centres, first + half, count - half);
         }
     }
 
-    /// Spreads for a contact footprint: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²) for every band, or
+    /// Displacement bounds for a contact footprint: `modal(i, c)` gives √(Σ|φᵢ − φ_c|²/ω²) for every band, or
     /// √(Σ|φᵢ|²/ω²) without c, and `residual(i)` √tr(Sᵢᵢ).
     pub(crate) fn bounds(
         &self,
@@ -272,38 +274,38 @@ impl SphereTree {
         for i in triangles.iter().flatten().map(|node| *node as usize) {
             own[i].get_or_insert_with(|| (modal(i, None), (residual(i) as f32).next_up()));
         }
-        let mut spreads = vec![SubtreeBound::default(); self.nodes.len()];
+        let mut subtrees = vec![SubtreeBound::default(); self.nodes.len()];
         // Children come after their parents.
         for at in (0..self.nodes.len()).rev() {
             let node = self.nodes[at];
             let c = node.centre as usize;
-            let mut spread = SubtreeBound::default();
+            let mut subtree = SubtreeBound::default();
             if node.count as usize <= 16 * LEAF {
                 for triangle in self.triangles_of(&node) {
                     for i in triangles[triangle as usize] {
                         let i = i as usize;
-                        let (moves, dent) = own[i].unwrap_or_default();
-                        raise(&mut spread.modal, |band| moves[band]);
-                        spread.residual = spread.residual.max(dent);
+                        let (modal_bound, residual_bound) = own[i].unwrap_or_default();
+                        raise(&mut subtree.modal, |band| modal_bound[band]);
+                        subtree.residual = subtree.residual.max(residual_bound);
                         if i != c {
                             let apart = modal(i, Some(c));
-                            raise(&mut spread.apart, |band| apart[band]);
+                            raise(&mut subtree.apart, |band| apart[band]);
                         }
                     }
                 }
             } else {
-                // Higher up, by way of the children's centres.
+                // Higher up: triangle inequality over the children's centres.
                 for child in [at + 1, node.second as usize] {
-                    let (below, middle) = (spreads[child], self.nodes[child].centre as usize);
+                    let (below, middle) = (subtrees[child], self.nodes[child].centre as usize);
                     let far = if middle == c { Bands::default() } else { modal(middle, Some(c)) };
-                    raise(&mut spread.modal, |band| below.modal[band].into());
-                    spread.residual = spread.residual.max(below.residual);
-                    raise(&mut spread.apart, |band| far[band] + f64::from(below.apart[band]));
+                    raise(&mut subtree.modal, |band| below.modal[band].into());
+                    subtree.residual = subtree.residual.max(below.residual);
+                    raise(&mut subtree.apart, |band| far[band] + f64::from(below.apart[band]));
                 }
             }
-            spreads[at] = spread;
+            subtrees[at] = subtree;
         }
-        Bounds { spreads }
+        Bounds { subtrees }
     }
 
     fn triangles_of(&self, node: &TreeNode) -> impl Iterator<Item = u32> + '_ {
@@ -315,9 +317,9 @@ impl SphereTree {
         self.nodes.len()
     }
 
-    /// Traverse the tree. `near` decides by kind of centre, centre and radius whether a sphere is entered: about the rest
-    /// position, then about the position by the low modes, then about the deformed position. `found` takes the triangles of
-    /// the leaves, with a bound of their nodes' distance from the positions by the low modes. All in one frame.
+    /// Traverse the tree. `near` decides by kind of centre, centre [m] and radius [m] whether a sphere is entered: about the
+    /// rest position, then about the position by the low modes, then about the deformed position. `found` takes the triangles
+    /// of the leaves, with a bound of their nodes' distance from the positions by the low modes [m]. All in one frame.
     ///
     /// # Real time
     pub(crate) fn traverse<S: DeformingNodes>(
@@ -330,13 +332,13 @@ impl SphereTree {
         self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), bounds, surface, near, found);
     }
 
-    /// Resume a traversal until so many spheres and triangles were visited, or up to a leaf's triangles more. Gives their
+    /// Resume a traversal until `max_visits` spheres and triangles were visited, or up to a leaf's triangles more. Gives their
     /// number.
     ///
     /// # Real time
     pub(crate) fn resume_traversal<S: DeformingNodes>(
         &self,
-        (traversal, most): (&mut Traversal, usize),
+        (traversal, max_visits): (&mut Traversal, usize),
         (bounds, bound): (&Bounds, &DeformationBound),
         surface: &mut S,
         near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
@@ -346,27 +348,27 @@ impl SphereTree {
         if self.nodes.is_empty() {
             *depth = 0;
         }
-        let mut passed = 0;
-        while *depth > 0 && passed < most {
-            passed += 1;
+        let mut visits = 0;
+        while *depth > 0 && visits < max_visits {
+            visits += 1;
             *depth -= 1;
-            let (at, done) = ((stack[*depth] & !DONE) as usize, stack[*depth] & DONE != 0);
-            let (node, spread) = (&self.nodes[at], &bounds.spreads[at]);
-            if done {
+            let (at, visited) = ((stack[*depth] & !VISITED) as usize, stack[*depth] & VISITED != 0);
+            let (node, subtree) = (&self.nodes[at], &bounds.subtrees[at]);
+            if visited {
                 self.refit_lazily(at, surface);
                 continue;
             }
             let refitted_radius = surface.refitted_radius(at);
-            if !Self::enter(node, spread, bound, refitted_radius, surface, &near) {
+            if !Self::enter(node, subtree, bound, refitted_radius, surface, &near) {
                 continue;
             }
             if node.second == 0 {
-                let high = bound.sum(&spread.modal, LOW..BANDS) + bound.residual_of(spread);
+                let high = bound.sum(&subtree.modal, LOW_BANDS..BANDS) + bound.residual_of(subtree);
                 self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
-                passed += node.count as usize;
+                visits += node.count as usize;
             }
             if refitted_radius.is_none() && surface.keeps_radii() {
-                stack[*depth] = at as u32 | DONE;
+                stack[*depth] = at as u32 | VISITED;
                 *depth += 1;
             }
             if node.second != 0 {
@@ -375,13 +377,13 @@ impl SphereTree {
                 *depth += 2;
             }
         }
-        passed
+        visits
     }
 
     /// Whether a traversal enters a sphere.
     fn enter<S: DeformingNodes>(
         node: &TreeNode,
-        spread: &SubtreeBound,
+        subtree: &SubtreeBound,
         bound: &DeformationBound,
         refitted_radius: Option<f64>,
         surface: &mut S,
@@ -394,20 +396,20 @@ impl SphereTree {
                 surface,
                 Centre::Deformed(c),
                 centre,
-                radius + bound.residual_apart(spread, node.radius),
+                radius + bound.residual_apart(subtree, node.radius),
             );
         }
         let at_rest = surface.rest(c);
-        if !near(surface, Centre::Rest, at_rest, node.radius + bound.reach(spread)) {
+        if !near(surface, Centre::Rest, at_rest, node.radius + bound.reach(subtree)) {
             return false;
         }
-        let within = node.radius + bound.apart(spread, node.radius);
-        let nearly = node.radius + bound.beside_low(spread, node.radius);
+        let within = node.radius + bound.apart(subtree, node.radius);
+        let nearly = node.radius + bound.beside_low(subtree, node.radius);
         let low = surface.low_mode_position(c);
         if low.is_some_and(|centre| !near(surface, Centre::LowModes(c), centre, nearly)) {
             return false;
         }
-        // The sphere about where it is costs all modes: only where that is much smaller.
+        // The sphere about the deformed centre costs all modes: only where it is much smaller.
         if low.is_some() && nearly <= REFINE_RATIO * within {
             return true;
         }
@@ -415,22 +417,25 @@ impl SphereTree {
         near(surface, Centre::Deformed(c), centre, within)
     }
 
-    /// Refit a sphere to the positions that the traversal has computed, if all of them are known.
+    /// Refit a sphere to the positions that the traversal has computed, if all of them are cached.
     fn refit_lazily<S: DeformingNodes>(&self, at: usize, surface: &mut S) {
         let node = &self.nodes[at];
         let Some(centre) = surface.known_position(node.centre as usize) else { return };
         let mut radius = 0.0_f64;
-        let mut hold = |place: Option<DVec3>, around: Option<f64>| {
-            let far = place.zip(around).map(|(place, around)| (place - centre).length() + around);
-            radius = radius.max(far?);
+        let mut enclose = |position: Option<DVec3>, extent: Option<f64>| {
+            let reach = position.zip(extent).map(|(position, extent)| (position - centre).length() + extent);
+            radius = radius.max(reach?);
             Some(())
         };
         let all = match node.second {
             0 => self.triangles_of(node).try_for_each(|t| {
-                surface.corners_of(t).into_iter().try_for_each(|i| hold(surface.known_position(i), Some(0.0)))
+                surface
+                    .corners_of(t)
+                    .into_iter()
+                    .try_for_each(|i| enclose(surface.known_position(i), Some(0.0)))
             }),
             second => [at + 1, second as usize].into_iter().try_for_each(|child| {
-                hold(
+                enclose(
                     surface.known_position(self.nodes[child].centre as usize),
                     surface.refitted_radius(child),
                 )
@@ -445,7 +450,7 @@ impl SphereTree {
 impl Bounds {
     /// Upper bound of the displacement of any surface node from rest [m].
     pub(crate) fn max_displacement(&self, bound: &DeformationBound) -> f64 {
-        let root = self.spreads.first().copied().unwrap_or_default();
-        bound.reach(&root)
+        let whole = self.subtrees.first().copied().unwrap_or_default();
+        bound.reach(&whole)
     }
 }

@@ -1,4 +1,4 @@
-//! Nearest points of triangles.
+//! Triangles: nearest points, normals and barycentric interpolation.
 
 use glam::DVec3;
 
@@ -39,12 +39,12 @@ pub(crate) fn nearest_on_triangle([a, b, c]: [DVec3; 3], p: DVec3) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
-/// Normal, twice as long as the area, on the side from which the corners go counter-clockwise.
+/// Normal with twice the area as length [m²], on the side from which the corners are counter-clockwise.
 pub(crate) fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// The point with barycentric weights.
+/// Point with barycentric weights [m].
 pub(crate) fn at_weights(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }

@@ -1,10 +1,10 @@
-//! A sample recording with a finer surface: what the modes and the residual compliance say between the nodes.
+//! Released recording with a refined surface: modes and residual compliance interpolated between the nodes.
 
 use glam::{DMat3, DVec3};
 use palpate::{ModalBasis, Recording, ResidualCompliance, Surface};
 use std::collections::HashMap;
 
-/// The same body with every surface triangle cut in four, so many times.
+/// Recording with every surface triangle cut in four, repeatedly.
 pub fn refined(recording: &Recording, times: usize) -> Recording {
     (0..times).fold(recording.clone(), |coarse, _| cut_in_four(&coarse))
 }
@@ -12,7 +12,7 @@ pub fn refined(recording: &Recording, times: usize) -> Recording {
 fn cut_in_four(coarse: &Recording) -> Recording {
     let surface = &coarse.surface;
     let m = coarse.modes.len();
-    // For every node the one or two nodes that it stands between.
+    // Parents of every node: the ends of the edge that it bisects, or twice itself.
     let mut parents: Vec<[usize; 2]> = (0..surface.positions.len()).map(|n| [n, n]).collect();
     let mut middles = HashMap::new();
     let mut triangles = Vec::new();
@@ -26,8 +26,8 @@ fn cut_in_four(coarse: &Recording) -> Recording {
         let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
         triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
     }
-    let place = |of: &[usize; 2]| (surface.positions[of[0]] + surface.positions[of[1]]) * 0.5;
-    let positions: Vec<DVec3> = parents.iter().map(place).collect();
+    let midpoint = |of: &[usize; 2]| (surface.positions[of[0]] + surface.positions[of[1]]) * 0.5;
+    let positions: Vec<DVec3> = parents.iter().map(midpoint).collect();
     let row = |node: usize, axis: usize| &coarse.modes.mode_shapes[(3 * node + axis) * m..][..m];
     let mut mode_shapes = Vec::with_capacity(3 * positions.len() * m);
     for &[a, b] in &parents {
