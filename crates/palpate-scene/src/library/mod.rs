@@ -7,13 +7,13 @@ mod pointers;
 
 use crate::error::{SceneError, SceneErrorKind};
 use crate::file::{RunMode, read_edited_scene, read_text};
-use crate::progress::Progress;
 use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::{Scene, SceneDevice};
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube};
 use palpate::{Coupling, Damping, Material};
 use palpate_fem::ElementOrder;
+use palpate_fem::Progress;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -31,11 +31,16 @@ const MAX_SWEEPS: u32 = 120;
 const HELD_ROUNDINGS: f64 = 8.0;
 const UNSOLVED: f64 = 1e-9;
 
-/// Tolerances of a contact's residual, as shares of the object's size: the goal; what is accepted beyond the budget of contact
-/// visits; and what is used, and reported as unsolved, at the limit of sweeps.
+/// Tolerances of a contact's residual, as shares of the object's size: the goal for islands of up to [`FEW`] contacts, whose
+/// friction sticks without creep, and for larger ones; what is accepted beyond the budget of contact visits; and what is used,
+/// and reported as unsolved, at the limit of sweeps.
+const EXACT: f64 = 1e-12;
 const TOLERANCE: f64 = 1e-8;
 const LOOSE: f64 = 1e-5;
 const ROUGH: f64 = 1e-4;
+
+/// Upper limit of contacts of a small island.
+const FEW: usize = 24;
 
 /// Contact visits that the goal is worth: contact samples, which stand for many nodes, are no more exact than [`LOOSE`].
 const VISITS: u32 = 600;
@@ -130,10 +135,11 @@ impl Solver {
 
     fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
+        let is_large = self.members.len() > FEW;
         let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
-            problem.states[at].points.least_move = if touches { MIN_DISPLACEMENT * radius } else { 0.0 };
+            problem.states[at].points.least_move = if is_large { MIN_DISPLACEMENT * radius } else { 0.0 };
             reach = reach.max(problem.states[at].reach(&problem.objects[at]));
             size = size.min(radius);
         }
@@ -231,7 +237,11 @@ impl Solver {
 
     /// Tolerance after so many contact visits, as a share of the size.
     fn tolerance(&self, visits: u32) -> f64 {
-        if visits > self.visits_until_loose { LOOSE } else { TOLERANCE }
+        match visits {
+            visits if visits > self.visits_until_loose => LOOSE,
+            _ if self.members.len() <= FEW => EXACT,
+            _ => TOLERANCE,
+        }
     }
 
     /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].

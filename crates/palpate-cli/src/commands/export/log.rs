@@ -58,12 +58,18 @@ pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
     let written = files.finish()?;
     let facts = json!({
         "steps": log.steps,
-        "repeated": { "steps": done, "identical": true },
+        "repeated": { "steps": done.steps, "identical": done.first_difference.is_none() },
         "step_s": step_s,
         "frames": frames,
     });
     let drawn =
         if frames > 0 { format!(", {frames} frames at {} a second", window.fps) } else { String::new() };
-    let line = format!("{done} of {} steps repeated, bit for bit{drawn}", log.steps);
+    let compared = match &done.first_difference {
+        None => "bit for bit".to_string(),
+        Some(first) => {
+            format!("with other digits from step {} on: the log is of palpate {}", first.step, log.version())
+        }
+    };
+    let line = format!("{} of {} steps repeated, {compared}{drawn}", done.steps, log.steps);
     print_written(arguments, &written, facts, &line)
 }
