@@ -55,7 +55,7 @@ pub enum StoreError {
     Invalid {
         /// Location of the store.
         location: String,
-        /// What was found and what was expected.
+        /// Value that was found, and what is expected.
         reason: String,
     },
     /// Shards of the table are missing.

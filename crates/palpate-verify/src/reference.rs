@@ -9,7 +9,7 @@ pub const IMPULSE_RESPONSE_1_MS: &str = include_str!("../reference/impulse_respo
 /// Fall from 5 cm, step 1 ms: time [s], height [m], force [N], energy [J].
 pub const FALL_1_MS: &str = include_str!("../reference/bounce_full_1ms.csv");
 
-/// The same with the paper's step, 2 ms.
+/// Fall at the paper's step, 2 ms.
 pub const FALL_2_MS: &str = include_str!("../reference/bounce_full_2ms.csv");
 
 /// Rebound [m] of the fall from 5 cm with all modes.

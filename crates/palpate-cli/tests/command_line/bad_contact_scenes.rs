@@ -1,4 +1,4 @@
-//! What is refused, or warned of, in scenes where things touch.
+//! Errors and warnings of scenes with contacts.
 
 use crate::workplace::{CUBE, Workplace};
 

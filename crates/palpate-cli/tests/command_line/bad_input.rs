@@ -1,4 +1,4 @@
-//! What bad input gives: one clear error, a status, and nothing half-written.
+//! Bad input: one clear error, a status, and nothing half-written.
 
 use crate::workplace::{SCENE, Workplace, gmsh_bar};
 

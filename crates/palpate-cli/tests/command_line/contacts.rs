@@ -1,4 +1,4 @@
-//! What scenes give where things touch: forces, contacts, energies.
+//! Forces, contacts and energies of scenes with contacts.
 
 use crate::workplace::{CUBE, Table, Workplace};
 use glam::DVec3;

@@ -14,7 +14,7 @@ fn bare() -> Workplace {
     workplace
 }
 
-/// The same with a stand-in for one vendor's.
+/// Workplace with a stand-in for one vendor's device.
 fn with_device() -> Workplace {
     let mut workplace = bare();
     let library = compile::compile("libdhd", &workplace.path(""));

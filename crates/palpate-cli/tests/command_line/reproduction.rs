@@ -1,4 +1,4 @@
-//! What `palpate reproduce` leaves, on a coarse cube. Whether a browser is here is none of these tests' business.
+//! Output of `palpate reproduce` on a coarse cube, with or without a browser.
 
 use crate::workplace::{Table, Workplace};
 

@@ -1,4 +1,4 @@
-//! What good input gives: recordings, runs, files.
+//! Results of good input: recordings, runs, files.
 
 use crate::workplace::{CUBE, SCENE, Table, Workplace, gmsh_bar};
 use glam::DVec3;

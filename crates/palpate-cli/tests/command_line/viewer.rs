@@ -15,7 +15,7 @@ struct Serving {
     child: Child,
     /// `127.0.0.1:PORT`.
     address: String,
-    /// What it says after that.
+    /// Lines printed after that.
     said: JoinHandle<Vec<String>>,
 }
 
@@ -61,7 +61,7 @@ impl Serving {
         self.interrupted().0
     }
 
-    /// The same, with what it has said since it listens.
+    /// Exit code after an interrupt, with the lines printed since it listens.
     fn interrupted(mut self) -> (Option<i32>, Vec<String>) {
         let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
@@ -81,7 +81,7 @@ impl Serving {
 /// A page without a browser.
 struct Page(WebSocket<MaybeTlsStream<TcpStream>>);
 
-/// What a picture of a scene of one object and one obstacle tells.
+/// Contents of a frame of a scene with one object and one obstacle.
 struct Picture {
     generation: u32,
     step: u32,
@@ -113,9 +113,9 @@ impl Picture {
         let f32_at = |at: usize| f32::from_bits(u32_at(at));
         assert_eq!((u32_at(64), u32_at(68)), (1, 1), "objects and obstacles");
         let modes = 88 + 28;
-        let dents = modes + 4 + 4 * u32_at(modes) as usize;
-        let k = u32_at(dents) as usize;
-        let obstacle = dents + 8 + (2 * k).next_multiple_of(4) + (3 * k).next_multiple_of(4);
+        let residuals = modes + 4 + 4 * u32_at(modes) as usize;
+        let k = u32_at(residuals) as usize;
+        let obstacle = residuals + 8 + (2 * k).next_multiple_of(4) + (3 * k).next_multiple_of(4);
         let force = obstacle + 28 + 4 + 24;
         let force = [0, 4, 8].map(|part| f32_at(force + part));
         Self {

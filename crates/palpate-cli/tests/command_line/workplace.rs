@@ -11,7 +11,7 @@ pub struct Workplace {
     variables: Vec<(String, String)>,
 }
 
-/// What a cube of 3×3×3 cells is recorded with; the output comes last.
+/// Arguments that record a cube of 3×3×3 cells; the output comes last.
 pub const CUBE: [&str; 15] = [
     "record",
     "box:0.1x0.1x0.1/3x3x3",
@@ -125,7 +125,7 @@ impl Workplace {
         String::from_utf8(stdout).expect("text on standard output")
     }
 
-    /// The same with JSON on standard output.
+    /// JSON on standard output of a command that succeeds.
     pub fn json(&self, arguments: &[&str]) -> Value {
         serde_json::from_str(&self.succeed(arguments)).expect("one JSON object")
     }

@@ -23,7 +23,7 @@ pub enum MeshError {
         path: PathBuf,
         /// Position of the error in the file.
         position: FilePosition,
-        /// What was found and what was expected.
+        /// Value that was found, and what is expected.
         message: String,
     },
     /// The scale factor is not a positive number.

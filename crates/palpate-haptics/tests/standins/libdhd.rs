@@ -160,7 +160,7 @@ pub extern "C" fn standin_place(id: usize, x: f64, y: f64, z: f64) {
     world().devices[id].position = [x, y, z];
 }
 
-/// How it turns the handle, row by row.
+/// Rotation of the handle, row by row.
 #[unsafe(no_mangle)]
 pub extern "C" fn standin_turn(id: usize, rows: &[[f64; 3]; 3]) {
     world().devices[id].frame = *rows;
@@ -171,7 +171,7 @@ pub extern "C" fn standin_press(id: usize, buttons: c_uint) {
     world().devices[id].buttons = buttons;
 }
 
-/// How many devices are plugged in; those that are pulled out are closed by nobody.
+/// Set the number of devices that are plugged in; unplugged ones stay open.
 #[unsafe(no_mangle)]
 pub extern "C" fn standin_plug(count: usize) {
     world().present = count;

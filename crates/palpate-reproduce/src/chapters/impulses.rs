@@ -217,7 +217,7 @@ fn pictures(body: &RecordedBody, surface: &[u32], wave: &Wave, caption: &str) ->
         let late = frames.iter().filter(|(ms, _)| *ms >= from_ms).flat_map(|(_, frame)| frame.iter());
         late.fold(0.0_f64, |peak, u| peak.max(u.length()))
     };
-    // The wave is to be seen, the first dent to stay a dent.
+    // The wave is to be seen, the first indentation to stay one.
     let (travelling, first) = (peak_from(TRAVELLING_MS), peak_from(0.0));
     let scale = (SHOWN_SHARE * 0.1 / travelling).min(LARGEST_SHARE * 0.1 / first);
     let deformed: Vec<Vec<DVec3>> = frames

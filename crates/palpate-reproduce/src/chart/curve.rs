@@ -1,4 +1,4 @@
-//! The look of a series: colour, dashes and marker, so that series differ without colour; and curves thinned to what can be seen.
+//! The look of a series: colour, dashes and marker, so that series differ without colour; and curves subsampled to what can be seen.
 
 use super::{Series, Style, short};
 use glam::DVec2;
@@ -55,7 +55,7 @@ impl Look {
             "" => String::new(),
             dashes => format!(" stroke-dasharray=\"{dashes}\""),
         };
-        let path: String = runs.iter().map(|run| polyline(&thinned(run))).collect();
+        let path: String = runs.iter().map(|run| polyline(&subsampled(run))).collect();
         format!("<path class=\"{class} s{}\"{dashes} d=\"{path}\"/>\n", self.colour)
     }
 
@@ -79,7 +79,7 @@ fn polyline(run: &[DVec2]) -> String {
 }
 
 /// The points of a curve that differ at the size of the chart.
-fn thinned(run: &[DVec2]) -> Vec<DVec2> {
+fn subsampled(run: &[DVec2]) -> Vec<DVec2> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| (a.x * COLUMNS).floor() == (b.x * COLUMNS).floor()) {
         let by_height = |&i: &usize, &j: &usize| column[i].y.total_cmp(&column[j].y);
@@ -102,10 +102,10 @@ mod tests {
         let at = |i: u32| DVec2::new(6e-3 * f64::from(i), 150.0 + 140.0 * (0.2 * f64::from(i)).sin());
         let mut run: Vec<DVec2> = (0..100_000).map(at).collect();
         run[54_321].y = 1.0;
-        let kept = thinned(&run);
+        let kept = subsampled(&run);
         assert!(kept.len() <= 4 * 1201 && kept.contains(&run[54_321]), "{} points", kept.len());
-        assert_eq!(thinned(&run[..1]), run[..1]);
-        assert!(thinned(&[]).is_empty());
+        assert_eq!(subsampled(&run[..1]), run[..1]);
+        assert!(subsampled(&[]).is_empty());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use toml::Spanned;
 /// Upper bound of lengths [m], velocities and accelerations.
 pub(super) const LARGEST: f64 = 1e6;
 
-/// Keys of earlier versions, which open but are not listed in errors.
+/// Keys in an old spelling, which open but are not listed in errors.
 pub(super) const RETIRED_KEYS: [&str; 5] = ["motion", "most_contact_points", "most_places", "which", "force"];
 
 #[derive(Deserialize)]

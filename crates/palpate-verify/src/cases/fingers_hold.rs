@@ -80,7 +80,7 @@ pub fn fingers_hold() -> Result<Vec<Check>, VerifyError> {
     let same = turned * LEAST_TIP * body.surface.mean_edge() / displacement(STEPS).length();
     let allowed = 3.2 * same + 2e-4;
     checks.push(Check::new(
-        "normal turns, where the surface bends beside the dent [rad]",
+        "normal turns, where the surface bends beside the indentation [rad]",
         turned,
         0.0,
         NORMAL_ROTATION,

@@ -110,7 +110,7 @@ impl<'a> DeformedSurface<'a> {
         }
     }
 
-    /// Exclude the contacts' own residual displacement within a radius [m] of their locations: the dent of a tip does not
+    /// Exclude the contacts' own residual displacement within a radius [m] of their locations: the indentation by a tip does not
     /// become a wall beside it.
     pub(crate) fn exclude_own_residual(
         &mut self,

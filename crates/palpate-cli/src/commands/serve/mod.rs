@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-/// See a scene in the browser and touch it with mouse, pen or fingers
+/// Show a scene in the browser and touch it with mouse, pen or fingers
 ///
 /// The scene runs in real time, as `palpate run --realtime` does; the page shows it at display rate and its pointers are
 /// devices. Scenes without `pointer = true` get four pointers of a size that suits their objects. Without a scene file

@@ -137,7 +137,7 @@ struct Found {
     differ: u32,
     /// Beyond the bound without the controller.
     free: LoopRun,
-    /// The same with the controller: as the device is, and without losses of its own.
+    /// Runs with the controller: with the device's own losses, and without.
     controlled: [LoopRun; 2],
 }
 
