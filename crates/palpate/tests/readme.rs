@@ -15,7 +15,7 @@ fn the_readme_shows_the_example_as_it_is() {
 fn the_program_prints_the_number_in_the_readme() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let output = std::process::Command::new(env!("CARGO"))
-        .args(["run", "--quiet", "--locked", "--package", "palpate", "--example", "hold"])
+        .args(["run", "--release", "--quiet", "--locked", "--package", "palpate", "--example", "hold"])
         .current_dir(root)
         .output()
         .expect("cargo runs, since it runs this test");

@@ -106,7 +106,7 @@ pub fn pinch_lift() -> Result<Vec<Check>, VerifyError> {
                 off = off.max((object.pose.position - fallen).length());
             }
         }
-        let (_, _, speed) = flight.ok_or_else(|| VerifyError::NotReached("the fingers do not let go"))?;
+        let (_, _, speed) = flight.ok_or(VerifyError::NotReached("the fingers do not let go"))?;
         checks.push(Check::new(
             format!("{name}: slip of the fingers while they shake [m]"),
             slipped,
