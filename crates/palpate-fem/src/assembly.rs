@@ -2,6 +2,8 @@
 //!
 //! K [N/m] has a block for each pair of nodes that share an element; the consistent mass M [kg] is a
 //! number times the unit matrix for each, so both share one sparsity.
+//!
+//! Equations: docs/theory.md (C1), (C2).
 
 use crate::discretisation::Discretisation;
 use crate::element::{Elasticity, ElementMatrices};

@@ -3,6 +3,8 @@
 //! Column by column from the factor, in blocks. Stored in f32: rounding moves an entry by at most 2⁻²⁴ of
 //! itself, so each diagonal entry is raised by 2⁻²⁴ of its row's absolute sum, which keeps S positive
 //! semi-definite (Gershgorin) and changes it by less than a millionth.
+//!
+//! Equations: docs/theory.md (C4).
 
 use crate::modes::ElasticModes;
 use crate::progress::Progress;

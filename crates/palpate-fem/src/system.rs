@@ -11,6 +11,8 @@
 //! K⁻ is the inverse of K with the six constrained degrees of freedom removed; any six that prevent all rigid
 //! motions give the same G. For a body with fixed nodes G is the inverse of K on the free ones.
 //! Reference: Géradin & Rixen, *Mechanical Vibrations*, 3.5.
+//!
+//! Equations: docs/theory.md (C1), (C2).
 
 use crate::assembly::{Assembly, SystemMatrix};
 use crate::discretisation::Discretisation;

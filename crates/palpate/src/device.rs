@@ -7,6 +7,8 @@
 //! ```text
 //! f = k·e⁺ + d·(e⁺ − e)/h        so        e⁺ = (f + d/h·e) / (k + d/h)
 //! ```
+//!
+//! Equations: docs/theory.md (C50), (C51), (C52), (C53).
 
 use crate::error::ModelError;
 use alloc::format;

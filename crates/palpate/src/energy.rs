@@ -10,6 +10,8 @@
 //! along their normals. Dissipated is the energy loss of modal damping (a quadratic form, `response::oscillator`) and of the
 //! residual spring when its force jumps, at least ½·Δfᵀ·S·Δf. The defect is the imbalance of these terms: round-off of the
 //! solver and of the sums; with the paper's update also the error of semi-implicit Euler.
+//!
+//! Equations: docs/theory.md (C47), (C48).
 
 /// Energies [J] of one object, or of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

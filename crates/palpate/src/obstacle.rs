@@ -1,4 +1,6 @@
 //! Rigid obstacles: shapes with a signed distance [m].
+//!
+//! Equations: docs/theory.md (C17), (C18), (C24).
 
 use crate::error::{Error, ModelError};
 use crate::spatial::Pose;

@@ -4,6 +4,8 @@
 //! tangent of half the angle), cay(v) = (I − v̂/2)⁻¹ (I + v̂/2). As a quaternion it is (1, v/2)
 //! normalised, and for every vector a it satisfies, exactly,
 //! cay(v)·a − a = v × (cay(v)·a + a)/2. The energy balance of a turning body follows from this identity.
+//!
+//! Equations: docs/theory.md (C9), (C10), (C11), (C12).
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 

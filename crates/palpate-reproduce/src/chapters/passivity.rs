@@ -7,6 +7,8 @@
 //! ```
 //!
 //! Where Re Y is negative the discrete port generates energy; its least value is given as a share of the largest.
+//!
+//! Equations: docs/theory.md (C54).
 
 use crate::chapter::{Chapter, csv};
 use crate::chart::{Axis, AxisName, Chart, ReferenceLine, Scale, Series, Style};

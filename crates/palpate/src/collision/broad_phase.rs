@@ -2,6 +2,8 @@
 //!
 //! Bounding spheres first, then a separating plane across the line between the centres: with upper bounds e_a and e_b of the
 //! objects' support functions along it, they are apart when e_a + e_b is less than the distance of the centres.
+//!
+//! Equations: docs/theory.md (C19).
 
 use super::context::CollisionContext;
 use super::deformed_surface::{DeformedSurface, SurfaceTime};

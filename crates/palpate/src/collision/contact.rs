@@ -1,4 +1,6 @@
 //! Contacts: their identity from step to step, their law, and the two sides.
+//!
+//! Equations: docs/theory.md (C31), (C32), (C34).
 
 use crate::surface::SurfacePoint;
 use glam::DVec3;

@@ -1,4 +1,6 @@
 //! Contact cache: candidates matched with the contacts of the last step, which keep their points and warm-start forces.
+//!
+//! Equations: docs/theory.md (C39).
 
 use super::candidate::{CandidateList, CandidateSide, ContactCandidate};
 use super::contact::{Contact, ContactLaw, OtherSide};

@@ -4,6 +4,8 @@
 //! ```text
 //! xᵢ = Xᵢ + Φᵢ·q + uᵢ        uᵢ = Σ_c S_ic·f_c        residual displacement of the forces f of the last step
 //! ```
+//!
+//! Equations: docs/theory.md (C19).
 
 use super::node_cache::NodePositionCache;
 use crate::response::{

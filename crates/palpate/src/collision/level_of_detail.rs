@@ -1,6 +1,8 @@
 //! Level of detail of an object against one collider: all surface nodes, or ever fewer contact samples.
 //!
 //! A level is coarsened as soon as too many samples come near, and refined with hysteresis.
+//!
+//! Equations: docs/theory.md (C30).
 
 /// An object is refined after `REFINE_AFTER_STEPS` [steps] with less than `1 / REFINE_BELOW` of the allowed samples near.
 const REFINE_BELOW: usize = 6;

@@ -1,4 +1,6 @@
 //! Proximity queries against the deformed surface of an object: nearest triangles, and local minima of the distance.
+//!
+//! Equations: docs/theory.md (C21).
 
 use super::deformed_surface::{DeformedSurface, TriangleProjection};
 use crate::response::Body;

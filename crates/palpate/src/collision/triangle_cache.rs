@@ -2,6 +2,8 @@
 //!
 //! A list built with reach r + skin holds all triangles within r while point and surface together have moved less than the
 //! skin since. The next list is built before that, a part of the traversal in each step.
+//!
+//! Equations: docs/theory.md (C20).
 
 use super::deformed_surface::{DeformedSurface, TriangleProjection};
 use super::proximity::{MAX_TRIANGLES, ProximityQuery, collect_within, keep_local_minima, sort_by_distance};

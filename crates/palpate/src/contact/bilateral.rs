@@ -4,6 +4,8 @@
 //! force, from modes, residual and rigid motion. ρ [m] is the position of the hand minus the free
 //! position of the point. A row that depends linearly on those before it (two hands on one point)
 //! is left out: its force is zero.
+//!
+//! Equations: docs/theory.md (C35).
 
 use super::problem::larger;
 use alloc::vec;

@@ -9,6 +9,8 @@
 //! ```
 //!
 //! The slip is that over the whole step, so the dissipation of friction, f_t·r_t [J], is never negative.
+//!
+//! Equations: docs/theory.md (C36), (C37), (C40).
 
 use glam::{DMat3, DVec2, DVec3};
 

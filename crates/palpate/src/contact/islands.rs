@@ -1,4 +1,6 @@
 //! Islands: objects that contacts connect, with their contacts. Each is solved by itself.
+//!
+//! Equations: docs/theory.md (C41), (C43).
 
 use crate::collision::{Contact, OtherSide};
 use crate::device::DeviceState;

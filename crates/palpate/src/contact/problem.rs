@@ -6,6 +6,8 @@
 //!
 //! W [m/N], the Delassus operator, is not formed: every object keeps its compliance between its contact points, and its
 //! linearised rigid motion.
+//!
+//! Equations: docs/theory.md (C31), (C32), (C34), (C44), (C45), (C46).
 
 use super::constraint::Constraint;
 use super::coulomb::{solve_contact, tangents};

@@ -9,6 +9,8 @@
 //! Projected block Gauss-Seidel: a sweep solves each contact's law with the other forces as they are (see `coulomb`); the
 //! held points of an island are one block, solved by Cholesky factors. Between sweeps everything is evaluated exactly with
 //! the rotation that the forces cause, so that in the end the equations of motion are met, not their linearisation.
+//!
+//! Equations: docs/theory.md (C41), (C42), (C43).
 
 use super::bilateral::BilateralSystem;
 use super::islands::Islands;

@@ -3,6 +3,8 @@
 //! ```text
 //! Δx = m⁻¹·c·h²·Δf        Δθ = I⁻¹·c·h²·(a × Δf)        c = ½ (zero-order hold) or 1 (the paper's update)
 //! ```
+//!
+//! Equations: docs/theory.md (C13), (C33).
 
 use glam::{DMat3, DVec3};
 

@@ -15,6 +15,8 @@
 //! and, without torque, the kinetic energy exactly, and changes the energy by exactly τ·h·ω̄
 //! (Simo & Wong 1991, Int. J. Numer. Meth. Eng. 31, 19). The orientation is second order.
 //! The paper accumulates a vector θ; turning by h·θ̇⁺ each step equals it for small angles.
+//!
+//! Equations: docs/theory.md (C9), (C10), (C11), (C12).
 
 mod increment;
 

@@ -1,4 +1,6 @@
 //! Elastic body in contact: its recording, contact patches and samples, and the sphere tree over its surface.
+//!
+//! Equations: docs/theory.md (C27), (C28), (C29).
 
 use super::dot_products::{dot3, dot3_single};
 use super::patch_field::{FactoredForce, ModalDistances, PatchField, SampleSurface, residual_size};

@@ -2,6 +2,8 @@
 //!
 //! C [m/N] in body axes, R_cc[0] of equation (9), depends on the locations of the points, not on time: a block is computed
 //! when a point gets its location.
+//!
+//! Equations: docs/theory.md (C31), (C32), (C34).
 
 use super::{ContactLocation, Footprint, LocationState, ResponseView, dot};
 use alloc::vec;

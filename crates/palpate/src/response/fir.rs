@@ -9,6 +9,8 @@
 //! surface. In the table, successive samples of one number lie far apart (all observed degrees of freedom lie between).
 //! The series R[0], R[1], … between a point in contact and a loaded point is therefore copied into one block when the two
 //! first meet, weighted with their corners. Without room for a copy the table itself is read: equal numbers, more slowly.
+//!
+//! Equations: docs/theory.md (C8).
 
 use super::ContactPoint;
 use super::force_history::ForceHistory;

@@ -2,6 +2,8 @@
 //!
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (`oscillator`). The residual compliance S [m/N] is the
 //! static compliance of the modes that are not kept: a massless spring within the step.
+//!
+//! Equations: docs/theory.md (C3), (C7).
 
 use super::ContactPoint;
 use super::dot_products::{dot, dot3, dot9, dots};

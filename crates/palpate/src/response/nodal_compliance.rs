@@ -2,6 +2,8 @@
 //!
 //! A face that lands on the floor brings all its nodes into contact at once. Their R_cc[0] of equation (9) is computed with
 //! the model, up to a number of nodes, and looked up in a step.
+//!
+//! Equations: docs/theory.md (C7).
 
 use super::dot_products::dot9;
 use super::modal::SampledModes;

@@ -11,6 +11,8 @@
 //! formula with cos/sin, cosh/sinh or their common limit. With D = E − AᵀEA, the loss of
 //! ½v² + ½ω²(q − p/ω²)² over the step, the energy taken by damping is a quadratic form
 //! of the state, never negative.
+//!
+//! Equations: docs/theory.md (C5), (C6).
 
 /// State of one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -8,6 +8,8 @@
 //! w are the weights of the patch about node c; G [1/√kg] and A [√(m/N)] are interpolated between nodes. D [m/N] is exact at
 //! the nodes. The kernel K [m/N] extends it to pairs of patches by Wendland's function ψ, whose range L [m] is fitted to S.
 //! K is positive semi-definite for any set of patches (Schur's product theorem), and its cost does not depend on the mesh.
+//!
+//! Equations: docs/theory.md (C27), (C28), (C29).
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
 use crate::surface::{

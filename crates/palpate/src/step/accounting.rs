@@ -1,4 +1,6 @@
 //! Energy accounting of a step: contacts and virtual couplings.
+//!
+//! Equations: docs/theory.md (C47), (C48), (C50), (C51), (C52), (C53).
 
 use crate::collision::{Contact, OtherSide};
 use crate::contact::Constraint;

@@ -18,6 +18,8 @@
 //! The work that a contact dissipates over a step is f·Δapart, in the normal direction −λ·(gap⁺ − gap). With
 //! gap⁺ ≥ min(0, gap) and Coulomb's law for the slip of the whole step it is never negative: contacts are passive, whatever
 //! the shape, the normal and the location that were chosen for the step.
+//!
+//! Equations: docs/theory.md (C38), (C44), (C45), (C46), (C49).
 
 mod accounting;
 mod output;

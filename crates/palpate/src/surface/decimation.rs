@@ -2,6 +2,8 @@
 //!
 //! The other nodes are merged into a neighbour, one after the other: the one for which the surrounding triangles best keep
 //! their directions and shapes. A closed surface stays closed, and sharp edges with samples are preserved.
+//!
+//! Equations: docs/theory.md (C30).
 
 use super::{Surface, area_normal, triangles_around};
 use alloc::vec;

@@ -8,6 +8,8 @@
 //!
 //! with the patch radius a [m] and the shape functions Nᵢ of the finite elements, over the part of the surface that is connected
 //! with c. Displacement is averaged and force distributed with the same weights. As a → 0 the patch becomes the node.
+//!
+//! Equations: docs/theory.md (C26).
 
 use super::quadratic_face::QuadraticFaces;
 use super::{Surface, area_normal, at_weights};

@@ -1,4 +1,6 @@
 //! Poisson-disk subsampling of surface nodes: contact samples of an even spacing.
+//!
+//! Equations: docs/theory.md (C30).
 
 use super::patch_weights::area_vector;
 use super::{Surface, triangles_around};

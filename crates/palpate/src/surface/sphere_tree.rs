@@ -11,6 +11,8 @@
 //! needs one precomputed number per energy. This replaces the bounds on |q| of James & Pai's bounded
 //! deformation tree (2004, ACM Trans. Graph. 23, 393). Modes are grouped in bands, each twice as wide as the one before,
 //! with an energy of its own: low modes carry most of the energy, high modes most of the difference between neighbours.
+//!
+//! Equations: docs/theory.md (C14), (C15), (C16).
 
 use super::Surface;
 use alloc::vec;

@@ -1,4 +1,6 @@
 //! Triangles: nearest points, normals and barycentric interpolation.
+//!
+//! Equations: docs/theory.md (C21).
 
 use glam::DVec3;
 

@@ -3,6 +3,8 @@
 //! A surface node or contact sample that comes near becomes a contact with the tangent plane of the obstacle at its nearest
 //! point, which moves with the obstacle. Round obstacles also meet the interior of triangles, and the corners of others
 //! meet the surface between the nodes.
+//!
+//! Equations: docs/theory.md (C17), (C18), (C24).
 
 use super::ON_EDGE;
 use super::point_surface::{MARGIN, MovingPoint, point_against_surface};

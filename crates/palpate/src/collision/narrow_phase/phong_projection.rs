@@ -9,6 +9,8 @@
 //!
 //! (Kobbelt et al. 1998, Proc. SIGGRAPH, 105): it moves continuously with p. A nodal normal is the mean over the triangles
 //! on its side of a crease; over a crease the tip rolls about the edge.
+//!
+//! Equations: docs/theory.md (C22).
 
 use crate::collision::deformed_surface::{DeformedSurface, TriangleProjection};
 use crate::surface::{area_normal, at_weights};

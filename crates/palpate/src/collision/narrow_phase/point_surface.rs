@@ -1,4 +1,6 @@
 //! Point against surface: a node of another object, or a corner of an obstacle, against a deformed surface.
+//!
+//! Equations: docs/theory.md (C25).
 
 use crate::collision::deformed_surface::DeformedSurface;
 use crate::collision::proximity::ProximityQuery;

@@ -3,6 +3,8 @@
 //! Where a surface comes within reach of the proxy in a step, the nearest point of each face becomes a contact, and the solver
 //! keeps the ball outside (god-object of Zilles & Salisbury 1995). A contact stays at its material point while it sticks; when
 //! it slips or rolls it follows the point nearest to the proxy. Fast tips are swept by conservative advancement.
+//!
+//! Equations: docs/theory.md (C23).
 
 use super::phong_projection::phong_project;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
