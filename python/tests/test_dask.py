@@ -1,10 +1,10 @@
 """Stores that several processes wrote together, as `examples/record_on_*` do: the bytes are those of one process."""
 
-import contextlib
 import os
 import signal
 import subprocess
 import sys
+import time
 
 import psutil
 import pytest
@@ -22,36 +22,52 @@ def undisturbed(tmp_path_factory):
     return hashes(place)
 
 
+# A palpate that halts at the start of parts 4 and 7, the first time that each is begun.
+HALTING = """#!/bin/sh
+case "$*" in
+*"--shard 4/12"*) part=4 ;;
+*"--shard 7/12"*) part=7 ;;
+*) part= ;;
+esac
+if [ -n "$part" ] && mkdir "{place}/begun-$part" 2>/dev/null; then
+    echo $$ >"{place}/writing-$part" && mv "{place}/writing-$part" "{place}/halted-$part"
+    kill -STOP $$
+fi
+exec "{palpate}" "$@"
+"""
+
+
 def on_dask(*command, parts=12):
     """The example with a cluster of two workers, its text as it comes."""
     words = [sys.executable, EXAMPLES / "record_on_dask.py", "--workers", 2, "--parts", parts, "--", *command]
     return subprocess.Popen([str(w) for w in words], stderr=subprocess.PIPE, text=True)
 
 
-def a_worker_at_work(script):
-    """A worker process and the palpate that it waits for, halted so that it does not end just now."""
-    for _ in range(1000):
-        for process in psutil.Process(script.pid).children(recursive=True):
-            with contextlib.suppress(psutil.NoSuchProcess):
-                if process.name() == "palpate" and process.status() != psutil.STATUS_ZOMBIE:
-                    process.suspend()
-                    return process.parent(), process
-    raise AssertionError("no worker was at work")
+def halted(place, part):
+    """The process of a part, once it has halted."""
+    file = place / f"halted-{part}"
+    for _ in range(6000):
+        if file.exists() and (process := psutil.Process(int(file.read_text()))).status() == psutil.STATUS_STOPPED:
+            return process
+        time.sleep(0.01)
+    raise AssertionError(f"part {part} did not begin within a minute")
 
 
 def test_two_workers_of_which_some_are_killed_write_the_bytes_of_one_process(tmp_path, undisturbed):
-    place = tmp_path / "cube.zarr"
-    text, killed = "", []
-    with on_dask(palpate(), "record", *BODY, *OPTIONS, "--dense", place) as script:
-        for line in script.stderr:
-            text += line
-            if line.startswith(("3 of 12 parts", "6 of 12 parts")):
-                worker, at_work = a_worker_at_work(script)
-                worker.send_signal(signal.SIGKILL)
-                killed.append(worker)
-                # First a worker whose palpate runs on, then a machine that is lost with all that ran on it.
-                at_work.send_signal(signal.SIGCONT if line.startswith("3") else signal.SIGKILL)
-                psutil.wait_procs([worker, at_work], timeout=20)
+    place, halting = tmp_path / "cube.zarr", tmp_path / "palpate"
+    halting.write_text(HALTING.format(place=tmp_path, palpate=palpate()))
+    halting.chmod(0o755)
+    killed = []
+    with on_dask(halting, "record", *BODY, *OPTIONS, "--dense", place) as script:
+        # First a worker whose palpate runs on, then a machine that is lost with all that ran on it.
+        for part, end in (4, signal.SIGCONT), (7, signal.SIGKILL):
+            at_work = halted(tmp_path, part)
+            worker = at_work.parent()
+            worker.send_signal(signal.SIGKILL)
+            at_work.send_signal(end)
+            psutil.wait_procs([worker, at_work], timeout=20)
+            killed.append(worker)
+        text = script.stderr.read()
     assert script.returncode == 0, text
     assert len(set(killed)) == 2 and not any(worker.is_running() for worker in killed)
     assert f"{place}: all 49 shards are there" in text

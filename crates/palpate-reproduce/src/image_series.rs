@@ -37,7 +37,7 @@ impl ImageRenderer {
     /// Draws with the browser that is named, or the first known one; without one nothing is drawn.
     ///
     /// # Errors
-    /// Where the browser that is named can't be started.
+    /// If the named browser can't be started.
     pub fn new(named: Option<&Path>) -> Result<Self, ReproduceError> {
         match find_browser(named) {
             Err(error) if named.is_some() => Err(error.into()),

@@ -318,17 +318,17 @@ impl<'a> DeformedSurface<'a> {
         self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), enter, found);
     }
 
-    /// Resume a traversal for so many spheres and triangles. Gives the number that was visited.
+    /// Resume a traversal for so many spheres and triangles.
     pub(crate) fn resume_traversal(
         &mut self,
         traversal: (&mut Traversal, usize),
         enter: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
         found: impl FnMut(&mut Self, u32, f64),
-    ) -> usize {
+    ) {
         let body = self.body;
         let bound = self.bound;
         let tree = body.tree(self.footprint);
-        tree.resume_traversal(traversal, (body.bounds(self.footprint), &bound), self, enter, found)
+        tree.resume_traversal(traversal, (body.bounds(self.footprint), &bound), self, enter, found);
     }
 }
 

@@ -114,15 +114,14 @@ impl ProximityQuery {
     }
 }
 
-/// Collect the triangles within a reach [m] of a body point, resuming a traversal for so many spheres and triangles. Gives
-/// the number that was visited.
+/// Collect the triangles within a reach [m] of a body point, resuming a traversal for so many spheres and triangles.
 pub(super) fn collect_within(
     surface: &mut DeformedSurface,
     traversal: (&mut Traversal, usize),
     p: DVec3,
     reach: f64,
     found: &mut Vec<TriangleProjection>,
-) -> usize {
+) {
     surface.resume_traversal(
         traversal,
         |_, _, centre, radius| (p - centre).length() - radius < reach,
@@ -132,7 +131,7 @@ pub(super) fn collect_within(
                 insert_bounded(found, one);
             }
         },
-    )
+    );
 }
 
 /// Insert a projection; a full list drops its farthest.

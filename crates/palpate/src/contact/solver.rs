@@ -129,7 +129,7 @@ impl Solver {
     }
 
     /// Start all objects of the island from their motion without contact force.
-    fn start(&mut self, problem: &mut ContactProblem) {
+    fn start(&self, problem: &mut ContactProblem) {
         for at in self.bodies.iter().map(|&at| at as usize) {
             problem.start(at);
         }

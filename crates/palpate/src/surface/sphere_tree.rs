@@ -334,8 +334,7 @@ impl SphereTree {
         self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), bounds, surface, near, found);
     }
 
-    /// Resume a traversal until `max_visits` spheres and triangles were visited, or up to a leaf's triangles more. Gives their
-    /// number.
+    /// Resume a traversal until `max_visits` spheres and triangles were visited, or up to a leaf's triangles more.
     ///
     /// # Real time
     pub(crate) fn resume_traversal<S: DeformingNodes>(
@@ -345,7 +344,7 @@ impl SphereTree {
         surface: &mut S,
         near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
         mut found: impl FnMut(&mut S, u32, f64),
-    ) -> usize {
+    ) {
         let Traversal { stack, depth } = traversal;
         if self.nodes.is_empty() {
             *depth = 0;
@@ -379,7 +378,6 @@ impl SphereTree {
                 *depth += 2;
             }
         }
-        visits
     }
 
     /// Whether a traversal enters a sphere.
