@@ -135,7 +135,7 @@ impl ObstacleMesh {
             (&self.bounds, &DeformationBound::STILL),
             &mut RigidNodes(&self.surface),
             |_, _, centre, radius| near(centre, radius),
-            |_, t, _| found(t, self.surface.triangles[t as usize].map(|n| position(n as usize))),
+            |_, t| found(t, self.surface.triangles[t as usize].map(|n| position(n as usize))),
         );
     }
 

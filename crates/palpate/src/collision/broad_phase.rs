@@ -7,7 +7,7 @@
 
 use super::context::CollisionContext;
 use super::deformed_surface::{DeformedSurface, SurfaceTime};
-use super::narrow_phase::{APPROACH_FACTOR, MARGIN};
+use super::parameters::COLLISION;
 use crate::response::Footprint;
 use glam::DVec3;
 
@@ -27,7 +27,7 @@ impl CollisionContext<'_> {
         };
         let objects = self.scene.objects;
         let edge = objects[a].body.edge.max(objects[b].body.edge);
-        let slack = MARGIN * edge + APPROACH_FACTOR * (motion(a) + motion(b));
+        let slack = COLLISION.margin * edge + COLLISION.motion_factor * (motion(a) + motion(b));
         let between = self.states[b].rigid.pose.position - self.states[a].rigid.pose.position;
         let Some(along) = between.try_normalize() else {
             return Some([HalfSpace { direction: DVec3::X, offset: f64::NEG_INFINITY }; 2]);

@@ -12,7 +12,7 @@ use crate::response::{
     AppliedForce, Body, ContactLocation, ContactPoints, Footprint, NodalForces, ResponseState,
 };
 use crate::surface::{
-    Centre, DeformationBound, DeformingNodes, Surface, Traversal, area_normal, at_weights, low_modes,
+    Centre, DeformationBound, DeformingNodes, Surface, Traversal, area_normal, at_weights,
     nearest_on_triangle,
 };
 use glam::DVec3;
@@ -60,8 +60,6 @@ pub(crate) struct DeformedSurface<'a> {
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
     own: OwnContacts,
     flat_radius: f64,
-    /// Whether bounds also hold at the end of the step without contact force.
-    covers_prediction: bool,
     cache: &'a mut NodePositionCache,
     bound: DeformationBound,
 }
@@ -106,7 +104,6 @@ impl<'a> DeformedSurface<'a> {
             nodal: state.nodal(),
             own: [None; MAX_TIP_CONTACTS],
             flat_radius: 0.0,
-            covers_prediction: false,
             cache,
             bound,
         }
@@ -169,7 +166,6 @@ impl<'a> DeformedSurface<'a> {
 
     /// Let bounds also hold at the end of the step without contact force.
     pub(crate) fn cover_prediction(&mut self) {
-        self.covers_prediction = true;
         let free = self.body.band_norms(self.free);
         self.bound.modal = core::array::from_fn(|band| self.bound.modal[band].max(free[band]));
     }
@@ -247,20 +243,6 @@ impl<'a> DeformedSurface<'a> {
         position
     }
 
-    /// Nodal position by the low modes [m].
-    pub(crate) fn low_mode_position(&self, node: usize) -> DVec3 {
-        self.low_modes_at(node, self.q, 0)
-    }
-
-    /// Nodal position by the low modes at the end of the step without contact force [m].
-    pub(crate) fn predicted_low_mode_position(&self, node: usize) -> DVec3 {
-        self.low_modes_at(node, self.free, 1)
-    }
-
-    fn low_modes_at(&self, node: usize, q: &[f64], moment: usize) -> DVec3 {
-        self.rest(node) + self.modal_displacement(node, &q[..low_modes(q.len())], moment)
-    }
-
     /// Corner positions of a triangle [m].
     pub(crate) fn corners(&mut self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.surface().triangles[triangle as usize].map(|n| n as usize);
@@ -285,7 +267,7 @@ impl<'a> DeformedSurface<'a> {
         let residual = self.max_residual();
         self.traverse(
             |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
-            |surface, triangle, _| {
+            |surface, triangle| {
                 for node in surface.surface().triangles[triangle as usize] {
                     let support = surface.modal_position(node as usize).dot(direction) + residual;
                     farthest.set(farthest.get().max(support));
@@ -303,7 +285,7 @@ impl<'a> DeformedSurface<'a> {
         let reached = core::cell::Cell::new(false);
         self.traverse(
             |_, _, centre, radius| !reached.get() && (p - centre).length() - radius < reach,
-            |_, _, _| reached.set(true),
+            |_, _| reached.set(true),
         );
         reached.get()
     }
@@ -313,7 +295,7 @@ impl<'a> DeformedSurface<'a> {
     pub(crate) fn traverse(
         &mut self,
         enter: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
-        found: impl FnMut(&mut Self, u32, f64),
+        found: impl FnMut(&mut Self, u32),
     ) {
         self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), enter, found);
     }
@@ -323,7 +305,7 @@ impl<'a> DeformedSurface<'a> {
         &mut self,
         traversal: (&mut Traversal, usize),
         enter: impl Fn(&mut Self, Centre, DVec3, f64) -> bool,
-        found: impl FnMut(&mut Self, u32, f64),
+        found: impl FnMut(&mut Self, u32),
     ) {
         let body = self.body;
         let bound = self.bound;
@@ -337,14 +319,6 @@ impl DeformingNodes for DeformedSurface<'_> {
         DeformedSurface::rest(self, node)
     }
 
-    fn low_mode_position(&self, node: usize) -> Option<DVec3> {
-        if self.cache.modal(node).is_some() {
-            return None;
-        }
-        let position = DeformedSurface::low_mode_position(self, node);
-        Some(if self.residual_is_smooth() { self.add_residual(node, position) } else { position })
-    }
-
     /// With residual displacement where it is smooth; elsewhere it counts for the sphere's radius.
     fn position(&mut self, node: usize) -> DVec3 {
         if self.residual_is_smooth() {
@@ -352,26 +326,5 @@ impl DeformingNodes for DeformedSurface<'_> {
         } else {
             self.modal_position(node)
         }
-    }
-
-    /// Only for points: patches are queried too rarely.
-    fn keeps_radii(&self) -> bool {
-        self.footprint == Footprint::Point && !self.covers_prediction
-    }
-
-    fn known_position(&self, node: usize) -> Option<DVec3> {
-        self.cache.modal(node)
-    }
-
-    fn corners_of(&self, triangle: u32) -> [usize; 3] {
-        self.surface().triangles[triangle as usize].map(|node| node as usize)
-    }
-
-    fn refitted_radius(&self, sphere: usize) -> Option<f64> {
-        if self.keeps_radii() { self.cache.sphere_radius(sphere) } else { None }
-    }
-
-    fn set_refitted_radius(&mut self, sphere: usize, radius: f64) {
-        self.cache.set_sphere_radius(sphere, radius);
     }
 }

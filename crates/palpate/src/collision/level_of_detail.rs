@@ -4,9 +4,7 @@
 //!
 //! Equations: docs/theory.md (C30).
 
-/// An object is refined after `REFINE_AFTER_STEPS` [steps] with less than `1 / REFINE_BELOW` of the allowed samples near.
-const REFINE_BELOW: usize = 6;
-const REFINE_AFTER_STEPS: u64 = 50;
+use super::parameters::COLLISION;
 
 /// Level of detail of an object against one obstacle or object.
 #[derive(Debug, Clone, Copy, Default)]
@@ -25,9 +23,9 @@ impl LevelOfDetail {
 
     /// Level for the next step, after one in which `found` samples of at most `max` were near.
     pub(super) fn after(self, found: usize, max: usize, step: u64) -> Self {
-        if found >= max / REFINE_BELOW {
+        if found as f64 >= COLLISION.refine_below * max as f64 {
             Self { since: step, ..self }
-        } else if self.level > 0 && step - self.since >= REFINE_AFTER_STEPS {
+        } else if self.level > 0 && step - self.since >= COLLISION.refine_after_steps {
             Self { level: self.level - 1, since: step }
         } else {
             self

@@ -12,6 +12,7 @@ mod deformed_surface;
 mod level_of_detail;
 mod narrow_phase;
 mod node_cache;
+mod parameters;
 mod proximity;
 mod triangle_cache;
 

@@ -45,8 +45,6 @@ pub(crate) struct NodePositionCache {
     excludes_own: bool,
     /// Step and footprint for which positions are kept; none within a step.
     key: Option<(u64, Footprint)>,
-    /// Refitted radii of the tree's spheres, about the modal positions of their centres [m].
-    sphere_radii: Stamped<f64>,
     /// Modal coordinates in single precision, now and at the end of the step without contact force, for patches.
     single: [Vec<f32>; 2],
     /// Nodes that the present traversal has reached.
@@ -64,7 +62,6 @@ impl NodePositionCache {
             total: positions(),
             excludes_own: false,
             key: None,
-            sphere_radii: Stamped::new(0.0, body.tree(Footprint::Point).spheres()),
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
             marks: vec![0; nodes],
             mark: 0,
@@ -77,7 +74,6 @@ impl NodePositionCache {
         let same = key.is_some() && self.key == key;
         if !same {
             [&mut self.modal, &mut self.predicted].into_iter().for_each(Stamped::clear);
-            self.sphere_radii.clear();
             self.key = key;
         }
         if !same || self.excludes_own {
@@ -137,14 +133,6 @@ impl NodePositionCache {
 
     pub(super) fn set_total(&mut self, node: usize, position: DVec3) {
         self.total.set(node, position);
-    }
-
-    pub(super) fn sphere_radius(&self, sphere: usize) -> Option<f64> {
-        self.sphere_radii.get(sphere)
-    }
-
-    pub(super) fn set_sphere_radius(&mut self, sphere: usize, radius: f64) {
-        self.sphere_radii.set(sphere, radius);
     }
 
     /// Begin a traversal: no node is marked.

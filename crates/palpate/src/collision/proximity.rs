@@ -3,6 +3,7 @@
 //! Equations: docs/theory.md (C21).
 
 use super::deformed_surface::{DeformedSurface, TriangleProjection};
+use super::parameters::{COLLISION, ROUND_OFF};
 use crate::response::Body;
 use crate::surface::Traversal;
 use alloc::vec::Vec;
@@ -11,14 +12,10 @@ use glam::DVec3;
 /// Upper limit of triangles that a query keeps; of more, the nearest count.
 pub(super) const MAX_TRIANGLES: usize = 1024;
 
-/// Points closer together than this [m] are one.
-const COINCIDENT: f64 = 1e-9;
-
-/// Factor beyond which one distance exceeds another whatever was rounded.
-const ROUNDING: f64 = 1.0 + 1e-9;
-
-/// Local minima whose normals have a larger cosine than this (within 32°) lie on one face of a facetted surface.
-pub(super) const SAME_FACE: f64 = 0.85;
+/// Distance below which two points are one [m].
+fn coincidence(body: &Body) -> f64 {
+    ROUND_OFF * body.edge
+}
 
 /// Result buffer of a query.
 #[derive(Debug, Clone)]
@@ -55,24 +52,25 @@ impl ProximityQuery {
         reach: f64,
         known: Option<u32>,
     ) {
+        let coincident = coincidence(surface.body);
         let found = &mut self.found;
         found.clear();
         let counts = |one: &TriangleProjection| one.normal.dot(facing) <= 0.0;
         let first = known.map(|triangle| surface.project_on_triangle(triangle, p)).filter(counts);
-        let first = first.map_or(f64::INFINITY, |one| one.distance + COINCIDENT);
+        let first = first.map_or(f64::INFINITY, |one| one.distance + coincident);
         let least = core::cell::Cell::new(reach.min(first));
         surface.traverse(
             |_, _, centre, radius| (p - centre).length() - radius < least.get(),
-            |surface, triangle, _| {
+            |surface, triangle| {
                 // Most triangles are farther by their bounding box.
                 let [a, b, c] = surface.corners(triangle);
                 let in_box = p.clamp(a.min(b).min(c), a.max(b).max(c));
-                if (p - in_box).length() > least.get() * ROUNDING {
+                if (p - in_box).length() > least.get() * (1.0 + ROUND_OFF) {
                     return;
                 }
                 let one = surface.project_on_triangle(triangle, p);
                 if one.distance < least.get() && counts(&one) {
-                    least.set(least.get().min(one.distance + COINCIDENT));
+                    least.set(least.get().min(one.distance + coincident));
                     found.retain(|other| other.distance < least.get());
                     if found.len() < MAX_TRIANGLES {
                         found.push(one);
@@ -91,7 +89,7 @@ impl ProximityQuery {
         let least = || best.get().map_or(reach, |found| found.distance.min(reach));
         surface.traverse(
             |_, _, centre, radius| (p - centre).length() - radius < least(),
-            |surface, triangle, _| {
+            |surface, triangle| {
                 let one = surface.project_on_triangle(triangle, p);
                 if one.distance < least() {
                     best.set(Some(one));
@@ -102,9 +100,9 @@ impl ProximityQuery {
     }
 
     /// Whether a point is inside, by the sum of the normals of the nearest triangles that were found.
-    pub(crate) fn is_inside(&self, p: DVec3) -> bool {
+    pub(crate) fn is_inside(&self, body: &Body, p: DVec3) -> bool {
         let Some(nearest) = self.found.first() else { return false };
-        let same = self.found.iter().filter(|f| (f.position - nearest.position).length() < COINCIDENT);
+        let same = self.found.iter().filter(|f| (f.position - nearest.position).length() < coincidence(body));
         same.map(|f| f.normal).sum::<DVec3>().dot(p - nearest.position) < 0.0
     }
 
@@ -125,7 +123,7 @@ pub(super) fn collect_within(
     surface.resume_traversal(
         traversal,
         |_, _, centre, radius| (p - centre).length() - radius < reach,
-        |surface, triangle, _| {
+        |surface, triangle| {
             let one = surface.project_on_triangle(triangle, p);
             if one.distance < reach {
                 insert_bounded(found, one);
@@ -161,12 +159,13 @@ pub(super) fn keep_local_minima(found: &mut Vec<TriangleProjection>, body: &Body
             break;
         }
         let one = found[at];
-        if found[..kept].iter().any(|other| one.normal.dot(other.normal) > SAME_FACE) {
+        if found[..kept].iter().any(|other| one.normal.dot(other.normal) > COLLISION.crease_cosine) {
             continue;
         }
         // The corner, edge or face that holds the nearest point.
         let corners = triangles[one.triangle as usize];
-        let feature = || corners.iter().zip(one.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| node);
+        let feature =
+            || corners.iter().zip(one.weights).filter(|(_, w)| *w > ROUND_OFF).map(|(node, _)| node);
         let holds = |other: &TriangleProjection| {
             feature().all(|node| triangles[other.triangle as usize].contains(node))
         };
@@ -233,7 +232,7 @@ mod tests {
             }
             found += query.found.len();
 
-            // Refitted spheres of earlier queries lose nothing.
+            // Nor by other queries at the same moment.
             for other in 0..4 {
                 let p = DVec3::new(angle(1.3), angle(1.6), angle(1.9)) * (0.03 * f64::from(other + 1));
                 let least = (0..recording.surface.triangles.len() as u32)

@@ -6,6 +6,7 @@
 //! Equations: docs/theory.md (C20).
 
 use super::deformed_surface::{DeformedSurface, TriangleProjection};
+use super::parameters::{COLLISION, MAX_ITERATIONS, ROUND_OFF};
 use super::proximity::{MAX_TRIANGLES, ProximityQuery, collect_within, keep_local_minima, sort_by_distance};
 use crate::response::Body;
 use crate::surface::Traversal;
@@ -13,21 +14,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Skin as a share of the mean edge, and of the reach. Where only seeds are kept the skin is thin, since another face may
-/// come up before long.
-const SKIN_EDGE: f64 = 0.8;
-const SKIN_EDGE_SEEDED: f64 = 0.15;
-const SKIN_REACH: f64 = 0.25;
-
-/// A rebuild begins when this share of the skin is left, and visits so many spheres and triangles per step.
-const REBUILD_AT: f64 = 0.5;
-const VISITS_PER_STEP: usize = 96;
-
-/// Of more triangles than this only seeds are kept: the local minima of the distance, so many at most, from which a descent
-/// of so many steps leads to the present minimum.
-const SEED_ABOVE: usize = 48;
+/// Room for seeds.
 const MAX_SEEDS: usize = 8;
-const MAX_DESCENT_STEPS: usize = 64;
 
 /// Verlet list of the triangles around a point.
 #[derive(Debug, Clone)]
@@ -72,6 +60,8 @@ pub(crate) struct TriangleCache {
     next: TriangleList,
     found: Vec<TriangleProjection>,
     traversal: Traversal,
+    /// Spheres and triangles that the last rebuild visited.
+    last_visits: usize,
     seed_above: usize,
 }
 
@@ -82,7 +72,8 @@ impl TriangleCache {
             next: TriangleList::new(modes),
             found: Vec::with_capacity(MAX_TRIANGLES),
             traversal: Traversal::FINISHED,
-            seed_above: SEED_ABOVE,
+            last_visits: 0,
+            seed_above: COLLISION.seed_above,
         }
     }
 
@@ -107,7 +98,7 @@ impl TriangleCache {
             query.found.clone_from(&self.found);
             return;
         }
-        if self.traversal.is_finished() && left < REBUILD_AT * skin {
+        if self.traversal.is_finished() && left < COLLISION.rebuild_at * skin {
             self.begin_rebuild(surface, p, reach);
         }
         let found = &mut query.found;
@@ -133,7 +124,7 @@ impl TriangleCache {
     /// # Real time
     /// Costs a part of a rebuild.
     pub(crate) fn continue_rebuild(&mut self, surface: &mut DeformedSurface) {
-        self.resume_rebuild(surface, VISITS_PER_STEP);
+        self.resume_rebuild(surface, self.last_visits.div_ceil(COLLISION.rebuild_steps));
     }
 
     /// Return the coordinates; a finished list becomes the current one.
@@ -145,11 +136,10 @@ impl TriangleCache {
     }
 
     fn begin_rebuild(&mut self, surface: &DeformedSurface, p: DVec3, reach: f64) {
-        let skin = if self.current.seeds.is_empty() { SKIN_EDGE } else { SKIN_EDGE_SEEDED };
         let next = &mut self.next;
         next.q[..surface.q.len()].copy_from_slice(surface.q);
         (next.point, next.residual) = (p, [surface.max_residual(); 2]);
-        next.reach = reach + skin * surface.body.edge + SKIN_REACH * reach;
+        next.reach = reach + COLLISION.skin * (surface.body.edge + reach);
         self.traversal = Traversal::START;
         self.found.clear();
     }
@@ -164,6 +154,7 @@ impl TriangleCache {
 
     /// Make the next list the current one.
     fn finish_rebuild(&mut self, body: &Body) {
+        self.last_visits = self.traversal.visits;
         let Self { current, next, found, .. } = self;
         sort_by_distance(found);
         next.triangles.clear();
@@ -185,9 +176,9 @@ impl TriangleCache {
 fn descend(surface: &mut DeformedSurface, triangle: u32, p: DVec3) -> TriangleProjection {
     let mut best = surface.project_on_triangle(triangle, p);
     let body = surface.body;
-    for _ in 0..MAX_DESCENT_STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let corners = body.recording.surface.triangles[best.triangle as usize];
-        let mut on = corners.iter().zip(best.weights).filter(|(_, w)| *w > 1e-9).map(|(node, _)| *node);
+        let mut on = corners.iter().zip(best.weights).filter(|(_, w)| *w > ROUND_OFF).map(|(node, _)| *node);
         let before = best;
         let mut look = |surface: &mut DeformedSurface, triangle: u32| {
             let one = surface.project_on_triangle(triangle, p);
@@ -313,7 +304,8 @@ mod tests {
     #[test]
     fn slow_motion_never_rebuilds_at_once() {
         for speed in [1e-4, 3e-4] {
-            let [.., at_once, in_parts] = follow(|body| body.footprint_at_level(0), SEED_ABOVE, speed);
+            let [.., at_once, in_parts] =
+                follow(|body| body.footprint_at_level(0), COLLISION.seed_above, speed);
             // The first build of each case.
             assert_eq!(at_once, 40, "{speed}");
             assert!(in_parts >= 40, "{speed}: {in_parts}");

@@ -12,13 +12,11 @@
 //!
 //! Equations: docs/theory.md (C36), (C37), (C40).
 
+use super::parameters::SOLVER;
 use glam::{DMat3, DVec2, DVec3};
 
 /// Upper limit of iterations for the direction of slip; Newton's method converges quadratically near the solution.
 const MAX_ITERATIONS: usize = 30;
-
-/// Upper limit of a Newton step [rad]; beyond it a fixed-point step is taken.
-const MAX_NEWTON_TURN: f64 = 0.3;
 
 /// Turn [rad] whose square is round-off.
 const SMALL_TURN: f64 = 3e-8;
@@ -50,7 +48,7 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
     let slipping = |direction: DVec2| {
         let denominator = W.x_axis.x + friction * coupling.dot(direction);
         // Below this denominator the contact jams; the remainder shows as residual.
-        let lambda = b.x / denominator.max(0.05 * W.x_axis.x);
+        let lambda = b.x / denominator.max(SOLVER.jam * W.x_axis.x);
         let tangent = direction * (friction * lambda);
         (DVec3::new(lambda, tangent.x, tangent.y), denominator)
     };
@@ -66,7 +64,7 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         let turns = *W * DVec3::new(lambda_turns, tangent_turns.x, tangent_turns.y);
         let slip_turns = -DVec2::new(turns.y, turns.z);
         let turn = -direction.perp_dot(slip) / (aside.perp_dot(slip) + direction.perp_dot(slip_turns));
-        let newton = direction.dot(slip) > 0.0 && turn.abs() < MAX_NEWTON_TURN;
+        let newton = direction.dot(slip) > 0.0 && turn.abs() < SOLVER.max_newton_turn;
         let next = if newton {
             (direction + aside * turn).normalize()
         } else {

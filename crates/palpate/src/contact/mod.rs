@@ -4,9 +4,11 @@ mod bilateral;
 mod constraint;
 mod coulomb;
 mod islands;
+mod parameters;
 mod problem;
 mod solver;
 
 pub(crate) use constraint::Constraint;
+pub(crate) use parameters::{SOLVER, UNSOLVED};
 pub(crate) use problem::{ContactProblem, StepRules};
 pub(crate) use solver::{Solver, SolverReport};

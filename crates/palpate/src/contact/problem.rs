@@ -11,17 +11,12 @@
 
 use super::constraint::Constraint;
 use super::coulomb::{solve_contact, tangents};
+use super::parameters::ROUND_OFF;
 use crate::collision::{Contact, ContactLaw, OtherSide};
 use crate::device::DeviceState;
 use crate::motion::{RigidIncrement, RigidIntegrator, RigidStep};
 use crate::object::{Object, ObjectState};
 use glam::{DMat3, DVec3};
-
-/// Round-off of a length, as a share of (distance from the origin + size): a few roundings of x + R·(r + u).
-pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
-
-/// Friction beyond the cone by less than this share is round-off.
-const CONE_TOLERANCE: f64 = 1e-12;
 
 /// Rules of a step that the problem depends on.
 #[derive(Debug, Clone, Copy)]
@@ -174,7 +169,7 @@ impl ContactProblem<'_> {
                 continue;
             }
             let (tangential, limit) = (contact.force + contact.normal * normal, friction * normal);
-            if tangential.length() > limit * (1.0 + CONE_TOLERANCE) {
+            if tangential.length() > limit * (1.0 + ROUND_OFF) {
                 self.add_force(at, tangential * (limit / tangential.length() - 1.0));
             }
         }

@@ -14,55 +14,11 @@
 
 use super::bilateral::BilateralSystem;
 use super::islands::Islands;
-use super::problem::{ContactProblem, ROUND_OFF, larger};
+use super::parameters::{ROUND_OFF, SOLVER, UNSOLVED};
+use super::problem::{ContactProblem, larger};
 use crate::collision::{ContactLaw, OtherSide};
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
-
-/// Upper limit of exact evaluations: each reduces the residual of the rotation by a factor of about h·|ω| + strain.
-const MAX_ITERATIONS: u32 = 40;
-
-/// Upper limit of evaluations that end a step, from where contacts are loose.
-const MAX_FINAL_EVALUATIONS: u32 = 6;
-
-/// Upper limit of sweeps over all evaluations together.
-const MAX_SWEEPS: u32 = 120;
-
-/// Residual of held points, as a multiple of round-off: the goal; and beyond which they count as unsolved, as a share of the
-/// reach.
-const HELD_ROUNDINGS: f64 = 8.0;
-const UNSOLVED: f64 = 1e-9;
-
-/// Tolerances of a contact's residual, as shares of the object's size: the goal for islands of up to [`FEW`] contacts, whose
-/// friction sticks without creep, and for larger ones; what is accepted beyond the budget of contact visits; and what is used,
-/// and reported as unsolved, at the limit of sweeps.
-const EXACT: f64 = 1e-12;
-const TOLERANCE: f64 = 1e-8;
-const LOOSE: f64 = 1e-5;
-const ROUGH: f64 = 1e-4;
-
-/// Upper limit of contacts of a small island.
-const FEW: usize = 24;
-
-/// Contact visits that the goal is worth: contact samples, which stand for many nodes, are no more exact than [`LOOSE`].
-const VISITS: u32 = 600;
-const VISITS_WITH_SAMPLES: u32 = 60;
-
-/// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at.
-const SKIP: f64 = 0.1;
-
-/// Change of force that is not propagated, by the displacement of its own point, as a share of the object's size.
-const MIN_DISPLACEMENT: f64 = 3e-10;
-
-/// Rotation within an evaluation [rad] from which contacts are linearised again.
-const RELINEARISE: f64 = 0.01;
-
-/// Scaled fallback: forces after so many sweeps, scaled to rotate a body by at most this [rad] and deform it by this share of
-/// its radius; so many scales are tried, with so many evaluations each.
-const FALLBACK_CHANGE: f64 = 0.3;
-const FALLBACK_SWEEPS: u32 = 20;
-const FALLBACK_SCALES: u32 = 4;
-const FALLBACK_EVALUATIONS: u32 = 20;
 
 /// Result of a solve, over all islands.
 #[derive(Debug, Clone, Copy, Default)]
@@ -80,7 +36,7 @@ pub(crate) struct SolverReport {
 /// Solver with its buffers, made once.
 #[derive(Debug, Clone)]
 pub(crate) struct Solver {
-    /// Contact visits after which the tolerance is [`LOOSE`].
+    /// Contact visits after which the loose tolerance is enough.
     visits_until_loose: u32,
     islands: Islands,
     system: BilateralSystem,
@@ -94,7 +50,7 @@ impl Solver {
     /// Solver for so many objects, devices and contacts; `uses_samples` says whether contact samples stand for nodes.
     pub(crate) fn new(objects: usize, devices: usize, contacts: usize, uses_samples: bool) -> Self {
         Self {
-            visits_until_loose: if uses_samples { VISITS_WITH_SAMPLES } else { VISITS },
+            visits_until_loose: if uses_samples { SOLVER.visits_with_samples } else { SOLVER.visits },
             islands: Islands::new(objects),
             system: BilateralSystem::new(devices),
             held: Vec::with_capacity(devices),
@@ -137,11 +93,12 @@ impl Solver {
 
     fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
-        let is_large = self.members.len() > FEW;
+        // Held points are solved exactly.
+        let least_change = if touches { SOLVER.skip * SOLVER.tolerance } else { 0.0 };
         let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
-            problem.states[at].points.least_move = if is_large { MIN_DISPLACEMENT * radius } else { 0.0 };
+            problem.states[at].points.least_move = least_change * radius;
             reach = reach.max(problem.states[at].reach(&problem.objects[at]));
             size = size.min(radius);
         }
@@ -160,31 +117,32 @@ impl Solver {
         let count = self.members.len() as u32;
         let (is_solved, last_residual) = loop {
             let rotation = self.evaluate(problem);
-            if rotation > RELINEARISE * size {
+            if rotation > SOLVER.relinearise * size {
                 self.linearise(problem);
             }
             iterations += 1;
-            let residual = larger(rotation, self.sweep(problem, SKIP * self.tolerance(visits) * size));
+            let residual = larger(rotation, self.sweep(problem, SOLVER.skip * self.tolerance(visits) * size));
             visits += count;
             if iterations == 1 {
                 first_residual = residual;
             }
-            let tolerance = if touches { self.tolerance(visits) * size } else { HELD_ROUNDINGS * round_off };
-            let is_last = iterations == MAX_ITERATIONS || sweeps >= MAX_SWEEPS || !residual.is_finite();
+            let tolerance = if touches { self.tolerance(visits) * size } else { 8.0 * round_off };
+            let is_last =
+                iterations == SOLVER.max_evaluations || sweeps >= SOLVER.max_sweeps || !residual.is_finite();
             if residual <= tolerance || is_last {
                 report.iterations = report.iterations.max(iterations);
                 report.residual_m =
                     report.residual_m.max(if residual.is_finite() { residual } else { reach });
-                let allowed = if touches { ROUGH * size } else { UNSOLVED * reach };
+                let allowed = if touches { SOLVER.rough_tolerance * size } else { UNSOLVED * reach };
                 // Dependent held points can't be met where their devices differ, and need not be.
                 let is_solved = residual <= allowed || dependent > 0 && residual <= first_residual;
                 break (is_solved, residual);
             }
             // Held points alone are solved by one sweep.
-            let goal = round_off.max(0.02 * residual);
-            while touches && sweeps < MAX_SWEEPS {
+            let goal = round_off.max(SOLVER.sweep_goal * residual);
+            while touches && sweeps < SOLVER.max_sweeps {
                 sweeps += 1;
-                let moved = self.sweep(problem, SKIP * goal);
+                let moved = self.sweep(problem, SOLVER.skip * goal);
                 visits += count;
                 if moved <= goal.max(0.3 * self.tolerance(visits) * size) || !moved.is_finite() {
                     break;
@@ -200,14 +158,14 @@ impl Solver {
             }
         }
         // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
-        (0..MAX_FINAL_EVALUATIONS).any(|_| self.evaluate(problem) <= round_off);
+        (0..SOLVER.fallback_iterations).any(|_| self.evaluate(problem) <= round_off);
         for &object in &self.bodies {
             problem.finish(object as usize);
         }
         problem.write_ends(&self.members);
         // A rough solution is used, and reported as unsolved: by its residual, or by what the last sweep moved.
         let is_rough =
-            last_residual > LOOSE * size || problem.max_open_gap(&self.members) > 1.9 * LOOSE * size;
+            last_residual.max(0.5 * problem.max_open_gap(&self.members)) > SOLVER.loose_tolerance * size;
         report.unsolved_islands += u32::from(is_solved && touches && is_rough);
     }
 
@@ -217,33 +175,29 @@ impl Solver {
         problem.release_forces(&self.bodies, &self.members);
         self.start(problem);
         self.linearise(problem);
-        for _ in 0..FALLBACK_SWEEPS {
+        for _ in 0..SOLVER.fallback_iterations {
             let moved = self.sweep(problem, 0.0);
             if moved <= round_off {
                 break;
             }
         }
         let largest = self.bodies.iter().map(|&at| problem.change(at as usize)).fold(0.0, larger);
-        let mut share = (FALLBACK_CHANGE / largest).min(0.5);
-        for _ in 0..FALLBACK_SCALES {
+        let mut share = (SOLVER.fallback_change / largest).min(0.5);
+        for _ in 0..SOLVER.fallback_iterations {
             self.start(problem);
             problem.scale_forces(&self.members, share);
-            let is_met = (0..FALLBACK_EVALUATIONS).any(|_| self.evaluate(problem) <= round_off);
+            let is_met = (0..SOLVER.fallback_iterations).any(|_| self.evaluate(problem) <= round_off);
             if is_met && problem.write_ends(&self.members) >= 0.0 {
                 return true;
             }
-            share = 0.25;
+            share *= 0.5;
         }
         false
     }
 
     /// Tolerance after so many contact visits, as a share of the size.
     fn tolerance(&self, visits: u32) -> f64 {
-        match visits {
-            visits if visits > self.visits_until_loose => LOOSE,
-            _ if self.members.len() <= FEW => EXACT,
-            _ => TOLERANCE,
-        }
+        if visits > self.visits_until_loose { SOLVER.loose_tolerance } else { SOLVER.tolerance }
     }
 
     /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].

@@ -28,19 +28,13 @@ use crate::collision::{
     CandidateSide, Collider, CollisionContext, ContactCandidate, ContactId, ContactLaw, FeatureId, OtherSide,
     TipPair, match_contacts,
 };
-use crate::contact::{Constraint, ContactProblem, SolverReport, StepRules};
+use crate::contact::{Constraint, ContactProblem, SOLVER, SolverReport, StepRules, UNSOLVED};
 use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
 use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
 use crate::spatial::Pose;
 use crate::state::{State, Workspace};
 use glam::DVec3;
-
-/// Residual of a rotation, times the size of the body, that counts as unsolved, as a share of the reach.
-const UNSOLVED: f64 = 1e-9;
-
-/// Share of a penetration that is pushed out per step, as far as earlier losses pay for the work.
-const RECOVERY: f64 = 0.1;
 
 impl Model {
     /// Rules of a step.
@@ -208,7 +202,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         let mut constraint = Constraint::new(other - at(contact.object(), contact.slot));
         let gap = contact.gap(constraint.start);
         if gap < 0.0 {
-            let push = RECOVERY * -gap;
+            let push = SOLVER.recovery * -gap;
             let cost = 2.0 * contact.force.length() * push;
             let paid = if cost > budget { 0.0 } else { push };
             budget -= if paid > 0.0 { cost } else { 0.0 };
@@ -263,8 +257,6 @@ fn integrate(model: &Model, state: &mut State) {
     for (object, own) in model.objects.iter().zip(objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
-        let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
-        own.contact_displacement = displaced.fold(0.0, f64::max);
         own.rigid = own.end.end;
         let mut view = object.view(gravity, &own.rigid, &mut own.response);
         own.ledger.dissipated += view.advance(&mut own.points.points);

@@ -15,7 +15,6 @@ pub(crate) use patch_weights::{PatchWeights, triangles_around};
 pub(crate) use poisson_disk::{node_normals, poisson_disk_sample};
 pub(crate) use sphere_tree::{
     Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
-    low_modes,
 };
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 

@@ -23,29 +23,24 @@ use glam::DVec3;
 /// Upper limit of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// Number of bands of modes, and of the low bands, which approximate the position of a centre.
+/// Number of bands of modes.
 pub(crate) const BANDS: usize = 8;
-const LOW_BANDS: usize = 5;
 
 /// Depth of a traversal's stack, enough for 2³¹ triangles.
 const MAX_DEPTH: usize = 128;
-
-/// Flag of a sphere whose subtree was visited.
-const VISITED: u32 = 1 << 31;
-
-/// Ratio of radii from which the sphere about the deformed centre, which costs all modes, is worth computing.
-const REFINE_RATIO: f64 = 1.3;
 
 /// Resumable traversal of a tree: its stack.
 #[derive(Debug, Clone)]
 pub(crate) struct Traversal {
     stack: [u32; MAX_DEPTH],
     depth: usize,
+    /// Spheres and triangles visited so far.
+    pub(crate) visits: usize,
 }
 
 impl Traversal {
     /// Finished traversal.
-    pub(crate) const FINISHED: Self = Self { stack: [0; MAX_DEPTH], depth: 0 };
+    pub(crate) const FINISHED: Self = Self { stack: [0; MAX_DEPTH], depth: 0, visits: 0 };
 
     /// Traversal at its start.
     pub(crate) const START: Self = Self { depth: 1, ..Self::FINISHED };
@@ -62,11 +57,6 @@ pub(crate) type Bands = [f64; BANDS];
 pub(crate) fn band(modes: usize, at: usize) -> Range<usize> {
     let end = |at: usize| modes.div_ceil(1 << (BANDS - 1 - at));
     if at == 0 { 0..end(0) } else { end(at - 1)..end(at) }
-}
-
-/// Number of low modes, which approximate the position of a centre.
-pub(crate) fn low_modes(modes: usize) -> usize {
-    band(modes, LOW_BANDS - 1).end
 }
 
 /// Sphere tree over the triangles; immutable.
@@ -129,18 +119,12 @@ impl DeformationBound {
 
     /// Displacement bound from rest [m].
     fn reach(&self, subtree: &SubtreeBound) -> f64 {
-        self.sum(&subtree.modal, 0..BANDS) + self.residual_of(subtree)
-    }
-
-    /// Distance bound from the centre by the low modes, less the radius at rest [m].
-    fn beside_low(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
-        let modal = self.sum(&subtree.apart, 0..LOW_BANDS) + self.sum(&subtree.modal, LOW_BANDS..BANDS);
-        modal + self.residual_apart(subtree, radius)
+        self.sum(&subtree.modal) + self.residual_of(subtree)
     }
 
     /// Distance bound from the deformed centre, less the radius at rest [m].
     fn apart(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
-        self.sum(&subtree.apart, 0..BANDS) + self.residual_apart(subtree, radius)
+        self.sum(&subtree.apart) + self.residual_apart(subtree, radius)
     }
 
     fn residual_apart(&self, subtree: &SubtreeBound, radius: f64) -> f64 {
@@ -148,8 +132,8 @@ impl DeformationBound {
         (f64::from(subtree.residual) * self.residual).min(change)
     }
 
-    fn sum(&self, subtree: &[f32; BANDS], bands: Range<usize>) -> f64 {
-        bands.map(|at| f64::from(subtree[at]) * self.modal[at]).sum()
+    fn sum(&self, subtree: &[f32; BANDS]) -> f64 {
+        subtree.iter().zip(&self.modal).map(|(bound, norm)| f64::from(*bound) * norm).sum()
     }
 }
 
@@ -158,25 +142,14 @@ impl DeformationBound {
 pub(crate) enum Centre {
     /// Rest position of a surface node.
     Rest,
-    /// Position of a surface node by the low modes.
-    LowModes(usize),
     /// Deformed position of a surface node.
     Deformed(usize),
 }
 
-/// Node positions of a deforming surface at a moment, and radii of its spheres as far as traversals have refitted them.
+/// Node positions of a deforming surface at a moment.
 pub(crate) trait DeformingNodes {
     fn rest(&self, node: usize) -> DVec3;
-    /// Position by the low modes; none where the position by all modes is cached.
-    fn low_mode_position(&self, node: usize) -> Option<DVec3>;
     fn position(&mut self, node: usize) -> DVec3;
-    /// Whether refitted radii are kept.
-    fn keeps_radii(&self) -> bool;
-    /// Cached position of a node.
-    fn known_position(&self, node: usize) -> Option<DVec3>;
-    fn refitted_radius(&self, sphere: usize) -> Option<f64>;
-    fn set_refitted_radius(&mut self, sphere: usize, radius: f64);
-    fn corners_of(&self, triangle: u32) -> [usize; 3];
 }
 
 /// Node positions of a rigid surface.
@@ -187,32 +160,9 @@ impl DeformingNodes for RigidNodes<'_> {
         self.0.positions[node]
     }
 
-    fn low_mode_position(&self, _: usize) -> Option<DVec3> {
-        None
-    }
-
     fn position(&mut self, node: usize) -> DVec3 {
         self.rest(node)
     }
-
-    /// False: spheres of a rigid surface are tight.
-    fn keeps_radii(&self) -> bool {
-        false
-    }
-
-    fn known_position(&self, _: usize) -> Option<DVec3> {
-        None
-    }
-
-    fn corners_of(&self, triangle: u32) -> [usize; 3] {
-        self.0.triangles[triangle as usize].map(|node| node as usize)
-    }
-
-    fn refitted_radius(&self, _: usize) -> Option<f64> {
-        None
-    }
-
-    fn set_refitted_radius(&mut self, _: usize, _: f64) {}
 }
 
 /// Raise every band to the larger value, rounded up.
@@ -314,14 +264,8 @@ impl SphereTree {
         self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
     }
 
-    /// Number of spheres.
-    pub(crate) fn spheres(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Traverse the tree. `near` decides by kind of centre, centre [m] and radius [m] whether a sphere is entered: about the
-    /// rest position, then about the position by the low modes, then about the deformed position. `found` takes the triangles
-    /// of the leaves, with a bound of their nodes' distance from the positions by the low modes [m]. All in one frame.
+    /// rest position, then about the deformed position. `found` takes the triangles of the leaves. All in one frame.
     ///
     /// # Real time
     pub(crate) fn traverse<S: DeformingNodes>(
@@ -329,7 +273,7 @@ impl SphereTree {
         bounds: (&Bounds, &DeformationBound),
         surface: &mut S,
         near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
-        found: impl FnMut(&mut S, u32, f64),
+        found: impl FnMut(&mut S, u32),
     ) {
         self.resume_traversal((&mut Traversal::START.clone(), usize::MAX), bounds, surface, near, found);
     }
@@ -343,34 +287,24 @@ impl SphereTree {
         (bounds, bound): (&Bounds, &DeformationBound),
         surface: &mut S,
         near: impl Fn(&mut S, Centre, DVec3, f64) -> bool,
-        mut found: impl FnMut(&mut S, u32, f64),
+        mut found: impl FnMut(&mut S, u32),
     ) {
-        let Traversal { stack, depth } = traversal;
+        let Traversal { stack, depth, visits } = traversal;
         if self.nodes.is_empty() {
             *depth = 0;
         }
-        let mut visits = 0;
-        while *depth > 0 && visits < max_visits {
-            visits += 1;
+        let end = visits.saturating_add(max_visits);
+        while *depth > 0 && *visits < end {
+            *visits += 1;
             *depth -= 1;
-            let (at, visited) = ((stack[*depth] & !VISITED) as usize, stack[*depth] & VISITED != 0);
+            let at = stack[*depth] as usize;
             let (node, subtree) = (&self.nodes[at], &bounds.subtrees[at]);
-            if visited {
-                self.refit_lazily(at, surface);
-                continue;
-            }
-            let refitted_radius = surface.refitted_radius(at);
-            if !Self::enter(node, subtree, bound, refitted_radius, surface, &near) {
+            if !Self::enter(node, subtree, bound, surface, &near) {
                 continue;
             }
             if node.second == 0 {
-                let high = bound.sum(&subtree.modal, LOW_BANDS..BANDS) + bound.residual_of(subtree);
-                self.triangles_of(node).for_each(|triangle| found(surface, triangle, high));
-                visits += node.count as usize;
-            }
-            if refitted_radius.is_none() && surface.keeps_radii() {
-                stack[*depth] = at as u32 | VISITED;
-                *depth += 1;
+                self.triangles_of(node).for_each(|triangle| found(surface, triangle));
+                *visits += node.count as usize;
             }
             if node.second != 0 {
                 stack[*depth] = node.second;
@@ -385,65 +319,17 @@ impl SphereTree {
         node: &TreeNode,
         subtree: &SubtreeBound,
         bound: &DeformationBound,
-        refitted_radius: Option<f64>,
         surface: &mut S,
         near: &impl Fn(&mut S, Centre, DVec3, f64) -> bool,
     ) -> bool {
         let c = node.centre as usize;
-        if let Some(radius) = refitted_radius {
-            let centre = surface.position(c);
-            return near(
-                surface,
-                Centre::Deformed(c),
-                centre,
-                radius + bound.residual_apart(subtree, node.radius),
-            );
-        }
         let at_rest = surface.rest(c);
         if !near(surface, Centre::Rest, at_rest, node.radius + bound.reach(subtree)) {
             return false;
         }
         let within = node.radius + bound.apart(subtree, node.radius);
-        let nearly = node.radius + bound.beside_low(subtree, node.radius);
-        let low = surface.low_mode_position(c);
-        if low.is_some_and(|centre| !near(surface, Centre::LowModes(c), centre, nearly)) {
-            return false;
-        }
-        // The sphere about the deformed centre costs all modes: only where it is much smaller.
-        if low.is_some() && nearly <= REFINE_RATIO * within {
-            return true;
-        }
         let centre = surface.position(c);
         near(surface, Centre::Deformed(c), centre, within)
-    }
-
-    /// Refit a sphere to the positions that the traversal has computed, if all of them are cached.
-    fn refit_lazily<S: DeformingNodes>(&self, at: usize, surface: &mut S) {
-        let node = &self.nodes[at];
-        let Some(centre) = surface.known_position(node.centre as usize) else { return };
-        let mut radius = 0.0_f64;
-        let mut enclose = |position: Option<DVec3>, extent: Option<f64>| {
-            let reach = position.zip(extent).map(|(position, extent)| (position - centre).length() + extent);
-            radius = radius.max(reach?);
-            Some(())
-        };
-        let all = match node.second {
-            0 => self.triangles_of(node).try_for_each(|t| {
-                surface
-                    .corners_of(t)
-                    .into_iter()
-                    .try_for_each(|i| enclose(surface.known_position(i), Some(0.0)))
-            }),
-            second => [at + 1, second as usize].into_iter().try_for_each(|child| {
-                enclose(
-                    surface.known_position(self.nodes[child].centre as usize),
-                    surface.refitted_radius(child),
-                )
-            }),
-        };
-        if all.is_some() {
-            surface.set_refitted_radius(at, radius);
-        }
     }
 }
 

@@ -6,24 +6,18 @@
 //!
 //! Equations: docs/theory.md (C17), (C18), (C24).
 
-use super::ON_EDGE;
-use super::point_surface::{MARGIN, MovingPoint, point_against_surface};
+use super::point_surface::{MovingPoint, point_against_surface};
 use crate::collision::candidate::{CandidateList, CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
 use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
+use crate::collision::parameters::{COLLISION, MAX_ITERATIONS};
 use crate::object::ObjectState;
 use crate::obstacle::Obstacle;
 use crate::response::{Body, ContactLocation, Footprint};
 use crate::spatial::Pose;
 use crate::surface::{Centre, SurfacePoint, at_weights};
 use glam::{DAffine3, DVec3};
-
-/// Displacement of a free node by forces on its neighbours, as a share of theirs: an upper bound between neighbours.
-const NEIGHBOUR_DISPLACEMENT: f64 = 0.3;
-
-/// Upper limit of conservative advancements.
-const MAX_ADVANCEMENTS: usize = 30;
 
 /// An object and an obstacle over a step.
 struct ObstacleQuery<'a> {
@@ -72,7 +66,7 @@ impl CollisionContext<'_> {
             obstacle_from_body: start.relative_to(&before),
             obstacle_from_body_after: free.relative_to(&after),
             travel,
-            margin: MARGIN * body.edge + NEIGHBOUR_DISPLACEMENT * own.contact_displacement,
+            margin: COLLISION.margin * body.edge,
             sweep_margin: if travel > 0.5 * obstacle.shape.size() { travel } else { 0.0 },
         };
         let max_samples = self.scene.max_contact_samples;
@@ -149,15 +143,12 @@ impl ObstacleQuery<'_> {
                 let reach = radius + self.margin + self.sweep_margin;
                 match of {
                     Centre::Rest => self.distance(centre, reach + self.travel) < reach + self.travel,
-                    Centre::LowModes(node) => {
-                        self.approaches(centre, || surface.predicted_low_mode_position(node), reach)
-                    }
                     Centre::Deformed(node) => {
                         self.approaches(centre, || surface.predicted_position(node), reach)
                     }
                 }
             },
-            |surface, triangle, high| {
+            |surface, triangle| {
                 for node in triangles[triangle as usize].map(|n| n as usize) {
                     if !surface.mark_node(node) {
                         continue;
@@ -170,12 +161,6 @@ impl ObstacleQuery<'_> {
                         }
                         Err(_) => {
                             let reach = self.margin + residual + self.sweep_margin;
-                            // The low modes alone may exclude it.
-                            let low = surface.low_mode_position(node);
-                            let end = || surface.predicted_low_mode_position(node);
-                            if !self.approaches(low, end, reach + high) {
-                                continue;
-                            }
                             let modal = surface.modal_position(node);
                             if !self.approaches(modal, || surface.predicted_position(node), reach) {
                                 continue;
@@ -212,14 +197,14 @@ impl ObstacleQuery<'_> {
         let local = positions.map(|p| self.obstacle_from_body.transform_point3(p));
         let Some(weights) = self.obstacle.shape.deepest(local) else { return };
         // Inside the triangle, or on an edge, which counts for one of its two triangles.
-        let is_thin = |k: &usize| weights[*k] < ON_EDGE;
+        let is_thin = |k: &usize| weights[*k] < COLLISION.on_edge;
         let edge = (0..3).find(is_thin).map(|k| (corners[(k + 1) % 3], corners[(k + 2) % 3]));
         if (0..3).filter(is_thin).count() > 1 || edge.is_some_and(|(a, b)| a > b) {
             return;
         }
         let far = f64::INFINITY;
         let deepest = self.distance(at_weights(positions, weights), far);
-        let is_nearer = |p: &DVec3| self.distance(*p, far) < deepest + 1e-3 * self.body.edge;
+        let is_nearer = |p: &DVec3| self.distance(*p, far) < deepest + 0.5 * self.margin;
         if deepest > self.margin + residual + self.sweep_margin || positions.iter().any(is_nearer) {
             return;
         }
@@ -252,7 +237,7 @@ impl ObstacleQuery<'_> {
         let mut position = start;
         if travel > 0.5 * shape.size() && first > 0.0 {
             let mut t = 0.0;
-            for _ in 0..MAX_ADVANCEMENTS {
+            for _ in 0..MAX_ITERATIONS {
                 position = start.lerp(end, t);
                 let Some((gap, _)) = distance(position) else { return };
                 if gap < 0.5 * self.margin {

@@ -1,21 +1,18 @@
 //! Elastic objects against one another: surface nodes of each against the surface of the other. Where many come near, contact
 //! samples stand for them on both sides, against the decimated surface between samples.
 
-use super::ON_EDGE;
-use super::point_surface::{MARGIN, MovingPoint, point_against_surface};
+use super::point_surface::{MovingPoint, point_against_surface};
 use crate::collision::broad_phase::HalfSpace;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, OtherSide};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
+use crate::collision::parameters::COLLISION;
 use crate::collision::proximity::ProximityQuery;
 use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
 use alloc::vec::Vec;
 use glam::DVec3;
-
-/// Distance on a decimated surface, as a share of the mean edge, below which a contact keeps its location.
-const SLIDE_TOLERANCE: f64 = 0.01;
 
 impl CollisionContext<'_> {
     /// Find the contacts of all pairs of objects.
@@ -118,8 +115,8 @@ impl CollisionContext<'_> {
                     candidates.list[first..].iter().any(|candidate| candidate.id == id)
                 };
                 let mut corners = base.object.body.corners(&candidate.location).into_iter();
-                let is_redundant =
-                    uses_samples && corners.all(|(node, weight)| weight < ON_EDGE || is_candidate(node));
+                let is_redundant = uses_samples
+                    && corners.all(|(node, weight)| weight < COLLISION.on_edge || is_candidate(node));
                 if !is_redundant {
                     candidates.push(candidate);
                 }
@@ -167,8 +164,9 @@ impl Side<'_> {
     ) {
         let Self { own, object, surface, .. } = self;
         let (pose, base_pose) = (own.rigid.pose, base.own.rigid.pose);
-        let grown =
-            base.surface.max_displacement() + travel + MARGIN * object.body.edge.min(base.object.body.edge);
+        let grown = base.surface.max_displacement()
+            + travel
+            + COLLISION.margin * object.body.edge.min(base.object.body.edge);
         let direction = pose.orientation.inverse() * half_space.direction;
         let residual = surface.max_residual();
         let is_near = |point: DVec3, radius: f64| {
@@ -180,7 +178,7 @@ impl Side<'_> {
         surface.clear_marks();
         surface.traverse(
             |_, _, centre, radius| is_near(centre, radius),
-            |surface, triangle, _| {
+            |surface, triangle| {
                 for node in surface.surface().triangles[triangle as usize] {
                     if surface.mark_node(node as usize)
                         && is_near(surface.modal_position(node as usize), residual)
@@ -247,7 +245,7 @@ fn meet(
     let mut location = ContactLocation { point, footprint: base.footprint };
     if let (Some((_, last)), Footprint::Patch(_)) = (known, base.footprint) {
         let rest = |location| base.object.body.rest_position(location);
-        if (rest(&location) - rest(&last)).length() < SLIDE_TOLERANCE * moving.edge {
+        if (rest(&location) - rest(&last)).length() < COLLISION.location_tolerance[1] * moving.edge {
             location = last;
         }
     }

@@ -13,18 +13,9 @@
 //! Equations: docs/theory.md (C22).
 
 use crate::collision::deformed_surface::{DeformedSurface, TriangleProjection};
+use crate::collision::parameters::{COLLISION, MAX_ITERATIONS, ROUND_OFF};
 use crate::surface::{area_normal, at_weights};
 use glam::DVec3;
-
-/// Cosine between adjacent triangles below which their edge is a crease (37°).
-const CREASE: f64 = 0.8;
-
-/// Upper limits of triangles that are visited, and of fixed-point iterations on each.
-const MAX_TRIANGLES: usize = 12;
-const MAX_ITERATIONS: usize = 8;
-
-/// Barycentric weight below which a point lies on the opposite edge.
-const ON_EDGE: f64 = 1e-6;
 
 /// Foot point of a tip on the surface.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +46,7 @@ pub(crate) fn phong_project(
     }
     let mut triangle = found.triangle;
     let mut weights = found.weights;
-    for _ in 0..MAX_TRIANGLES {
+    for _ in 0..MAX_ITERATIONS {
         let corners = surface.corners(triangle);
         let normals = corner_normals(surface, triangle);
         let mut normal = at_weights(normals, weights).normalize_or(found.normal);
@@ -67,7 +58,7 @@ pub(crate) fn phong_project(
             // Normals are interpolated within the triangle only.
             let inside = clamp(next);
             normal = at_weights(normals, inside).normalize_or(found.normal);
-            if moved < 1e-12 {
+            if moved < ROUND_OFF {
                 break;
             }
         }
@@ -75,14 +66,14 @@ pub(crate) fn phong_project(
         let least = (0..3).min_by(|&a, &b| next[a].total_cmp(&next[b])).unwrap_or_default();
         let inside = clamp(next);
         let foot = FootPoint { triangle, weights: inside, normal };
-        if next[least] > -1e-9 {
+        if next[least] > -ROUND_OFF {
             return foot;
         }
         let body = surface.body;
         let ends = body.recording.surface.triangles[triangle as usize];
         let (a, b) = (ends[(least + 1) % 3], ends[(least + 2) % 3]);
         let Some(over) = body.triangle_across(triangle, a, b) else { return foot };
-        if face_normal(surface, over).dot(face_normal(surface, triangle)) < CREASE {
+        if face_normal(surface, over).dot(face_normal(surface, triangle)) < COLLISION.crease_cosine {
             return foot;
         }
         let from = body.recording.surface.triangles[over as usize];
@@ -96,11 +87,11 @@ pub(crate) fn phong_project(
 fn crease_clearance(surface: &mut DeformedSurface, found: &TriangleProjection, away: DVec3) -> Option<f64> {
     let body = surface.body;
     let corners = body.recording.surface.triangles[found.triangle as usize];
-    let mut on = corners.iter().zip(found.weights).filter(|(_, w)| *w >= ON_EDGE).map(|(node, _)| *node);
+    let mut on = corners.iter().zip(found.weights).filter(|(_, w)| *w > ROUND_OFF).map(|(node, _)| *node);
     let (mut crease, mut most) = (false, away.dot(found.normal));
     let mut look = |surface: &mut DeformedSurface, triangle: u32| {
         let normal = face_normal(surface, triangle);
-        crease |= normal.dot(found.normal) < CREASE;
+        crease |= normal.dot(found.normal) < COLLISION.crease_cosine;
         most = most.max(away.dot(normal));
     };
     match (on.next(), on.next(), on.next()) {
@@ -128,7 +119,7 @@ fn corner_normals(surface: &mut DeformedSurface, triangle: u32) -> [DVec3; 3] {
         let mut sum = DVec3::ZERO;
         for &other in body.triangles_around(node as usize) {
             let normal = face_normal(surface, other);
-            if normal.dot(own) >= CREASE {
+            if normal.dot(own) >= COLLISION.crease_cosine {
                 sum += normal;
             }
         }

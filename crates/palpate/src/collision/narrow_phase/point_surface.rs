@@ -3,19 +3,10 @@
 //! Equations: docs/theory.md (C25).
 
 use crate::collision::deformed_surface::DeformedSurface;
+use crate::collision::parameters::{COLLISION, ROUND_OFF};
 use crate::collision::proximity::ProximityQuery;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
-
-/// Margin within which points become candidates without approaching, as a share of the mean edge: contact forces of one
-/// step move neighbours by less.
-pub(crate) const MARGIN: f64 = 2e-3;
-
-/// Safety factor on the predicted approach within a step.
-pub(crate) const APPROACH_FACTOR: f64 = 1.5;
-
-/// Depth, as a share of the mean edge, beyond which a point that was not in contact has not come through this surface.
-const MAX_DEPTH: f64 = 0.5;
 
 /// A point that moves relative to a surface over a step.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +28,9 @@ impl MovingPoint {
     /// Distance within which the surface can be met [m].
     pub(crate) fn reach(&self) -> f64 {
         let Self { travel, known, edge, .. } = *self;
-        MARGIN * edge + 2.0 * travel + if known.is_some() { edge } else { MAX_DEPTH * edge }
+        COLLISION.margin * edge
+            + 2.0 * travel
+            + if known.is_some() { edge } else { COLLISION.max_depth * edge }
     }
 }
 
@@ -50,19 +43,20 @@ pub(crate) fn point_against_surface(
     moving: &MovingPoint,
 ) -> Option<(SurfacePoint, DVec3)> {
     let MovingPoint { point, travel, facing, known, edge } = *moving;
-    let (margin, reach) = (MARGIN * edge, moving.reach());
+    let (margin, reach) = (COLLISION.margin * edge, moving.reach());
     query.nearest_triangles(surface, (point, facing), reach, known);
     let nearest = query.found.first().copied()?;
-    let inside = query.is_inside(point);
+    let inside = query.is_inside(surface.body, point);
     let gap = if inside { -nearest.distance } else { nearest.distance };
     // From outside, points that can close the gap; from inside, those that were in contact or have just come in.
-    let closes = gap < margin + APPROACH_FACTOR * (travel + surface.predicted_motion(nearest.triangle));
-    if !closes || gap < -MAX_DEPTH * edge && known.is_none() {
+    let closes =
+        gap < margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
+    if !closes || gap < -COLLISION.max_depth * edge && known.is_none() {
         return None;
     }
     // Outside an edge the normal leads to the point, on a face it is the face's.
-    let on_face = nearest.weights.iter().all(|w| *w > 1e-9);
-    let is_clear = !inside && nearest.distance > 1e-3 * edge && !on_face;
+    let on_face = nearest.weights.iter().all(|w| *w > ROUND_OFF);
+    let is_clear = !inside && nearest.distance > margin && !on_face;
     let normal = if is_clear { (point - nearest.position) / nearest.distance } else { nearest.normal };
     let location = SurfacePoint { triangle: nearest.triangle, weights: nearest.weights };
     (normal != DVec3::ZERO && normal.dot(facing) <= 0.0).then_some((location, normal))

@@ -13,23 +13,12 @@ use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{
     DeformedSurface, MAX_TIP_CONTACTS, SurfaceTime, TriangleProjection,
 };
-use crate::collision::proximity::{ProximityQuery, SAME_FACE};
+use crate::collision::parameters::{COLLISION, MAX_ITERATIONS, ROUND_OFF};
+use crate::collision::proximity::ProximityQuery;
 use crate::device::{DeviceParameters, DeviceState};
 use crate::response::{Body, ContactLocation, Footprint};
 use crate::surface::SurfacePoint;
 use glam::DVec3;
-
-/// Tangential distance of the proxy, as a share of the contact's size, below which its material point stays.
-const ROLL_TOLERANCE: f64 = 1e-3;
-
-/// Cosine below which two faces are the front and the back of one wall.
-const OPPOSED: f64 = -0.5;
-
-/// Least radius of a tip, as a share of the mean edge: a point needs a side from which it comes.
-const MIN_TIP: f64 = 1e-3;
-
-/// Upper limit of conservative advancements along a path; each about halves the distance.
-const MAX_ADVANCEMENTS: usize = 40;
 
 /// Upper limit of samples along a slide.
 const MAX_SLIDE_SAMPLES: f64 = 8.0;
@@ -66,7 +55,7 @@ impl CollisionContext<'_> {
         let parameters = &self.scene.devices[number];
         let body = &object.body;
         let footprint = body.footprint(parameters.patch_radius);
-        let tip = parameters.tip_radius.max(MIN_TIP * body.edge);
+        let tip = parameters.tip_radius.max(COLLISION.min_tip * body.edge);
         let start = own.rigid.pose.body_from_world(device.proxy);
         let free = own.free.end.pose.body_from_world(device.proxy_under_force());
         let travel = (free - start).length();
@@ -87,24 +76,29 @@ impl CollisionContext<'_> {
         let query = &mut workspace.query;
         if is_new || *inside {
             let Some(nearest) = ProximityQuery::nearest(&mut surface, start, f64::INFINITY) else { return };
-            query.triangles_within(&mut surface, start, nearest.distance * (1.0 + 1e-9) + 1e-12);
-            *inside = query.is_inside(start);
+            query.triangles_within(
+                &mut surface,
+                start,
+                nearest.distance * (1.0 + ROUND_OFF) + ROUND_OFF * body.edge,
+            );
+            *inside = query.is_inside(body, start);
             if *inside {
                 return;
             }
         }
-        let reach = tip + 1.2 * travel + 0.02 * body.edge;
+        let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
         let triangles = &mut workspace.triangles[triangle_cache];
         triangles.find(query, &mut surface, start, reach);
         // The surface here moves about as its nearest nodes do.
         let mut motion = motion;
         if let Some(nearest) = query.found.first().copied() {
-            let local = 1.5 * surface.predicted_motion(nearest.triangle);
-            motion = motion.min(travel + local + 0.01 * body.edge);
+            let local = COLLISION.motion_factor * surface.predicted_motion(nearest.triangle);
+            motion = motion.min(travel + local + COLLISION.margin * body.edge);
         }
         // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
-        let is_fast = motion > 0.5 * tip.max(0.5 * body.edge);
-        let needed = if is_fast { 1.05 * tip } else { tip + 1.2 * motion };
+        let is_fast = motion > COLLISION.fast_motion * tip.max(0.5 * body.edge);
+        let needed =
+            if is_fast { (1.0 + COLLISION.sweep_gap) * tip } else { tip + COLLISION.motion_factor * motion };
         if needed > reach {
             triangles.find(query, &mut surface, start, needed);
         }
@@ -166,7 +160,7 @@ impl CollisionContext<'_> {
         if touching == 0 {
             // Free: conservative advancement to the first touch.
             let mut t = 0.0;
-            for _ in 0..MAX_ADVANCEMENTS {
+            for _ in 0..MAX_ITERATIONS {
                 interpolate(t, blend);
                 let moment = SurfaceTime::Coordinates(blend);
                 let mut surface =
@@ -175,8 +169,12 @@ impl CollisionContext<'_> {
                 let reach = motion * (1.0 - t) + 2.0 * contacts.tip;
                 let Some(nearest) = ProximityQuery::nearest(&mut surface, p, reach) else { return };
                 let gap = nearest.distance - contacts.tip;
-                if gap < 0.02 * contacts.tip {
-                    query.triangles_within(&mut surface, p, contacts.tip + gap + 0.05 * contacts.tip);
+                if gap < COLLISION.sweep_gap * contacts.tip {
+                    query.triangles_within(
+                        &mut surface,
+                        p,
+                        contacts.tip + gap + COLLISION.sweep_gap * contacts.tip,
+                    );
                     query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
                     for found in &query.found {
                         contacts.add(&mut surface, found, p, before.slerp(after, t));
@@ -195,8 +193,8 @@ impl CollisionContext<'_> {
         for contact in contacts.all() {
             slide -= contact.normal_in_body * slide.dot(contact.normal_in_body).min(0.0);
         }
-        let count =
-            libm::ceil(slide.length() / (0.5 * contacts.tip.max(0.5 * body.edge))).min(MAX_SLIDE_SAMPLES);
+        let count = libm::ceil(slide.length() / (COLLISION.fast_motion * contacts.tip.max(0.5 * body.edge)))
+            .min(MAX_SLIDE_SAMPLES);
         for k in 1..=count as u32 {
             let t = f64::from(k) / count;
             interpolate(t, blend);
@@ -204,10 +202,15 @@ impl CollisionContext<'_> {
             let mut surface =
                 DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
             let p = start + slide * t;
-            query.triangles_within(&mut surface, p, 0.98 * contacts.tip.max(slide.length() / count));
+            query.triangles_within(
+                &mut surface,
+                p,
+                (1.0 - COLLISION.sweep_gap) * contacts.tip.max(slide.length() / count),
+            );
             query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
             for found in &query.found {
-                let is_other = contacts.all().all(|c| c.normal_in_body.dot(found.normal) < SAME_FACE);
+                let is_other =
+                    contacts.all().all(|c| c.normal_in_body.dot(found.normal) < COLLISION.crease_cosine);
                 // Met from outside: the slide leads against it.
                 if is_other && slide.dot(found.normal) < 0.0 {
                     let beside = found.position + found.normal * contacts.tip;
@@ -242,7 +245,7 @@ impl CollisionContext<'_> {
                     let point = own.points.of(contact.slot);
                     let away = start - (point.rest + point.state.displacement);
                     let aside = away - found.normal_in_body * found.normal_in_body.dot(away);
-                    if aside.length() < ROLL_TOLERANCE * size {
+                    if aside.length() < COLLISION.location_tolerance[0] * size {
                         location = point.location;
                     }
                     feature
@@ -307,13 +310,17 @@ impl TipContacts {
     ) {
         // A proxy on the surface itself may be below it by round-off.
         let clearance = (proxy - found.position).dot(found.normal);
-        if self.count == MAX_TIP_CONTACTS || clearance < -0.5 * self.tip || found.normal == DVec3::ZERO {
+        if self.count == MAX_TIP_CONTACTS
+            || clearance < -COLLISION.max_depth * self.tip
+            || found.normal == DVec3::ZERO
+        {
             return;
         }
         let foot = phong_project(surface, found, proxy, self.tip);
         // Two nearest points of one smooth surface are one contact; the back of a wall whose front is touched is none.
-        let is_known = |c: &TipContact| c.normal_in_body.dot(foot.normal) > SAME_FACE;
-        let is_back = |c: &TipContact| clearance < 0.0 && c.normal_in_body.dot(foot.normal) < OPPOSED;
+        let is_known = |c: &TipContact| c.normal_in_body.dot(foot.normal) > COLLISION.crease_cosine;
+        let is_back =
+            |c: &TipContact| clearance < 0.0 && c.normal_in_body.dot(foot.normal) < COLLISION.opposed_cosine;
         if self.all().any(|c| is_known(c) || is_back(c)) {
             return;
         }

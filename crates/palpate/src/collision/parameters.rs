@@ -1,0 +1,69 @@
+//! Parameters of collision detection: every tuned number in one place, each dimensionless by a named scale.
+//!
+//! Lengths are shares of the *mean edge* of the object's triangles at rest unless said otherwise. docs/ablation.md has what
+//! each is worth.
+
+/// Parameters of collision detection.
+pub(super) struct CollisionParameters {
+    /// Margin within which points become candidates without approaching, and length below which two points count as one
+    /// place: contact forces of one step move neighbours by less.
+    pub(super) margin: f64,
+    /// Safety factor on motions that are predicted without contact force.
+    pub(super) motion_factor: f64,
+    /// Depth beyond which a point that was not in contact has not come through this surface; of a tip, a share of its radius.
+    pub(super) max_depth: f64,
+    /// Motion of a step from which a tip is fast and is swept, as a share of its radius or of half an edge.
+    pub(super) fast_motion: f64,
+    /// Least radius of a tip: a point needs a side from which it comes.
+    pub(super) min_tip: f64,
+    /// Gap at which a sweep has arrived, as a share of the tip's radius.
+    pub(super) sweep_gap: f64,
+    /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated surface.
+    /// It saves the responses of a new location.
+    pub(super) location_tolerance: [f64; 2],
+    /// Cosine between the normals of two triangles below which there is a crease between them (within 32° they are one face).
+    pub(super) crease_cosine: f64,
+    /// Cosine below which two faces are the front and the back of one wall.
+    pub(super) opposed_cosine: f64,
+    /// Barycentric weight below which a point lies on the opposite edge.
+    pub(super) on_edge: f64,
+    /// Skin of a triangle cache, as a share of mean edge and reach.
+    pub(super) skin: f64,
+    /// Share of the skin that is left when a rebuild begins.
+    pub(super) rebuild_at: f64,
+    /// Steps that a rebuild takes, if it visits as many spheres and triangles as the last one.
+    pub(super) rebuild_steps: usize,
+    /// Number of cached triangles above which only seeds are kept: local minima of the distance, from which a descent leads
+    /// to the present ones.
+    pub(super) seed_above: usize,
+    /// An object is refined after this many steps with less than this share of the allowed samples near.
+    pub(super) refine_after_steps: u64,
+    pub(super) refine_below: f64,
+}
+
+/// The parameters.
+pub(super) const COLLISION: CollisionParameters = CollisionParameters {
+    margin: 2e-3,
+    motion_factor: 1.5,
+    max_depth: 0.5,
+    fast_motion: 0.5,
+    min_tip: 1e-3,
+    sweep_gap: 0.02,
+    location_tolerance: [1e-3, 1e-2],
+    crease_cosine: 0.85,
+    opposed_cosine: -0.5,
+    on_edge: 0.02,
+    skin: 0.5,
+    rebuild_at: 0.5,
+    rebuild_steps: 4,
+    seed_above: 48,
+    refine_after_steps: 50,
+    refine_below: 1.0 / 6.0,
+};
+
+/// Relative difference that is round-off: of distances, and of barycentric weights.
+pub(super) const ROUND_OFF: f64 = 1e-9;
+
+/// Upper limit of iterations: conservative advancements (each about halves the distance), triangles of a descent or of a
+/// projection. Reached in degenerate geometry only.
+pub(super) const MAX_ITERATIONS: usize = 40;

@@ -1,0 +1,65 @@
+//! Parameters of the contact solver: every tuned number in one place, each dimensionless by a named scale.
+//!
+//! Residuals are lengths, as shares of the *size* of the smallest object of the island. docs/ablation.md has what each is
+//! worth.
+
+/// Parameters of the contact solver.
+pub(crate) struct SolverParameters {
+    /// Residual of a contact's law at which an island is solved.
+    pub(super) tolerance: f64,
+    /// Residual that is enough after a number of contact visits: `visits`, or `visits_with_samples` where contact samples stand
+    /// for nodes, since they are no more exact.
+    pub(super) loose_tolerance: f64,
+    pub(super) visits: u32,
+    pub(super) visits_with_samples: u32,
+    /// Residual that is used, and reported as unsolved, at the limit of sweeps.
+    pub(super) rough_tolerance: f64,
+    /// Upper limits of exact evaluations, each of which reduces the residual of the rotation by a factor of about
+    /// h·|ω| + strain, and of sweeps over all of them.
+    pub(super) max_evaluations: u32,
+    pub(super) max_sweeps: u32,
+    /// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at; and change of a point's
+    /// displacement that is not propagated, as a share of the tolerance.
+    pub(super) skip: f64,
+    /// Goal of the sweeps between two evaluations, as a share of the residual before them.
+    pub(super) sweep_goal: f64,
+    /// Rotation within an evaluation [rad] from which contacts are linearised again.
+    pub(super) relinearise: f64,
+    /// Scaled fallback: rotation [rad], and deformation as a share of the radius, to which forces are scaled; and the upper
+    /// limit of its sweeps, scales and evaluations.
+    pub(super) fallback_change: f64,
+    pub(super) fallback_iterations: u32,
+    /// Upper limit of a Newton step for the direction of slip [rad]; beyond it a fixed-point step is taken.
+    pub(super) max_newton_turn: f64,
+    /// Denominator of a slipping contact's normal force, as a share of its normal compliance, below which it jams; the
+    /// remainder shows as residual.
+    pub(super) jam: f64,
+    /// Share of a penetration that is pushed out per step, as far as earlier losses pay for the work.
+    pub(crate) recovery: f64,
+}
+
+/// The parameters.
+pub(crate) const SOLVER: SolverParameters = SolverParameters {
+    tolerance: 1e-8,
+    loose_tolerance: 1e-5,
+    visits: 600,
+    visits_with_samples: 60,
+    rough_tolerance: 1e-4,
+    max_evaluations: 40,
+    max_sweeps: 120,
+    skip: 0.1,
+    sweep_goal: 0.02,
+    relinearise: 0.01,
+    fallback_change: 0.3,
+    fallback_iterations: 20,
+    max_newton_turn: 0.3,
+    jam: 0.05,
+    recovery: 0.1,
+};
+
+/// Round-off of a length, as a share of (distance from the origin + size): a few roundings of x + R·(r + u).
+pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
+
+/// Residual, as a share of the reach, and pivot, as a share of its diagonal, that are more than round-off. Residual
+/// compliances in single precision have a relative error of 6e-8; a point at a thousandth of a triangle keeps about 1e-6.
+pub(crate) const UNSOLVED: f64 = 1e-9;
