@@ -2,7 +2,8 @@
 //!
 //! At sampled points and patches of the surface, in three directions each, the response of the recording is compared with
 //! that of all modes (see `krylov`): R[0], static compliance, dynamic compliance over frequency, and the force of an
-//! imposed displacement. The certificate also states the convergence error of this reference.
+//! imposed displacement. The certificate also states the convergence error of this reference. The geometric error of the levels of
+//! contact samples is measured by [`palpate::CertificateLevel::new`] and added by `record`.
 
 use crate::krylov::{KrylovSpaces, LoadedMode};
 use crate::modes::ElasticModes;
@@ -94,6 +95,7 @@ pub(crate) fn certificate(
         event: EVENT,
         worst_at_m: [0.0; 3],
         worst_patch_radius_m: 0.0,
+        sample_levels: Vec::new(),
     };
     let mut force_errors = Vec::new();
     for (at, sample) in samples.iter().enumerate() {

@@ -16,8 +16,8 @@ use crate::solve_error::SolveError;
 use crate::system::System;
 use glam::DVec3;
 use palpate::{
-    Certificate, Damping, FORMAT_VERSION, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording,
-    Support, Surface,
+    Certificate, CertificateLevel, Damping, FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts,
+    Metadata, ModalBasis, Provenance, Recording, Support, Surface,
 };
 
 /// Parameters of a recording.
@@ -44,7 +44,7 @@ pub struct RecordParameters {
 /// Extent of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RecordExtent {
-    /// Modes, residual compliance and certificate.
+    /// Modes, residual compliance, levels of contact samples, and certificate.
     #[default]
     Full,
     /// Modes and residual compliance: for tables in closed form.
@@ -128,13 +128,18 @@ fn record_body(
         if no_modes { ResidualChoice::None } else { parameters.residual },
         progress,
     )?;
-    let mut stated = None;
+    let (mut sample_levels, mut stated) = (Vec::new(), None);
     if parameters.extent == RecordExtent::Full {
+        progress.begin("contact samples", 2);
+        sample_levels = surface.sample_levels(MIN_CONTACT_SAMPLES);
+        progress.advance(1);
+        let level_errors = sample_levels.iter().map(|level| CertificateLevel::new(&surface, level)).collect();
+        progress.advance(1);
         let certificate =
             certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)
                 .map_err(certificate_error)?;
         warn_about_certificate(&certificate, progress);
-        stated = Some(certificate);
+        stated = Some(Certificate { sample_levels: level_errors, ..certificate });
     }
 
     let free = system.fixed_nodes.is_empty();
@@ -165,6 +170,7 @@ fn record_body(
         modes: modal_basis(&modes, &surface_nodes, parameters.damping),
         residual,
         gravity: (!free).then(|| gravity_response(&system, &modes, &surface_nodes)),
+        sample_levels,
     };
     Ok(RecordedBody { recording, system, modes })
 }

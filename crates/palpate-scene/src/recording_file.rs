@@ -64,7 +64,22 @@ fn write_certificate(out: &mut String, certificate: &Certificate) -> std::fmt::R
         "    bandwidth            {:.1} Hz (dynamic compliance within 5 % of the static)",
         certificate.bandwidth_hz
     )?;
-    writeln!(out, "    reference            its own error is {}", percent(certificate.reference_error))
+    writeln!(out, "    reference            its own error is {}", percent(certificate.reference_error))?;
+    for (at, level) in certificate.sample_levels.iter().enumerate() {
+        let name = format!("level {}", at + 1);
+        let mm = |metres: f64| 1000.0 * metres;
+        write!(
+            out,
+            "    {name:<21}{} contact samples, spacing {:.3} mm, ",
+            level.samples,
+            mm(level.spacing_m)
+        )?;
+        match level.hausdorff_distance_m {
+            Some(distance) => writeln!(out, "decimated surface within {:.3} mm", mm(distance))?,
+            None => writeln!(out, "no decimated surface")?,
+        }
+    }
+    Ok(())
 }
 
 fn percent(share: f64) -> String {

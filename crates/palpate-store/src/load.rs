@@ -52,5 +52,6 @@ fn body(content: &TableContent) -> Recording {
         residual: ResidualCompliance::None,
         gravity: fixed
             .then(|| GravityResponse { modal_forces: vec![], residual_displacements: vec![0.0; 9 * nodes] }),
+        sample_levels: vec![],
     }
 }

@@ -5,7 +5,7 @@
 //! and of S: `S(m, n) = ¼·Σ S(parents of m, parents of n)`.
 
 use glam::{DMat3, DVec3};
-use palpate::{ModalBasis, NearField, Recording, ResidualCompliance, Surface};
+use palpate::{Metadata, ModalBasis, NearField, Recording, ResidualCompliance, Surface};
 use std::collections::HashMap;
 
 /// Radius of the near field of [`subdivided_near_field`], in mean edges of the new surface.
@@ -63,7 +63,9 @@ fn interpolated(
         }
     }
     let modes = ModalBasis { mode_shapes, ..coarse.modes.clone() };
-    Recording { metadata: coarse.metadata.clone(), surface, modes, residual, gravity: None }
+    // The certificate states the errors of the coarse body.
+    let metadata = Metadata { certificate: None, ..coarse.metadata.clone() };
+    Recording { metadata, surface, modes, residual, gravity: None, sample_levels: Vec::new() }
 }
 
 /// S between all new nodes, its lower triangle packed by rows.

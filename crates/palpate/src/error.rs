@@ -98,6 +98,8 @@ pub enum RecordingPart {
     Metadata,
     /// Positions, triangles and source nodes.
     Surface,
+    /// Levels of contact samples.
+    SampleLevels,
     /// Angular frequencies, damping ratios and mode shapes.
     Modes,
     /// Residual compliance.

@@ -19,10 +19,10 @@
 //!   [`ObjectOutput`], [`ContactOutput`] against a [`Collider`], [`EnergyLedger`] and [`StepStatus`].
 //! - **State.** [`State`] resumes from [`ObjectSnapshot`]s; a [`DeformationSnapshot`] gives surfaces to another thread, with a
 //!   [`ResidualFieldCache`].
-//! - **Surface.** [`Surface`] and [`SurfacePoint`].
+//! - **Surface.** [`Surface`] and [`SurfacePoint`]; [`SampleLevel`]s of contact samples, at least [`MIN_CONTACT_SAMPLES`].
 //! - **Recording.** [`Recording`] of [`Metadata`], [`ModalBasis`], [`ResidualCompliance`] ([`NearField`]) and
 //!   [`GravityResponse`]; file format [`FORMAT_VERSION`]. Metadata: [`Support`], [`Material`], [`Damping`], [`MeshCounts`],
-//!   [`MassProperties`], [`Provenance`], and the [`Certificate`] of a [`CertificateEvent`].
+//!   [`MassProperties`], [`Provenance`], and the [`Certificate`] of a [`CertificateEvent`] and of [`CertificateLevel`]s.
 //! - **Table.** [`ImpulseResponse`] of the paper, with its [`Sampling`] and [`ImpulseColumns`] ([`Column`],
 //!   [`ColumnsInMemory`]).
 //! - **Modes.** [`SampledOscillator`] and [`OscillatorState`].
@@ -75,9 +75,9 @@ pub use motion::RigidIntegrator;
 pub use object::ObjectStart;
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
-    Certificate, CertificateEvent, Column, ColumnsInMemory, Damping, FORMAT_VERSION, GravityResponse,
-    ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField,
-    Provenance, Recording, ResidualCompliance, Sampling, Support,
+    Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory, Damping, FORMAT_VERSION,
+    GravityResponse, ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata,
+    ModalBasis, NearField, Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
 pub use response::{OscillatorState, ResponseForm, SampledOscillator};
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};
@@ -85,4 +85,4 @@ pub use snapshot::{DeformationSnapshot, ResidualFieldCache};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
 pub use state::{ObjectSnapshot, State};
 pub use step::step;
-pub use surface::{Surface, SurfacePoint};
+pub use surface::{MIN_CONTACT_SAMPLES, SampleLevel, Surface, SurfacePoint};

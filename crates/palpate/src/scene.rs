@@ -8,6 +8,7 @@ use crate::object::{Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
 use crate::recording::Recording;
 use crate::response::ResponseForm;
+use crate::surface::MIN_CONTACT_SAMPLES;
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
@@ -75,9 +76,6 @@ pub struct ModelObject {
     /// Coulomb's coefficient of friction against other objects [1]; of a pair, the geometric mean.
     pub friction: f64,
 }
-
-/// Lower limit of `max_contact_samples`: fewer do not support a face.
-const MIN_CONTACT_SAMPLES: usize = 8;
 
 /// Default coefficient of friction between objects [1]: rubber on wood.
 const FRICTION: f64 = 0.5;

@@ -60,6 +60,13 @@ fn a_recorded_box_has_the_counts_mass_and_frequencies_of_a_box() {
     assert!(number(&certificate["force_error_max"]) < 0.1, "{certificate}");
     assert_eq!(certificate["samples"], 12);
     assert_eq!(certificate["modes_of"], serde_json::json!([20, 64 * 3 - 6]));
+    // Levels of contact samples: ever fewer, wider apart, and none off by more than the cube's half diagonal.
+    let levels = certificate["sample_levels"].as_array().expect("levels");
+    assert!(levels.last().is_some_and(|level| number(&level["samples"]) <= 8.0), "{certificate}");
+    assert!(levels.is_sorted_by_key(|level| number(&level["spacing_m"])), "{certificate}");
+    assert!(levels.iter().all(|level| number(&level["hausdorff_distance_m"]) < 0.0867), "{certificate}");
+    let line = format!("    level 1              {} contact samples, spacing ", levels[0]["samples"]);
+    assert!(printed.contains(&line), "{printed}");
     assert_eq!(recording["support"], "free");
     assert_eq!(recording["provenance"]["source"], "box:0.1x0.1x0.1/3x3x3");
 

@@ -1,7 +1,8 @@
 //! Content of recordings, closed forms, and refused input.
 
 use glam::DVec3;
-use palpate::Damping;
+use palpate::{Damping, MIN_CONTACT_SAMPLES};
+use palpate_fem::mesh::ball_mesh;
 use palpate_fem::{
     ElementOrder, Progress, RecordError, RecordParameters, RecordedBody, ResidualChoice, record,
 };
@@ -280,5 +281,36 @@ fn every_long_stage_can_be_interrupted() {
         let refused = record(mesh, &parameters, &mut listener);
         assert!(matches!(refused, Err(RecordError::Interrupted)), "{stage}");
         assert!(listener.reached.get(), "{stage} was not reached");
+    }
+}
+
+#[test]
+fn a_recorded_ball_holds_its_levels_and_the_certificate_their_chord_sag() {
+    const RADIUS_M: f64 = 0.05;
+    let mesh = ball_mesh(RADIUS_M, 6).expect("a good ball");
+    let recording = recorded(mesh, &parameters(ElementOrder::Linear, 6)).recording;
+    let levels = &recording.sample_levels;
+    assert_eq!(*levels, recording.surface.sample_levels(MIN_CONTACT_SAMPLES));
+    let stated = recording.metadata.certificate.expect("a certificate").sample_levels;
+    assert_eq!(stated.len(), levels.len());
+    let longest = |triangles: &[[u32; 3]]| {
+        let corner = |node: u32| recording.surface.positions[node as usize];
+        let sides = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        sides.map(|(a, b)| (corner(a) - corner(b)).length()).fold(0.0, f64::max)
+    };
+    // Depth of a triangle with corners on the sphere, by its longest side: at least that of the side's middle, at most that of an
+    // equilateral triangle's. The recorded surface has triangles itself.
+    let depth = |half_squared: f64| RADIUS_M - (RADIUS_M * RADIUS_M - half_squared).max(0.0).sqrt();
+    let own = depth(longest(&recording.surface.triangles).powi(2) / 3.0);
+    for (level, stated) in levels.iter().zip(stated) {
+        assert_eq!((stated.samples, stated.spacing_m), (level.nodes.len() as u64, level.spacing));
+        let side = longest(&level.triangles);
+        let distance = stated.hausdorff_distance_m.expect("a ball has a decimated surface");
+        let (low, high) = (depth(side * side / 4.0) - own, depth(side * side / 3.0));
+        assert!(
+            (low..high).contains(&distance),
+            "{} samples: {distance}, {low} to {high}",
+            level.nodes.len()
+        );
     }
 }

@@ -4,6 +4,7 @@
 //! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). The reader
 //! checks the hash, then every length, index and number, and allocates no more than the file's size.
 
+use super::sample_levels::LevelLists;
 use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
 use crate::error::{Error, RecordingError};
 use crate::surface::Surface;
@@ -127,6 +128,18 @@ impl Recording {
                 tensor_f64(&[3 * n, 3], gravity.residual_displacements.iter().copied()),
             ));
         }
+        if !self.sample_levels.is_empty() {
+            let lists = LevelLists::new(&self.sample_levels);
+            let (levels, triangles) = (lists.spacings.len(), lists.triangles.len() / 3);
+            tensors.push(("samples.spacings", tensor_f64(&[levels], lists.spacings.into_iter())));
+            tensors.push(("samples.offsets", tensor_u32(&[levels + 1], lists.offsets.into_iter())));
+            tensors.push(("samples.nodes", tensor_u32(&[lists.nodes.len()], lists.nodes.into_iter())));
+            tensors.push((
+                "samples.triangle_offsets",
+                tensor_u32(&[levels + 1], lists.triangle_offsets.into_iter()),
+            ));
+            tensors.push(("samples.triangles", tensor_u32(&[triangles, 3], lists.triangles.into_iter())));
+        }
         let not_writable = |e: serde_json::Error| RecordingError::NotWritable {
             what: format!("metadata cannot be written: {e}"),
         };
@@ -210,7 +223,20 @@ impl Recording {
         } else {
             None
         };
-        Ok(Self { metadata, surface, modes, residual, gravity })
+        // Older files hold no levels.
+        let sample_levels = if tensors.has("samples.spacings") {
+            let lists = LevelLists {
+                spacings: tensors.f64("samples.spacings")?,
+                offsets: tensors.u32("samples.offsets")?,
+                nodes: tensors.u32("samples.nodes")?,
+                triangle_offsets: tensors.u32("samples.triangle_offsets")?,
+                triangles: tensors.u32("samples.triangles")?,
+            };
+            lists.levels()?
+        } else {
+            Vec::new()
+        };
+        Ok(Self { metadata, surface, modes, residual, gravity, sample_levels })
     }
 }
 
@@ -220,7 +246,7 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> 
     let count = |name: &str| extents(name).and_then(|shape| shape.first()).copied().unwrap_or(0);
     let (nodes, modes) = (count("surface.positions"), count("modes.angular_frequencies"));
     for (name, view) in views {
-        let blocks = count("residual.nodes");
+        let (blocks, levels) = (count("residual.nodes"), count("samples.spacings"));
         let expected: &[usize] = match *name {
             "surface.positions" => &[nodes, 3],
             "surface.triangles" => &[count("surface.triangles"), 3],
@@ -233,6 +259,10 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> 
             "residual.blocks" => &[blocks, 3, 3],
             "gravity.modal_forces" => &[3, modes],
             "gravity.residual_displacements" => &[nodes.saturating_mul(3), 3],
+            "samples.spacings" => &[levels],
+            "samples.offsets" | "samples.triangle_offsets" => &[levels.saturating_add(1)],
+            "samples.nodes" => &[count("samples.nodes")],
+            "samples.triangles" => &[count("samples.triangles"), 3],
             _ => continue,
         };
         if view.shape() != expected {

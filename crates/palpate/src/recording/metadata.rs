@@ -1,6 +1,7 @@
 //! Metadata of a recording; stored as JSON in the file.
 
 use crate::error::{RecordingError, RecordingPart};
+use crate::surface::{SampleLevel, Surface};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -75,8 +76,9 @@ impl Certificate {
             self.bandwidth_hz,
             self.reference_error,
         ]
-        .iter()
-        .all(|number| number.is_finite())
+        .into_iter()
+        .chain(self.sample_levels.iter().flat_map(|level| [level.spacing_m, level.distance_or_zero()]))
+        .all(f64::is_finite)
     }
 }
 
@@ -184,6 +186,42 @@ pub struct Certificate {
     pub worst_at_m: [f64; 3],
     /// Patch radius of the worst sample [m]; 0 for a point.
     pub worst_patch_radius_m: f64,
+    /// Geometric error of each level of contact samples, finest first; empty for a recording that does not hold its levels.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sample_levels: Vec<CertificateLevel>,
+}
+
+/// Geometric error of a level of contact samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CertificateLevel {
+    /// Number of contact samples.
+    pub samples: u64,
+    /// Sample spacing [m].
+    pub spacing_m: f64,
+    /// Hausdorff distance between the surface and the decimated one at rest [m]; none without decimated surface.
+    pub hausdorff_distance_m: Option<f64>,
+}
+
+impl CertificateLevel {
+    /// Geometric error of a level of a surface.
+    pub fn new(surface: &Surface, level: &SampleLevel) -> Self {
+        Self {
+            samples: level.nodes.len() as u64,
+            spacing_m: level.spacing,
+            hausdorff_distance_m: level.hausdorff_distance(surface),
+        }
+    }
+
+    fn distance_or_zero(&self) -> f64 {
+        self.hausdorff_distance_m.unwrap_or_default()
+    }
+
+    /// Whether it is the error of a level.
+    pub(super) fn is_of(&self, level: &SampleLevel) -> bool {
+        self.samples == level.nodes.len() as u64
+            && self.spacing_m == level.spacing
+            && self.hausdorff_distance_m.is_none() == level.triangles.is_empty()
+    }
 }
 
 /// Press of the force error's measurement.

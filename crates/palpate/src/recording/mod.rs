@@ -4,17 +4,18 @@ mod file;
 mod impulse_response;
 mod metadata;
 mod residual;
+mod sample_levels;
 
 pub use file::FORMAT_VERSION;
 pub use impulse_response::{Column, ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
 pub use metadata::{
-    Certificate, CertificateEvent, Damping, MassProperties, Material, MeshCounts, Metadata, Provenance,
-    Support,
+    Certificate, CertificateEvent, CertificateLevel, Damping, MassProperties, Material, MeshCounts, Metadata,
+    Provenance, Support,
 };
 pub use residual::{NearField, ResidualCompliance};
 
 use crate::error::{Error, RecordingError, RecordingPart};
-use crate::surface::Surface;
+use crate::surface::{SampleLevel, Surface};
 use alloc::format;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -33,6 +34,8 @@ pub struct Recording {
     pub residual: ResidualCompliance,
     /// Sag of a body with fixed nodes under its weight; none for a free body.
     pub gravity: Option<GravityResponse>,
+    /// Levels of contact samples, finest first; empty: a model makes them.
+    pub sample_levels: Vec<SampleLevel>,
 }
 
 /// Elastic modes, orthonormal in the mass matrix: ΦᵀMΦ = I.
@@ -181,6 +184,7 @@ impl Recording {
             return fail(Mass, "the inertia tensor is not one of a body: symmetric, positive definite, and no principal value above the sum of the others".into());
         }
         self.metadata.validate()?;
+        self.validate_sample_levels()?;
         match (&self.gravity, self.metadata.support) {
             (None, Support::Free) => Ok(()),
             (Some(gravity), Support::Fixed)

@@ -6,19 +6,11 @@ use super::dot_products::{dot3, dot3_single};
 use super::patch_field::{FactoredForce, ModalDistances, PatchField, SampleSurface, residual_size};
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, poisson_disk_sample,
-    triangles_around,
+    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
-
-/// Upper limit of levels of contact samples.
-const MAX_LEVELS: usize = 24;
-
-/// Ratio of sample spacings of successive levels: for more samples than `MANY_SAMPLES`, and for fewer.
-const SPACING_RATIOS: [f64; 2] = [2.0, 1.45];
-const MANY_SAMPLES: usize = 4096;
 
 /// Ratio of patch radius to sample spacing, with which a landing cube bounces as high as with all nodes.
 const PATCH_OVERLAP: f64 = 1.5;
@@ -94,18 +86,8 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
-        let mut spacing = edge;
-        let mut count = recording.surface.positions.len();
-        for _ in 0..MAX_LEVELS {
-            if count <= max_contact_samples {
-                break;
-            }
-            spacing *= SPACING_RATIOS[usize::from(count <= MANY_SAMPLES)];
-            let nodes = poisson_disk_sample(&recording.surface, spacing);
-            if nodes.len() < count {
-                count = nodes.len();
-                patches.push(PatchField::at_samples(&recording, &nodes, PATCH_OVERLAP * spacing));
-            }
+        for level in &*recording.levels_down_to(max_contact_samples) {
+            patches.push(PatchField::at_samples(&recording, level, PATCH_OVERLAP * level.spacing));
         }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {

@@ -13,7 +13,7 @@
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
 use crate::surface::{
-    Bands, Bounds, PatchWeights, SphereTree, Surface, SurfacePoint, band, decimate, node_normals,
+    Bands, Bounds, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, band, node_normals,
 };
 use alloc::vec;
 use alloc::vec::Vec;
@@ -54,9 +54,9 @@ pub(crate) struct SampleSurface {
     indices: Vec<u32>,
     /// Surface node of each sample.
     nodes: Vec<u32>,
-    /// Decimated surface; a degenerate triangle per sample where decimation fails.
+    /// Decimated surface; a degenerate triangle per sample where the level has none.
     pub(crate) surface: Surface,
-    /// Whether decimation succeeded.
+    /// Whether the level has a decimated surface.
     pub(crate) is_surface: bool,
     /// Outward unit normal of each sample at rest; zero where it has none.
     normals: Vec<DVec3>,
@@ -69,12 +69,13 @@ pub(crate) struct SampleSurface {
 const NONE: u32 = u32::MAX;
 
 impl SampleSurface {
-    pub(crate) fn new(surface: &Surface, nodes: &[u32]) -> Self {
+    pub(crate) fn new(surface: &Surface, level: &SampleLevel) -> Self {
+        let nodes = &level.nodes;
         let mut indices = vec![NONE; surface.positions.len()];
         nodes.iter().enumerate().for_each(|(index, &node)| indices[node as usize] = index as u32);
-        let decimated = decimate(surface, nodes);
-        let is_surface = decimated.is_some();
-        let triangles = decimated.unwrap_or_else(|| nodes.iter().map(|&node| [node; 3]).collect());
+        let is_surface = !level.triangles.is_empty();
+        let triangles =
+            if is_surface { level.triangles.clone() } else { nodes.iter().map(|&node| [node; 3]).collect() };
         let mut triangle = vec![0; nodes.len()];
         for (t, corners) in triangles.iter().enumerate() {
             corners.iter().for_each(|node| triangle[indices[*node as usize] as usize] = t as u32);
@@ -83,7 +84,7 @@ impl SampleSurface {
         let normals = nodes.iter().map(|&node| normals[node as usize]).collect();
         let tree = SphereTree::new(&surface.positions, &triangles);
         let surface = Surface { triangles, ..surface.clone() };
-        Self { indices, nodes: nodes.to_vec(), surface, is_surface, normals, triangle, tree }
+        Self { indices, nodes: nodes.clone(), surface, is_surface, normals, triangle, tree }
     }
 
     /// Surface nodes of the samples.
@@ -117,10 +118,10 @@ impl PatchField {
         Self { bounds, ..field }
     }
 
-    /// Patches about contact samples.
-    pub(crate) fn at_samples(recording: &Recording, nodes: &[u32], radius: f64) -> Self {
-        let samples = SampleSurface::new(&recording.surface, nodes);
-        let field = Self { samples: Some(samples), ..Self::without_bounds(recording, nodes, radius) };
+    /// Patches about the contact samples of a level.
+    pub(crate) fn at_samples(recording: &Recording, level: &SampleLevel, radius: f64) -> Self {
+        let samples = SampleSurface::new(&recording.surface, level);
+        let field = Self { samples: Some(samples), ..Self::without_bounds(recording, &level.nodes, radius) };
         let samples = field.samples.as_ref();
         let bounds =
             samples.map(|samples| field.bounds(recording, &samples.tree, &samples.surface.triangles));

@@ -7,12 +7,15 @@ mod decimation;
 mod patch_weights;
 mod poisson_disk;
 mod quadratic_face;
+mod sample_level;
 mod sphere_tree;
 mod triangle;
 
 pub(crate) use decimation::decimate;
 pub(crate) use patch_weights::{PatchWeights, triangles_around};
 pub(crate) use poisson_disk::{node_normals, poisson_disk_sample};
+pub(crate) use sample_level::MAX_LEVELS;
+pub use sample_level::{MIN_CONTACT_SAMPLES, SampleLevel};
 pub(crate) use sphere_tree::{
     Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
 };

@@ -14,7 +14,7 @@
 //!
 //! Equations: docs/theory.md (C14), (C15), (C16).
 
-use super::Surface;
+use super::{Surface, at_weights, nearest_on_triangle};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -262,6 +262,45 @@ impl SphereTree {
 
     fn triangles_of(&self, node: &TreeNode) -> impl Iterator<Item = u32> + '_ {
         self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
+    }
+
+    /// Distance [m] at rest of a point from the nearest triangle, or from the first one found within `enough` [m].
+    pub(crate) fn distance(
+        &self,
+        (positions, triangles): (&[DVec3], &[[u32; 3]]),
+        point: DVec3,
+        enough: f64,
+    ) -> f64 {
+        let gap = |at: u32| {
+            let node = &self.nodes[at as usize];
+            (point - positions[node.centre as usize]).length() - node.radius
+        };
+        let mut least = f64::INFINITY;
+        let Traversal { mut stack, mut depth, .. } =
+            if self.nodes.is_empty() { Traversal::FINISHED } else { Traversal::START };
+        while depth > 0 && least > enough {
+            depth -= 1;
+            let at = stack[depth];
+            if gap(at) >= least {
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            if node.second == 0 {
+                for triangle in self.triangles_of(node) {
+                    let corners = triangles[triangle as usize].map(|n| positions[n as usize]);
+                    let nearest = at_weights(corners, nearest_on_triangle(corners, point));
+                    least = least.min((point - nearest).length());
+                }
+            } else {
+                // The nearer child is visited first.
+                let (first, second) = (at + 1, node.second);
+                let nearer_first = gap(first) <= gap(second);
+                (stack[depth], stack[depth + 1]) =
+                    if nearer_first { (second, first) } else { (first, second) };
+                depth += 2;
+            }
+        }
+        least
     }
 
     /// Traverse the tree. `near` decides by kind of centre, centre [m] and radius [m] whether a sphere is entered: about the

@@ -54,5 +54,6 @@ fn cut_in_four(coarse: &Recording) -> Recording {
         modes: ModalBasis { mode_shapes, ..coarse.modes.clone() },
         residual: ResidualCompliance::Whole(packed),
         gravity: None,
+        sample_levels: Vec::new(),
     }
 }

@@ -1,0 +1,251 @@
+//! Levels of contact samples in recording files: the released form is readable, damaged levels are refused, and stored levels are those
+//! that a model makes of the surface.
+
+use glam::DVec3;
+use palpate::{
+    Certificate, CertificateLevel, Error, Input, MIN_CONTACT_SAMPLES, Model, ModelObject, ModelParameters,
+    ObjectStart, Obstacle, Pose, Recording, RecordingError, RecordingPart, Shape, State, Twist, step,
+};
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+use std::sync::Arc;
+
+const BALL: &[u8] = include_bytes!("../../../data/recordings/v1_levels/ball.palp");
+
+fn ball() -> Recording {
+    Recording::from_bytes(BALL).expect("a released recording")
+}
+
+/// Recording in the form before levels.
+fn without_levels(recording: &Recording) -> Recording {
+    let mut old = recording.clone();
+    old.sample_levels.clear();
+    let certificate = old.metadata.certificate.take();
+    old.metadata.certificate =
+        certificate.map(|certificate| Certificate { sample_levels: Vec::new(), ..certificate });
+    old
+}
+
+#[test]
+fn files_with_levels_are_read_and_written_back_to_the_same_bytes() {
+    let ball = ball();
+    assert_eq!(ball.metadata.format_version, 1);
+    let counts: Vec<usize> = ball.sample_levels.iter().map(|level| level.nodes.len()).collect();
+    assert!(
+        counts.len() > 1 && counts.last().is_some_and(|&count| count <= MIN_CONTACT_SAMPLES),
+        "{counts:?}"
+    );
+    assert_eq!(ball.to_bytes().expect("it can be written"), BALL);
+}
+
+#[test]
+fn certificate_states_the_levels_of_the_file() {
+    let ball = ball();
+    let stated = &ball.metadata.certificate.as_ref().expect("a certificate").sample_levels;
+    let measured: Vec<CertificateLevel> =
+        ball.sample_levels.iter().map(|level| CertificateLevel::new(&ball.surface, level)).collect();
+    assert_eq!(*stated, measured);
+}
+
+#[test]
+fn levels_of_an_old_file_are_those_that_a_new_one_holds() {
+    let ball = ball();
+    let bytes = without_levels(&ball).to_bytes().expect("it can be written");
+    let text = String::from_utf8_lossy(&bytes);
+    assert!(!text.contains("samples.") && !text.contains("sample_levels"), "the form before levels");
+    let old = Recording::from_bytes(&bytes).expect("an old file");
+    assert!(old.sample_levels.is_empty());
+    assert_eq!(old.surface.sample_levels(MIN_CONTACT_SAMPLES), ball.sample_levels);
+}
+
+#[test]
+fn stored_levels_give_the_same_steps_as_levels_made_with_the_model() {
+    let ball = ball();
+    let contacts = |recording: &Recording, max_contact_samples: usize| {
+        let floor =
+            Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
+        let parameters = ModelParameters {
+            gravity: DVec3::Y * -9.81,
+            obstacles: vec![floor],
+            max_contact_samples,
+            ..ModelParameters::default()
+        };
+        let start = |height: f64| ObjectStart {
+            pose: Pose { position: DVec3::new(0.01 * height, height, 0.0), ..Pose::IDENTITY },
+            twist: Twist::ZERO,
+        };
+        let recording = Arc::new(recording.clone());
+        let objects = [0.051, 0.155].map(|height| ModelObject::new(recording.clone(), start(height)));
+        let model = Model::new(parameters, objects.into()).expect("a model");
+        let mut state = State::new(&model);
+        let mut all = Vec::new();
+        for _ in 0..200 {
+            all.extend(step(&model, &mut state, &Input::default()).contacts.iter().cloned());
+        }
+        all
+    };
+    for max_contact_samples in [8, 12, 20] {
+        let stored = contacts(&ball, max_contact_samples);
+        assert!(!stored.is_empty());
+        assert_eq!(stored, contacts(&without_levels(&ball), max_contact_samples), "{max_contact_samples}");
+    }
+}
+
+/// Bytes of a tensor after a change, in a file whose hash fits; `None` leaves the tensor out.
+fn changed(name: &str, change: impl Fn(&[u8]) -> Option<Vec<u8>>) -> Vec<u8> {
+    let file = SafeTensors::deserialize(BALL).expect("a container");
+    let (_, header) = SafeTensors::read_metadata(BALL).expect("a header");
+    let json = &header.metadata().as_ref().expect("metadata")["palpate"];
+    let end = json.rfind(",\"content_hash\"").expect("a hash");
+    let metadata = &json["{\"metadata\":".len()..end];
+    let mut tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
+    for (own, view) in file.iter() {
+        let bytes = if own == name { change(view.data()) } else { Some(view.data().to_vec()) };
+        let Some(bytes) = bytes else { continue };
+        let mut shape = view.shape().to_vec();
+        shape[0] = shape[0] * bytes.len() / view.data().len();
+        tensors.push((own.into(), view.dtype(), shape, bytes));
+    }
+    tensors.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(metadata.as_bytes());
+    for (name, _, shape, bytes) in &tensors {
+        hasher.update(name.as_bytes());
+        shape.iter().for_each(|&extent| {
+            hasher.update(&(extent as u64).to_le_bytes());
+        });
+        hasher.update(bytes);
+    }
+    let header = format!("{{\"metadata\":{metadata},\"content_hash\":\"{}\"}}", hasher.finalize().to_hex());
+    let views = tensors.iter().map(|(name, dtype, shape, bytes)| {
+        (name.as_str(), TensorView::new(*dtype, shape.clone(), bytes).expect("a tensor"))
+    });
+    let header = [("palpate".to_string(), header)];
+    safetensors::serialize(views, Some(header.into_iter().collect())).expect("a container")
+}
+
+/// A change of the u32 at an index; from the end where it is negative.
+fn with_u32(at: isize, value: u32) -> impl Fn(&[u8]) -> Option<Vec<u8>> {
+    move |bytes| {
+        let mut bytes = bytes.to_vec();
+        let start = (4 * at).rem_euclid(bytes.len() as isize) as usize;
+        bytes[start..start + 4].copy_from_slice(&value.to_le_bytes());
+        Some(bytes)
+    }
+}
+
+fn with_f64(at: usize, value: f64) -> impl Fn(&[u8]) -> Option<Vec<u8>> {
+    move |bytes| {
+        let mut bytes = bytes.to_vec();
+        bytes[8 * at..8 * at + 8].copy_from_slice(&value.to_le_bytes());
+        Some(bytes)
+    }
+}
+
+#[test]
+fn damaged_levels_are_refused_with_the_finding() {
+    let same = |bytes: &[u8]| Some(bytes.to_vec());
+    assert!(
+        Recording::from_bytes(&changed("samples.nodes", same)) == Ok(ball()),
+        "the hash is computed here"
+    );
+    let ball = ball();
+    let (first, second) = (ball.sample_levels[0].nodes[0], ball.sample_levels[0].nodes[1]);
+    let other = (0..).find(|node| !ball.sample_levels[0].nodes.contains(node)).expect("a node");
+    let inner = ball.sample_levels[0].nodes.len();
+    let offsets = "the offsets of the levels of contact samples do not fit together";
+    let level = "level 0 of contact samples: ";
+    let cases: [(Vec<u8>, String); 15] = [
+        (
+            changed("samples.nodes", with_u32(0, 42)),
+            format!("{level}sample node 42 is beyond the surface's 42 nodes"),
+        ),
+        (
+            changed("samples.nodes", with_u32(0, u32::MAX)),
+            format!("{level}sample node 4294967295 is beyond the surface's 42 nodes"),
+        ),
+        (changed("samples.nodes", with_u32(0, second)), format!("{level}node {second} is a sample twice")),
+        (
+            changed("samples.triangles", with_u32(0, u32::MAX)),
+            format!("{level}triangle 0 names node 4294967295, which is no sample"),
+        ),
+        (
+            changed("samples.triangles", with_u32(0, other)),
+            format!("{level}triangle 0 names node {other}, which is no sample"),
+        ),
+        (changed("samples.offsets", with_u32(0, 1)), offsets.into()),
+        (changed("samples.offsets", with_u32(1, u32::MAX)), offsets.into()),
+        (changed("samples.offsets", with_u32(-1, u32::MAX)), offsets.into()),
+        (changed("samples.triangle_offsets", with_u32(-1, 1)), offsets.into()),
+        (
+            changed("samples.offsets", with_u32(1, 0)),
+            format!("{level}0 samples, expected 1 or more and below 42"),
+        ),
+        (
+            changed("samples.spacings", with_f64(0, f64::NAN)),
+            format!("{level}the spacing is NaN m, expected a finite number above 0e0"),
+        ),
+        (
+            changed("samples.spacings", with_f64(0, -0.01)),
+            format!("{level}the spacing is -1e-2 m, expected a finite number above 0e0"),
+        ),
+        (
+            changed("samples.spacings", with_f64(0, 1e300)),
+            format!("{level}the spacing is 1e300 m, expected a finite number above 0e0"),
+        ),
+        (
+            changed("samples.spacings", with_f64(0, 0.001)),
+            "the certificate states other levels of contact samples than the recording holds".into(),
+        ),
+        (changed("samples.triangles", |_| None), "the tensor samples.triangles is missing".into()),
+    ];
+    for (bytes, expected) in cases {
+        let refusal = Recording::from_bytes(&bytes).expect_err(&expected);
+        assert_eq!(refusal.to_string(), format!("not a usable recording: {expected}"));
+    }
+    let short = changed("samples.offsets", |bytes| Some(bytes[4..].to_vec()));
+    assert!(matches!(
+        Recording::from_bytes(&short),
+        Err(Error::Recording(RecordingError::WrongShape { .. }))
+    ));
+    let kind = |change: &dyn Fn(&mut Recording)| {
+        let mut recording = ball.clone();
+        change(&mut recording);
+        match recording.validate() {
+            Err(Error::Recording(RecordingError::Inconsistent { part, what })) => Some((part, what)),
+            _ => None,
+        }
+    };
+    let part = RecordingPart::SampleLevels;
+    let what = format!("level 0 of contact samples: sample node {first} is a corner of no triangle");
+    let found = kind(&|recording| {
+        recording.sample_levels[0].triangles.retain(|corners| !corners.contains(&first));
+    });
+    assert_eq!(found, Some((part, what)));
+    let what = format!("level 1 of contact samples: {inner} samples, expected 1 or more and below {inner}");
+    let found = kind(&|recording| {
+        let mut level = recording.sample_levels[0].clone();
+        level.spacing *= 1.1;
+        recording.sample_levels.insert(1, level);
+    });
+    assert_eq!(found, Some((part, what)));
+    let what = "25 levels of contact samples, expected 24 at most".into();
+    let found = kind(&|recording| {
+        let level = recording.sample_levels[0].clone();
+        recording.sample_levels = vec![level; 25];
+    });
+    assert_eq!(found, Some((part, what)));
+}
+
+#[test]
+fn truncated_or_changed_file_with_levels_is_refused() {
+    for length in (0..BALL.len()).step_by(7) {
+        assert!(Recording::from_bytes(&BALL[..length]).is_err(), "cut to {length} bytes");
+    }
+    let mut bytes = BALL.to_vec();
+    for at in (0..bytes.len()).step_by(7) {
+        bytes[at] ^= 0x11;
+        assert!(Recording::from_bytes(&bytes).is_err(), "byte {at}");
+        bytes[at] ^= 0x11;
+    }
+}
