@@ -1,5 +1,5 @@
-//! Rebuilds the crate when the embedded page in `viewer/dist` changes; `cargo xtask viewer` builds it.
+//! Rebuilds the crate when the embedded page changes: `page` is a link to `viewer/dist`, which `cargo xtask viewer` builds.
 
 fn main() {
-    println!("cargo:rerun-if-changed=../../viewer/dist");
+    println!("cargo:rerun-if-changed=page");
 }

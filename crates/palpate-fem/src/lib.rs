@@ -7,6 +7,7 @@
 //! - [`mesh`]: readers (Gmsh, VTK; OBJ and STL surfaces), boxes and balls.
 //! - [`RecordParameters`]: materials, element order, modes, damping, supports.
 //! - [`table`]: impulse responses for direct convolution, from a [`RecordedBody`].
+//! - [`paper_cube`]: the cube of the paper.
 //! - [`reference`]: the unreduced finite element solution, for verification.
 #![doc = "\n"]
 #![doc = include_str!("../README.md")]
@@ -22,6 +23,7 @@ mod material;
 mod memory;
 pub mod mesh;
 mod modes;
+pub mod paper_cube;
 mod progress;
 mod record;
 mod record_error;

@@ -57,7 +57,9 @@ pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
 pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer};
 #[doc(no_inline)]
-pub use timing::{Cycle, CycleReceiver, CycleSender, DurationHistogram, Percentiles, Timing, cycle_channel};
+pub use timing::{
+    Cycle, CycleReceiver, CycleSender, DurationHistogram, Percentiles, Timing, cycle_channel, percentile_us,
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -169,8 +169,15 @@ impl Safety {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_testkit::Random;
 
     const DT: f64 = 1e-3;
+
+    /// Round-off of a ramp [1]: a few hundred sums of shares.
+    const RAMP_ROUND_OFF: f64 = 1e-9;
+
+    /// Round-off of a force that is scaled to a length [N], and relative to it [1].
+    const SCALED: f64 = 1e-12;
 
     fn armed() -> Safety {
         let mut safety = Safety::new(SafetyLimits::default());
@@ -184,7 +191,7 @@ mod tests {
         assert_eq!(safety.limit(DVec3::X, 0.0, 0.0, DT), DVec3::ZERO);
         safety.arm(true);
         let forces: Vec<f64> = (0..600).map(|_| safety.limit(DVec3::X, 0.0, 0.0, DT).x).collect();
-        assert!((forces[249] - 0.5).abs() < 1e-9, "{}", forces[249]);
+        assert!((forces[249] - 0.5).abs() < RAMP_ROUND_OFF, "{}", forces[249]);
         assert_eq!(forces[599], 1.0);
         assert!(forces.windows(2).all(|f| f[1] >= f[0]));
         assert_eq!(safety.counts(), SafetyCounts::default());
@@ -225,24 +232,21 @@ mod tests {
     fn whatever_comes_in_what_goes_out_is_finite_small_and_slow() {
         let mut safety = armed();
         let limits = SafetyLimits::default();
-        let mut random = 12_345_u64;
+        let mut random = Random::new(12_345);
         let mut last = DVec3::ZERO;
-        let mut number = || {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            match random >> 60 {
-                0 => f64::NAN,
-                1 => f64::INFINITY,
-                2 => -1e300,
-                3 => 0.0,
-                _ => ((random >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 20.0,
-            }
+        let mut number = || match (random.unit() * 16.0) as u32 {
+            0 => f64::NAN,
+            1 => f64::INFINITY,
+            2 => -1e300,
+            3 => 0.0,
+            _ => random.within(-10.0, 10.0),
         };
         for _ in 0..200_000 {
             let force = DVec3::new(number(), number(), number());
             let given = safety.limit(force, number().abs() * 0.002, number().abs() * 0.25, DT);
-            assert!(given.is_finite() && given.length() <= limits.force_n * (1.0 + 1e-12), "{given}");
+            assert!(given.is_finite() && given.length() <= limits.force_n * (1.0 + SCALED), "{given}");
             let fastest = limits.slew_n_s * DT;
-            assert!((given - last).length() <= fastest + 1e-12 || given == DVec3::ZERO, "{given} {last}");
+            assert!((given - last).length() <= fastest + SCALED || given == DVec3::ZERO, "{given} {last}");
             last = given;
         }
         let counts = safety.counts();

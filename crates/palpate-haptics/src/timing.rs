@@ -118,6 +118,12 @@ impl Default for DurationHistogram {
     }
 }
 
+/// Quantile [µs] of sorted durations [ns]; 0 of none.
+pub fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
+    let at = (share * sorted_ns.len() as f64).ceil() as usize;
+    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
+}
+
 impl DurationHistogram {
     /// Records a duration.
     ///
@@ -173,6 +179,14 @@ impl Timing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn percentile_of_sorted_durations_is_one_of_them() {
+        let durations = [1000, 2000, 3000, 4000];
+        let expected = [(0.0, 1.0), (0.5, 2.0), (0.51, 3.0), (1.0, 4.0)];
+        assert!(expected.iter().all(|(share, us)| percentile_us(&durations, *share) == *us));
+        assert_eq!(percentile_us(&[], 0.5), 0.0);
+    }
 
     #[test]
     fn percentiles_are_those_of_the_cycles_that_were_sent() {

@@ -2,20 +2,12 @@
 
 use crate::error::ReproduceError;
 use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
-use palpate_fem::{Progress, RecordExtent, RecordParameters, RecordedBody};
-use palpate_scene::{RecordingRecipe, paper_cube};
-
-/// Parameters of the paper's cube.
-fn parameters(cells: u32, modes: usize) -> RecordParameters {
-    let source = format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}");
-    RecordingRecipe { source, modes, ..paper_cube() }.parameters(1)
-}
+use palpate_fem::{Progress, RecordExtent, RecordParameters, RecordedBody, paper_cube};
 
 /// The paper's cube with a number of cells along each side, without certificate.
 pub fn cube(cells: u32, modes: usize, progress: &mut dyn Progress) -> Result<RecordedBody, ReproduceError> {
-    damped_cube(cells, modes, parameters(cells, modes).damping, progress)
+    damped_cube(cells, modes, paper_cube::DAMPING, progress)
 }
 
 /// The cube with another damping.
@@ -25,9 +17,9 @@ pub fn damped_cube(
     damping: Damping,
     progress: &mut dyn Progress,
 ) -> Result<RecordedBody, ReproduceError> {
-    let parameters =
-        RecordParameters { damping, extent: RecordExtent::NoCertificate, ..parameters(cells, modes) };
-    Ok(RecordedBody::new(box_mesh([0.1; 3], [cells; 3])?, &parameters, progress)?)
+    let extent = RecordExtent::NoCertificate;
+    let parameters = RecordParameters { damping, extent, ..paper_cube::parameters(cells, modes) };
+    Ok(RecordedBody::new(paper_cube::mesh(cells)?, &parameters, progress)?)
 }
 
 /// A table in closed form of a free body, end of step, in memory; `change` maps every number of it.

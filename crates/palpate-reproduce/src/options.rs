@@ -1,5 +1,6 @@
 //! Options of a reproduction.
 
+use palpate_fem::paper_cube::CELLS;
 use std::path::PathBuf;
 
 /// A part that can be made by itself; in the order of the paper.
@@ -32,6 +33,32 @@ impl Part {
         Self::Fall,
         Self::Shake,
     ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Recording => "recording",
+            Self::Impulses => "impulses",
+            Self::Passivity => "passivity",
+            Self::Agreement => "agreement",
+            Self::Cost => "cost",
+            Self::Fall => "fall",
+            Self::Shake => "shake",
+        }
+    }
+
+    /// Content, as part of a sentence.
+    pub fn content(self) -> &'static str {
+        match self {
+            Self::Recording => "Table 1",
+            Self::Impulses => "Figures 2 and 3, and the arrival of the wave",
+            Self::Passivity => "Passivity of the samples",
+            Self::Agreement => "Both forms of the response, both ways of recording",
+            Self::Cost => "Section 2.5",
+            Self::Fall => "Figure 5(a)",
+            Self::Shake => "Figure 5(b)",
+        }
+    }
 }
 
 /// Thoroughness of the measurements.
@@ -43,6 +70,13 @@ pub struct Effort {
     pub columns: usize,
     /// Steps that are timed per point of a curve.
     pub steps: usize,
+}
+
+impl Default for Effort {
+    /// The paper's mesh, and enough columns and steps for three digits.
+    fn default() -> Self {
+        Self { cells: CELLS, columns: 96, steps: 4000 }
+    }
 }
 
 /// Options of [`reproduce`](crate::reproduce).

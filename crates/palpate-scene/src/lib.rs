@@ -28,7 +28,7 @@ pub use devices::{ANY_HAND, MAX_FORCE_N, RealDevice, find_device_traits, find_dr
 pub use error::{SceneError, SceneErrorKind};
 pub use file::{Relocated, RunMode, read_path, read_relocated_scene, read_scene};
 pub use library::{
-    BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube,
+    BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube_recipe,
 };
 pub use mesh_source::{read_mesh, read_surface, source_name};
 pub use palpate_fem::{Progress, SilentProgress};

@@ -2,17 +2,15 @@
 
 use palpate::{DeviceMode, RigidIntegrator};
 use palpate_scene::{RunMode, Scene, SceneError, SceneErrorKind, read_scene};
+use palpate_testkit::FREE_BLOCK_FILE;
 use std::path::Path;
 use tempfile::TempDir;
-
-/// Recording of a cube with a side of 2 m, about the origin.
-const RECORDING: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
 
 /// A scene in a folder with a recording `cube.palp` and a path `path.csv`.
 fn read(text: &str) -> Result<Scene, SceneError> {
     let folder = TempDir::new().expect("a temporary folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).expect("a file");
-    write("cube.palp", RECORDING);
+    write("cube.palp", FREE_BLOCK_FILE);
     write("path.csv", b"t,x,y,z\n0,0,0,3\n1,0,0,2\n");
     write("scene.toml", text.as_bytes());
     read_scene(&folder.path().join("scene.toml"), RunMode::Offline)

@@ -1,15 +1,14 @@
 //! Library of scenes: pointers are added, settings change the text, and the last scene stays when a change is refused.
 
 use palpate_scene::{SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
+use palpate_testkit::FREE_BLOCK_FILE;
 use tempfile::TempDir;
-
-const RECORDING: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
 
 #[test]
 fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("scene.toml");
-    std::fs::write(folder.path().join("cube.palp"), RECORDING).expect("a file");
+    std::fs::write(folder.path().join("cube.palp"), FREE_BLOCK_FILE).expect("a file");
     let text = "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nfriction = 0.3\n";
     std::fs::write(&path, text).expect("a file");
     let library = SceneLibrary::new(Some(&folder.path().join("cache"))).expect("a library");

@@ -4,6 +4,7 @@ use crate::recording_cache::recorded_once;
 use glam::DVec3;
 use palpate::{Damping, Material, Recording};
 use palpate_fem::mesh::Mesh;
+use palpate_fem::paper_cube::{DENSITY_KG_M3, POISSON, YOUNG_PA};
 use palpate_fem::{ElementOrder, RecordError, RecordExtent, RecordParameters, ResidualChoice};
 use std::sync::Arc;
 
@@ -19,6 +20,14 @@ pub struct ElasticMaterial {
     /// β [s].
     pub stiffness_damping_s: f64,
 }
+
+/// Material of the paper's cube with the damping of the reference solution of its fall, β = 10⁻⁴ s.
+pub const PAPER_MATERIAL: ElasticMaterial = ElasticMaterial {
+    young_pa: YOUNG_PA,
+    poisson: POISSON,
+    density_kg_m3: DENSITY_KG_M3,
+    stiffness_damping_s: 1e-4,
+};
 
 impl ElasticMaterial {
     /// Parameters of a recording without certificate.
@@ -54,10 +63,19 @@ impl ElasticMaterial {
         modes: usize,
         fixed: impl Fn(DVec3) -> bool,
     ) -> Result<Arc<Recording>, RecordError> {
-        let fixed_nodes = (0..mesh.nodes.len()).filter(|&node| fixed(mesh.nodes[node]));
-        let fixed_nodes = fixed_nodes.map(|node| node as u32).collect();
+        let fixed_nodes = nodes_where(&mesh, fixed);
         recorded_once(mesh, &RecordParameters { fixed_nodes, ..self.parameters(order, modes) })
     }
+}
+
+/// Nodes of a mesh where a condition holds for their position [m].
+pub fn nodes_where(mesh: &Mesh, holds: impl Fn(DVec3) -> bool) -> Vec<u32> {
+    (0..mesh.nodes.len() as u32).filter(|&node| holds(mesh.nodes[node as usize])).collect()
+}
+
+/// A material of all regions: E [Pa], ν, ρ [kg/m³].
+pub const fn isotropic(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
+    Material { region: String::new(), young_pa, poisson, density_kg_m3 }
 }
 
 /// Parameters of an undamped body of one material: E [Pa], ν, ρ [kg/m³].
@@ -69,7 +87,7 @@ pub fn undamped(
     modes: usize,
 ) -> RecordParameters {
     RecordParameters {
-        materials: vec![Material { region: String::new(), young_pa, poisson, density_kg_m3 }],
+        materials: vec![isotropic(young_pa, poisson, density_kg_m3)],
         order,
         modes,
         damping: Damping::Ratio(0.0),

@@ -25,7 +25,10 @@ pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> Result<RecordedBod
 ///
 /// # Errors
 /// As [`RecordedBody::new`]. What has failed is tried again.
-pub fn recorded_once(mesh: Mesh, parameters: &RecordParameters) -> Result<Arc<Recording>, RecordError> {
+pub(crate) fn recorded_once(
+    mesh: Mesh,
+    parameters: &RecordParameters,
+) -> Result<Arc<Recording>, RecordError> {
     let entry: Entry = {
         let all = RECORDINGS.get_or_init(Mutex::default);
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);

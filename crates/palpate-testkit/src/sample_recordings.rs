@@ -3,19 +3,25 @@
 use palpate::Recording;
 use std::sync::{Arc, OnceLock};
 
-fn read_once(cache: &'static OnceLock<Arc<Recording>>, bytes: &[u8]) -> Arc<Recording> {
-    let read = || Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+/// File of the block that moves freely.
+pub const FREE_BLOCK_FILE: &[u8] = include_bytes!("../recordings/free.palp");
+
+/// File of the block with fixed nodes at one end.
+pub const FIXED_BLOCK_FILE: &[u8] = include_bytes!("../recordings/fixed.palp");
+
+fn read_once(cache: &'static OnceLock<Arc<Recording>>, file: &[u8]) -> Arc<Recording> {
+    let read = || Arc::new(Recording::from_bytes(file).expect("a released recording"));
     cache.get_or_init(read).clone()
 }
 
 /// The block that moves freely.
 pub fn free_block() -> Arc<Recording> {
     static FREE: OnceLock<Arc<Recording>> = OnceLock::new();
-    read_once(&FREE, include_bytes!("../../../data/recordings/v1/free.palp"))
+    read_once(&FREE, FREE_BLOCK_FILE)
 }
 
 /// The block with fixed nodes at one end.
 pub fn fixed_block() -> Arc<Recording> {
     static FIXED: OnceLock<Arc<Recording>> = OnceLock::new();
-    read_once(&FIXED, include_bytes!("../../../data/recordings/v1/fixed.palp"))
+    read_once(&FIXED, FIXED_BLOCK_FILE)
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceParameters, Error, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle,
-    Pose, Recording, Shape, Twist,
+    DeviceInput, DeviceParameters, Error, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart,
+    Obstacle, Output, Pose, Recording, Shape, State, SurfacePoint, Twist,
 };
 use std::sync::Arc;
 
@@ -46,6 +46,26 @@ pub fn scene(
     Model::new(parameters, objects)
 }
 
+/// A model and its initial state.
+///
+/// # Panics
+/// Where [`Model::new`] fails.
+pub fn model_and_state(parameters: ModelParameters, objects: Vec<ModelObject>) -> (Model, State) {
+    let model = Model::new(parameters, objects).expect("a good model");
+    let state = State::new(&model);
+    (model, state)
+}
+
+/// A grasp of an object at a point of a triangle, with barycentric weights [1].
+pub const fn grasp(object: usize, triangle: u32, weights: [f64; 3]) -> Grasp {
+    Grasp { object, point: SurfacePoint { triangle, weights } }
+}
+
+/// One device that holds a point, at an interface point [m].
+pub fn holding(position: DVec3, grasp: Grasp) -> Input {
+    Input { devices: vec![DeviceInput::held(position, grasp)], ..Input::default() }
+}
+
 /// Devices that touch, at interface points [m].
 pub fn touching(positions: &[DVec3]) -> Input {
     Input { devices: positions.iter().map(|&p| DeviceInput::touching(p)).collect(), ..Input::default() }
@@ -54,6 +74,12 @@ pub fn touching(positions: &[DVec3]) -> Input {
 /// Largest coordinate [m] of a body's surface along an axis (0, 1, 2), in its frame.
 pub fn half_extent(recording: &Recording, axis: usize) -> f64 {
     recording.surface.positions.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Imbalance of the energy ledger [J] since a stored energy at the start [J]: what is stored beyond work minus losses.
+pub fn energy_imbalance(output: &Output, stored_at_start: f64) -> f64 {
+    let energy = &output.energy;
+    energy.stored() - stored_at_start - (energy.input - energy.lost())
 }
 
 /// 3s² − 2s³ with s clamped to [0, 1]: even at both ends.

@@ -1,26 +1,36 @@
 //! Contact samples: faces against obstacles at fewer contacts than nodes, on a released recording with a refined surface
 //! (a block of 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
 
-mod refined;
-
 use glam::{DQuat, DVec3};
 use palpate::{
-    DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Output,
-    Pose, Recording, Shape, State, Twist, step,
+    DeviceInput, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, Shape,
+    State, Twist, step,
 };
-use refined::refined;
+use palpate_testkit::{
+    GRAVITY_M_S2, energy_imbalance, finger, floor, free_block, model_and_state, object_at, subdivided,
+};
 use std::sync::Arc;
 
 const H: f64 = 1e-3;
-const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+const GRAVITY: DVec3 = DVec3::new(0.0, -GRAVITY_M_S2, 0.0);
+
+/// Mean force on a block at rest over its weight, minus one [1]: what it still rocks after 5 s.
+const STILL_ROCKS: f64 = 1e-3;
+
+/// Round-off of an energy ledger [J]: thousands of sums of terms below 1 J.
+const LEDGER_ROUND_OFF_J: f64 = 1e-12;
+
+/// Round-off of a momentum [kg·m/s]: thousands of sums of terms below 1 kg·m/s.
+const MOMENTUM_ROUND_OFF: f64 = 1e-12;
+
+/// Relative round-off of contact forces and of what follows from them [1]: the solver keeps nine digits.
+const SOLVED: f64 = 1e-9;
+
+/// Half the block's length less a hundredth [m]: its corners are beyond.
+const AT_THE_CORNERS_M: f64 = 0.099;
 
 fn block() -> Arc<Recording> {
-    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
-    Arc::new(refined(&Recording::from_bytes(bytes).expect("a released recording"), 2))
-}
-
-fn floor(friction: f64) -> Obstacle {
-    Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction }
+    Arc::new(subdivided(&free_block(), 2))
 }
 
 fn on_a_floor(recording: &Arc<Recording>, max_contact_samples: usize, pose: Pose) -> (Model, State) {
@@ -31,25 +41,17 @@ fn on_a_floor(recording: &Arc<Recording>, max_contact_samples: usize, pose: Pose
         ..ModelParameters::default()
     };
     let start = ObjectStart { pose, twist: Twist::ZERO };
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start)]).expect("a model");
-    let state = State::new(&model);
-    (model, state)
+    model_and_state(parameters, vec![ModelObject::new(recording.clone(), start)])
 }
 
 fn at(position: DVec3) -> Pose {
     Pose { position, ..Pose::IDENTITY }
 }
 
-/// Imbalance of the energy ledger since the start [J].
-fn open(output: &Output, start: f64) -> f64 {
-    let e = &output.energy;
-    e.stored() - start - (e.input - e.lost())
-}
-
 #[test]
 fn block_rests_on_contact_samples_as_on_all_nodes() {
     let recording = block();
-    let weight = recording.mass() * 9.81;
+    let weight = recording.mass() * GRAVITY_M_S2;
     for most in [usize::MAX, 24, 12] {
         let (model, mut state) = on_a_floor(&recording, most, at(DVec3::Y * 0.0502));
         let mut force = DVec3::ZERO;
@@ -61,13 +63,13 @@ fn block_rests_on_contact_samples_as_on_all_nodes() {
             }
         }
         let output = state.output();
-        assert!((force - DVec3::Y * weight).length() < 1e-3 * weight, "{most}: {force}");
+        assert!((force - DVec3::Y * weight).length() < STILL_ROCKS * weight, "{most}: {force}");
         // Its corners are among the contacts.
         let pose = output.objects[0].pose;
         let outmost = |side: f64| {
             output.contacts.iter().map(|c| side * (c.point.x - pose.position.x)).fold(0.0, f64::max)
         };
-        assert!(outmost(1.0) > 0.099 && outmost(-1.0) > 0.099, "{most}");
+        assert!(outmost(1.0) > AT_THE_CORNERS_M && outmost(-1.0) > AT_THE_CORNERS_M, "{most}");
         assert!((most == usize::MAX) == (output.contacts.len() > 24), "{}", output.contacts.len());
     }
 }
@@ -86,18 +88,19 @@ fn contact_samples_carry_the_change_of_momentum_and_dissipate_the_lost_energy() 
             let force: DVec3 = output.contacts.iter().map(|c| c.force).sum();
             momentum += (force + GRAVITY * mass) * H;
             let error = (output.objects[0].twist.linear * mass - momentum).length();
-            assert!(error < 1e-12, "step {number}: {error}");
+            assert!(error < MOMENTUM_ROUND_OFF, "step {number}: {error}");
             for contact in &output.contacts {
                 let normal = contact.force.dot(-contact.normal);
                 let across = (contact.force + contact.normal * normal).length();
                 assert!(
-                    normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9),
+                    normal > 0.0 && across <= 0.4 * normal * (1.0 + SOLVED),
                     "in the cone: {number} {normal} {across} {:?}",
                     output.status
                 );
             }
-            assert!(output.energy.stored() <= stored + 1e-12, "step {number}");
-            assert!(open(output, stored).abs() < 1e-12, "step {number}: {}", open(output, stored));
+            assert!(output.energy.stored() <= stored + LEDGER_ROUND_OFF_J, "step {number}");
+            let imbalance = energy_imbalance(output, stored);
+            assert!(imbalance.abs() < LEDGER_ROUND_OFF_J, "step {number}: {imbalance}");
             most = most.max(output.contacts.len());
         }
         assert!((8..=24).contains(&most), "{most}");
@@ -115,16 +118,14 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
     ];
     let obstacles: Vec<Obstacle> =
         shapes.into_iter().map(|shape| Obstacle { shape, pose: Pose::IDENTITY, friction: 0.7 }).collect();
-    let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.03, friction: 0.5, coupling: None };
     let parameters = ModelParameters {
         obstacles,
-        devices: vec![finger],
+        devices: vec![finger(0.01, 0.03, 0.5)],
         max_contact_samples: 8,
         ..ModelParameters::default()
     };
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
-    let mut state = State::new(&model);
+    let (model, mut state) =
+        model_and_state(parameters, vec![object_at(&recording, DVec3::ZERO, DVec3::ZERO)]);
     let mut most = [0; 4];
     for number in 0..12_000_u32 {
         let t = f64::from(number) * H;
@@ -141,7 +142,10 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
         let input = Input { obstacles: obstacles.collect(), devices: vec![device] };
         let output = step(&model, &mut state, &input);
         let energy = &output.energy;
-        assert!(energy.stored() <= energy.input + 1e-9 * (1.0 + energy.input.abs()), "{number}: {energy:?}");
+        assert!(
+            energy.stored() <= energy.input + SOLVED * (1.0 + energy.input.abs()),
+            "{number}: {energy:?}"
+        );
         assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
         for (k, most) in most.iter_mut().enumerate() {
             let is_its = |c: &&palpate::ContactOutput| c.against == palpate::Collider::Obstacle(k);

@@ -1,51 +1,47 @@
 //! Contact samples: two objects in contact at fewer points than nodes, on a released recording with a refined surface
 //! (a block of 0.2 × 0.1 × 0.1 m whose lower face has 45 nodes).
 
-mod refined;
-
 use glam::{DQuat, DVec3};
 use palpate::{
-    Collider, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Output, Pose, Recording,
-    Shape, State, Twist, step,
+    Collider, Input, Model, ModelObject, ModelParameters, ObjectStart, Output, Recording, State, Twist, step,
 };
-use refined::refined;
+use palpate_testkit::{
+    GRAVITY_M_S2, energy_imbalance, floor, free_block, model_and_state, start_at, subdivided,
+};
 use std::sync::Arc;
 
 const H: f64 = 1e-3;
-const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+const GRAVITY: DVec3 = DVec3::new(0.0, -GRAVITY_M_S2, 0.0);
 const HALF: DVec3 = DVec3::new(0.1, 0.05, 0.05);
 const ALL: usize = usize::MAX;
 
-fn block() -> Arc<Recording> {
-    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
-    Arc::new(refined(&Recording::from_bytes(bytes).expect("a released recording"), 2))
-}
+/// Round-off of the momentum of two objects [kg·m/s]: hundreds of sums of terms below 0.1 kg·m/s.
+const MOMENTUM_ROUND_OFF: f64 = 1e-13;
 
-fn at(position: DVec3) -> ObjectStart {
-    ObjectStart { pose: Pose { position, ..Pose::IDENTITY }, twist: Twist::ZERO }
+/// Round-off of an energy ledger [J], and of contact forces [N]: hundreds of sums of terms below 1.
+const ROUND_OFF: f64 = 1e-12;
+
+/// Mean force between blocks of a stack over a block's weight, minus one [1]: what they still rock after 1.5 s.
+const STILL_ROCKS: f64 = 5e-3;
+
+/// Difference of forces [N] that are both solved to round-off.
+const SOLVED_N: f64 = 1e-9;
+
+/// Half the block's length less a hundredth [m]: its corners are beyond.
+const AT_THE_CORNERS_M: f64 = 0.099;
+
+fn block() -> Arc<Recording> {
+    Arc::new(subdivided(&free_block(), 2))
 }
 
 fn scene(parameters: ModelParameters, body: &Arc<Recording>, starts: [ObjectStart; 2]) -> (Model, State) {
     let objects = starts.map(|start| ModelObject::new(body.clone(), start));
-    let model = Model::new(parameters, objects.to_vec()).expect("a model");
-    let state = State::new(&model);
-    (model, state)
+    model_and_state(parameters, objects.to_vec())
 }
 
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
-    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
-    ModelParameters {
-        gravity: GRAVITY,
-        obstacles: vec![floor],
-        max_contact_samples,
-        ..ModelParameters::default()
-    }
-}
-
-/// Imbalance of the energy ledger since the start [J].
-fn open(output: &Output, start: f64) -> f64 {
-    let e = &output.energy;
-    e.stored() - start - (e.input - e.lost())
+    let obstacles = vec![floor(0.5)];
+    ModelParameters { gravity: GRAVITY, obstacles, max_contact_samples, ..ModelParameters::default() }
 }
 
 fn between_objects(output: &Output) -> impl Iterator<Item = &palpate::ContactOutput> {
@@ -62,27 +58,28 @@ fn pairs_have_opposite_forces_and_dissipate_the_lost_energy() {
     for (max_contact_samples, (beside, orientation)) in
         [ALL, 24, 12].into_iter().flat_map(|m| cases.map(|c| (m, c)))
     {
-        let mut upper = at(DVec3::new(beside, 2.4 * HALF.y, 0.3 * beside));
+        let mut upper = start_at(DVec3::new(beside, 2.4 * HALF.y, 0.3 * beside));
         upper.pose.orientation = orientation;
         upper.pose.position.y += if orientation == tilted { 0.06 } else { 0.0 };
         upper.twist = Twist { linear: DVec3::new(0.05, -0.6, 0.02), angular: DVec3::new(0.0, 0.4, 0.1) };
         let parameters = ModelParameters { max_contact_samples, ..ModelParameters::default() };
-        let (model, mut state) = scene(parameters, &body, [at(DVec3::ZERO), upper]);
+        let (model, mut state) = scene(parameters, &body, [start_at(DVec3::ZERO), upper]);
         let start = state.output().energy.stored();
         let momentum = upper.twist.linear * mass;
         let (mut most, mut unsolved) = (0, 0);
         for number in 0..800 {
             let output = step(&model, &mut state, &Input::default());
             let now: DVec3 = output.objects.iter().map(|o| o.twist.linear * mass).sum();
-            assert!((now - momentum).length() < 1e-13, "step {number}: {}", now - momentum);
-            assert!(output.energy.stored() <= start + 1e-12, "step {number}");
-            assert!(open(output, start).abs() < 1e-12, "step {number}: {}", open(output, start));
-            assert!(output.energy.input.abs() < 1e-12, "no work from outside");
+            assert!((now - momentum).length() < MOMENTUM_ROUND_OFF, "step {number}: {}", now - momentum);
+            assert!(output.energy.stored() <= start + ROUND_OFF, "step {number}");
+            let imbalance = energy_imbalance(output, start);
+            assert!(imbalance.abs() < ROUND_OFF, "step {number}: {imbalance}");
+            assert!(output.energy.input.abs() < ROUND_OFF, "no work from outside");
             for contact in &output.contacts {
                 let normal = contact.force.dot(-contact.normal);
                 let across = (contact.force + contact.normal * normal).length();
                 // Scaled fallback solutions, of two whole faces that collide, may leave the cone.
-                let in_the_cone = normal > -1e-12 && across <= 0.5 * normal + 1e-12;
+                let in_the_cone = normal > -ROUND_OFF && across <= 0.5 * normal + ROUND_OFF;
                 assert!(in_the_cone || output.status.unsolved_islands > 0, "{number}: {normal} {across}");
             }
             unsolved += output.status.unsolved_islands;
@@ -102,9 +99,9 @@ fn pairs_have_opposite_forces_and_dissipate_the_lost_energy() {
 fn stack_stands_on_contact_samples() {
     // The sag against all nodes is measured on a finer body: `palpate verify places`.
     let body = block();
-    let weight = body.mass() * 9.81;
+    let weight = body.mass() * GRAVITY_M_S2;
     for most in [ALL, 24, 12] {
-        let starts = [1.0, 3.0].map(|k| at(DVec3::Y * (k * HALF.y + 1e-4)));
+        let starts = [1.0, 3.0].map(|k| start_at(DVec3::Y * (k * HALF.y + 1e-4)));
         let (model, mut state) = scene(on_a_floor(most), &body, starts);
         let mut carried = DVec3::ZERO;
         for number in 0..2500 {
@@ -117,12 +114,12 @@ fn stack_stands_on_contact_samples() {
             }
         }
         let output = state.output();
-        assert!((carried - DVec3::Y * weight).length() < 5e-3 * weight, "{most}: {carried}");
+        assert!((carried - DVec3::Y * weight).length() < STILL_ROCKS * weight, "{most}: {carried}");
         let count = between_objects(output).count();
         assert!((most == ALL) == (count > 24) && count <= most, "{most}: {count}");
         // Corners of the upper block are among the contacts.
         let outmost = between_objects(output).map(|c| c.point.x).fold(0.0, f64::max);
-        assert!(outmost > 0.099, "{most}: {outmost}");
+        assert!(outmost > AT_THE_CORNERS_M, "{most}: {outmost}");
     }
 }
 
@@ -132,8 +129,8 @@ fn overhanging_block_tips_over_as_with_all_nodes() {
     for most in [ALL, 24, 12] {
         // Its centre of mass is above the other block up to half of its length.
         for (overhang, falls) in [(0.6, false), (1.1, true)] {
-            let lower = at(DVec3::Y * HALF.y);
-            let upper = at(DVec3::new(2.0 * HALF.x * 0.5 * overhang, 3.0 * HALF.y, 0.0));
+            let lower = start_at(DVec3::Y * HALF.y);
+            let upper = start_at(DVec3::new(2.0 * HALF.x * 0.5 * overhang, 3.0 * HALF.y, 0.0));
             let (model, mut state) = scene(on_a_floor(most), &body, [lower, upper]);
             for _ in 0..1500 {
                 step(&model, &mut state, &Input::default());
@@ -150,20 +147,20 @@ fn few_nodes_in_contact_are_not_subsampled() {
     let body = block();
     let corner = DQuat::from_rotation_arc(HALF.normalize(), -DVec3::Y);
     let run = |max_contact_samples: usize| {
-        let mut upper = at(DVec3::Y * (HALF.y + HALF.length() + 1e-3));
+        let mut upper = start_at(DVec3::Y * (HALF.y + HALF.length() + 1e-3));
         upper.pose.orientation = corner;
         upper.twist.linear = -DVec3::Y * 0.05;
         let parameters = ModelParameters { max_contact_samples, ..ModelParameters::default() };
-        let (model, mut state) = scene(parameters, &body, [at(DVec3::ZERO), upper]);
+        let (model, mut state) = scene(parameters, &body, [start_at(DVec3::ZERO), upper]);
         (0..60)
             .map(|_| step(&model, &mut state, &Input::default()).contacts.iter().map(|c| c.force.y).sum())
             .collect::<Vec<f64>>()
     };
     let (ours, theirs) = (run(24), run(ALL));
     assert!(theirs.iter().any(|force| *force != 0.0), "they are in contact");
-    // Both are solved to round-off: fewer than 24 contacts.
+    // Fewer than 24 contacts.
     for (number, (a, b)) in ours.iter().zip(&theirs).enumerate() {
-        assert!((a - b).abs() < 1e-9, "step {number}: {a} {b}");
+        assert!((a - b).abs() < SOLVED_N, "step {number}: {a} {b}");
     }
     assert!((H * ours.iter().sum::<f64>()).abs() > 0.0);
 }

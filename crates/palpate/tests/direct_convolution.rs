@@ -3,24 +3,13 @@
 use glam::DVec3;
 use palpate::{
     ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
-    ModelParameters, ObjectStart, OscillatorState, Pose, Recording, ResponseForm, SampledOscillator,
-    Sampling, State, SurfacePoint, Twist, step,
+    ModelParameters, ObjectStart, OscillatorState, Recording, ResponseForm, SampledOscillator, Sampling,
+    State, SurfacePoint, Twist, step,
 };
+use palpate_testkit::{GRAVITY_M_S2, fixed_block, free_block, holding, model_and_state, start_at};
 use std::sync::Arc;
 
 const H: f64 = 1e-3;
-
-fn recording(bytes: &[u8]) -> Arc<Recording> {
-    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
-}
-
-fn free() -> Arc<Recording> {
-    recording(include_bytes!("../../../data/recordings/v1/free.palp"))
-}
-
-fn fixed() -> Arc<Recording> {
-    recording(include_bytes!("../../../data/recordings/v1/fixed.palp"))
-}
 
 /// R[s] = Φ·g(s)·Φᵀ, and S added to R[0], of a recording's own modes.
 fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
@@ -82,11 +71,9 @@ fn scene(recording: &Arc<Recording>, form: ResponseForm, parameters: ModelParame
         }
         palpate::Support::Fixed => Twist::ZERO,
     };
-    let start = ObjectStart { pose: Pose::IDENTITY, twist };
+    let start = ObjectStart { twist, ..start_at(DVec3::ZERO) };
     let object = ModelObject { response: form, ..ModelObject::new(recording.clone(), start) };
-    let model = Model::new(parameters, vec![object]).expect("a good model");
-    let state = State::new(&model);
-    (model, state)
+    model_and_state(parameters, vec![object])
 }
 
 /// Movable points of a recording, one per triangle, with all three weights.
@@ -143,16 +130,23 @@ fn differences(
             largest[1] = largest[1].max(modal.length());
         }
     }
-    assert!(largest[0] > 1e-3 && largest[1] > 1e-6, "the hands do something: {largest:?}");
+    assert!(
+        largest[0] > LEAST_FORCE_N && largest[1] > LEAST_DISPLACEMENT_M,
+        "the hands do something: {largest:?}"
+    );
     (worst[0] / largest[0], worst[1] / largest[1])
 }
+
+/// Force [N] and displacement [m] that hands of a test cause at least, so that there is something to compare.
+const LEAST_FORCE_N: f64 = 1e-3;
+const LEAST_DISPLACEMENT_M: f64 = 1e-6;
 
 /// Relative round-off of sums of a few hundred terms in another order, and of a system with condition below 1e3 [1].
 const ROUND_OFF: f64 = 1e-11;
 
 #[test]
 fn forces_and_displacements_equal_those_of_the_modal_form() {
-    let recording = free();
+    let recording = free_block();
     let held = points(&recording);
     let (force, shape) =
         differences(&recording, 300, 300, DVec3::ZERO, |_| [Some(held[3]), Some(held[held.len() / 2])]);
@@ -164,7 +158,7 @@ const FED_BACK: f64 = 1e-9;
 
 #[test]
 fn history_holds_contacts_that_appear_vanish_and_move() {
-    let recording = free();
+    let recording = free_block();
     let held = points(&recording);
     // Another point every second step, more points than copies of series; the second hand releases its point at times.
     let (force, shape) = differences(&recording, 300, 300, DVec3::ZERO, |number| {
@@ -177,9 +171,9 @@ fn history_holds_contacts_that_appear_vanish_and_move() {
 
 #[test]
 fn a_body_with_fixed_nodes_sags_under_gravity_as_in_modal_form() {
-    let recording = fixed();
+    let recording = fixed_block();
     let held = points(&recording);
-    let gravity = DVec3::new(1.0, -9.81, 0.5);
+    let gravity = DVec3::new(1.0, -GRAVITY_M_S2, 0.5);
     let (force, shape) = differences(&recording, 300, 300, gravity, |number| {
         [(number > 50).then_some(held[2]), (number % 100 < 60).then_some(held[held.len() / 2])]
     });
@@ -188,7 +182,7 @@ fn a_body_with_fixed_nodes_sags_under_gravity_as_in_modal_form() {
 
 #[test]
 fn forces_older_than_the_window_have_no_effect() {
-    let recording = free();
+    let recording = free_block();
     let held = points(&recording);
     let samples = 20;
     let form = ResponseForm::Fir(Arc::new(table(&recording, samples, H)));
@@ -198,8 +192,7 @@ fn forces_older_than_the_window_have_no_effect() {
         ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::default() },
     );
     let rest = recording.surface.rest_position(&held[0]);
-    let push = DeviceInput::held(rest + DVec3::X * 1e-3, Grasp { object: 0, point: held[0] });
-    step(&model, &mut state, &Input { devices: vec![push], ..Input::default() });
+    step(&model, &mut state, &holding(rest + DVec3::X * 1e-3, Grasp { object: 0, point: held[0] }));
     let mut shape = vec![DVec3::ZERO; recording.surface.positions.len()];
     for number in 1..=samples {
         state.surface_displacement(&model, 0, &mut shape);
@@ -210,9 +203,12 @@ fn forces_older_than_the_window_have_no_effect() {
     assert!(shape.iter().all(|u| *u == DVec3::ZERO));
 }
 
+/// Round-off of an energy ledger [1], relative to what moved: four hundred sums with terms of that size.
+const LEDGER_ROUND_OFF: f64 = 1e-13;
+
 #[test]
 fn work_of_hands_is_stored_in_motion_and_deformation() {
-    let recording = free();
+    let recording = free_block();
     let held = points(&recording);
     let form = ResponseForm::Fir(Arc::new(table(&recording, 200, H)));
     let (model, mut state) = scene(
@@ -230,20 +226,22 @@ fn work_of_hands_is_stored_in_motion_and_deformation() {
             &Input { devices: vec![DeviceInput { position, mode: grasp.into() }], ..Input::default() },
         )
         .energy;
-        assert!(energy.defect.abs() < 1e-13 * (energy.input.abs() + energy.stored()), "{number}: {energy:?}");
+        assert!(
+            energy.defect.abs() < LEDGER_ROUND_OFF * (energy.input.abs() + energy.stored()),
+            "{number}: {energy:?}"
+        );
     }
 }
 
 #[test]
 fn tables_that_do_not_fit_are_refused() {
-    let recording = free();
+    let recording = free_block();
     let refusal = |change: &dyn Fn(&mut ImpulseResponse)| {
         let mut table = table(&recording, 5, H);
         change(&mut table);
-        let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
         let object = ModelObject {
             response: ResponseForm::Fir(Arc::new(table)),
-            ..ModelObject::new(recording.clone(), start)
+            ..ModelObject::new(recording.clone(), start_at(DVec3::ZERO))
         };
         Model::new(ModelParameters::default(), vec![object]).err().map(|e| e.to_string()).unwrap_or_default()
     };
@@ -268,7 +266,7 @@ fn tables_that_do_not_fit_are_refused() {
 
 #[test]
 fn untouchable_point_cannot_be_held() {
-    let recording = free();
+    let recording = free_block();
     let mut table = table(&recording, 5, H);
     // The first node's first column belongs to another degree of freedom.
     table.touchable_dofs[0] = u32::MAX;
@@ -286,9 +284,6 @@ fn untouchable_point_cannot_be_held() {
         ResponseForm::Fir(Arc::new(table)),
         ModelParameters { devices: vec![DeviceParameters::default(); 1], ..Default::default() },
     );
-    let device = DeviceInput::held(DVec3::ZERO, Grasp { object: 0, point });
-    assert_eq!(
-        step(&model, &mut state, &Input { devices: vec![device], ..Input::default() }).status.rejected_inputs,
-        1
-    );
+    let held = holding(DVec3::ZERO, Grasp { object: 0, point });
+    assert_eq!(step(&model, &mut state, &held).status.rejected_inputs, 1);
 }

@@ -1,51 +1,19 @@
 //! Real time: a step allocates nothing, for any input.
 
-mod refined;
-
 use glam::DVec3;
 use palpate::{
     ColumnsInMemory, Coupling, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model,
     ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, ResponseForm, Sampling, Shape,
-    State, SurfacePoint, Twist, step,
+    State, Twist, step,
 };
-use refined::refined;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use palpate_testkit::{
+    CountingAllocator, GRAVITY_M_S2, allocations, finger, fixed_block, floor, free_block, start_at,
+    subdivided,
+};
 use std::sync::Arc;
 
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-// SAFETY: every call goes on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's layout, unchanged.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from the system's allocator with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the pointer came from the system's allocator with this layout.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
 #[global_allocator]
-static COUNTING: Counting = Counting;
-
-fn recording(bytes: &[u8]) -> Arc<Recording> {
-    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
-}
+static COUNTING: CountingAllocator = CountingAllocator;
 
 /// Table without coupling between nodes, with R[s] that decays over 50 samples.
 fn table(recording: &Recording) -> ImpulseResponse {
@@ -69,13 +37,11 @@ fn table(recording: &Recording) -> ImpulseResponse {
 
 #[test]
 fn step_makes_no_allocation() {
-    let free = recording(include_bytes!("../../../data/recordings/v1/free.palp"));
-    let fixed = recording(include_bytes!("../../../data/recordings/v1/fixed.palp"));
-    let start =
-        |x: f64| ObjectStart { pose: Pose { position: DVec3::X * x, ..Pose::IDENTITY }, twist: Twist::ZERO };
+    let free = free_block();
+    let start = |x: f64| start_at(DVec3::X * x);
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); 4],
-        gravity: DVec3::Y * -9.81,
+        gravity: DVec3::Y * -GRAVITY_M_S2,
         ..ModelParameters::default()
     };
     let convolved = ModelObject {
@@ -84,15 +50,20 @@ fn step_makes_no_allocation() {
     };
     let model = Model::new(
         parameters,
-        vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed, start(1.0)), convolved],
+        vec![
+            ModelObject::new(free.clone(), start(0.0)),
+            ModelObject::new(fixed_block(), start(1.0)),
+            convolved,
+        ],
     )
     .expect("a good model");
     let mut state = State::new(&model);
-    let grasp =
-        |object, triangle| Some(Grasp { object, point: SurfacePoint { triangle, weights: [0.2, 0.3, 0.5] } });
+    let grasp = |object, triangle| -> Option<Grasp> {
+        Some(palpate_testkit::grasp(object, triangle, [0.2, 0.3, 0.5]))
+    };
     let mut input = Input { devices: vec![DeviceInput::inactive(); 4], ..Input::default() };
 
-    let before = ALLOCATIONS.get();
+    let before = allocations();
     for number in 0..200_u32 {
         // New and lasting grasps, none, one that does not exist, two on one point, a position that is not finite.
         for (device, entry) in input.devices.iter_mut().enumerate() {
@@ -115,30 +86,26 @@ fn step_makes_no_allocation() {
         }
         step(&model, &mut state, &input);
     }
-    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 200 steps");
+    assert_eq!(allocations() - before, 0, "allocations in 200 steps");
 
     // Tips, a floor, a moving ball, two objects on one another.
-    let finger = DeviceParameters {
-        tip_radius: 0.004,
-        patch_radius: 0.02,
-        friction: 0.5,
-        coupling: Some(Coupling { stiffness: 200.0, damping: 0.1 }),
-    };
-    let plane = Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction: 0.5 };
+    let coupling = Some(Coupling { stiffness: 200.0, damping: 0.1 });
+    let finger = DeviceParameters { coupling, ..finger(0.004, 0.02, 0.5) };
+    let plane = floor(0.5);
     let ball = Obstacle { shape: Shape::Sphere { radius: 0.03 }, ..plane.clone() };
     let parameters = ModelParameters {
         devices: vec![DeviceParameters { patch_radius: 0.0, ..finger }, finger],
         obstacles: vec![plane, ball],
-        gravity: DVec3::Y * -9.81,
+        gravity: DVec3::Y * -GRAVITY_M_S2,
         ..ModelParameters::default()
     };
     let lying = |y: f64| ObjectStart {
-        pose: Pose { position: DVec3::Y * y, ..Pose::IDENTITY },
         twist: Twist { linear: DVec3::X * 0.1, angular: DVec3::Z * 2.0 },
+        ..start_at(DVec3::Y * y)
     };
     let objects = [0.08, 0.2].map(|y| ModelObject::new(free.clone(), lying(y)));
     touch(&Model::new(parameters.clone(), objects.to_vec()).expect("a good model"), "of touching");
-    let finer = Arc::new(refined(&free, 3));
+    let finer = Arc::new(subdivided(&free, 3));
     let objects = [0.08, 0.2].map(|y| ModelObject::new(finer.clone(), lying(y)));
     let parameters = ModelParameters { max_contact_samples: 12, ..parameters };
     touch(&Model::new(parameters, objects.to_vec()).expect("a good model"), "with contact samples");
@@ -149,7 +116,7 @@ fn touch(model: &Model, what: &str) {
     let mut state = State::new(model);
     let mut input =
         Input { devices: vec![DeviceInput::touching(DVec3::ZERO); 2], obstacles: vec![Pose::IDENTITY; 2] };
-    let (before, mut most) = (ALLOCATIONS.get(), 0);
+    let (before, mut most) = (allocations(), 0);
     for number in 0..600_u32 {
         let t = f64::from(number) * 1e-3;
         let object = state.output().objects[1].pose.position;
@@ -159,10 +126,10 @@ fn touch(model: &Model, what: &str) {
         input.obstacles[1].position = DVec3::new(0.0, 0.05, 0.2 - 0.3 * t);
         most = most.max(step(model, &mut state, &input).contacts.len());
     }
-    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 600 steps {what}");
+    assert_eq!(allocations() - before, 0, "allocations in 600 steps {what}");
     assert!(most > 5, "{most} contacts at once");
 
     // The counter works: the boxed probe is counted.
     let probe = Box::new(0_u64);
-    assert!(ALLOCATIONS.get() > before, "{probe}");
+    assert!(allocations() > before, "{probe}");
 }

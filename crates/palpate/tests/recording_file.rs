@@ -1,9 +1,10 @@
 //! Recording files: every released one is readable, every damaged one is refused with its kind of error.
 
 use palpate::{Error, Recording, RecordingError, RecordingPart};
+use palpate_testkit::{FIXED_BLOCK_FILE as FIXED, FREE_BLOCK_FILE as FREE, fixed_block, free_block};
 
-const FREE: &[u8] = include_bytes!("../../../data/recordings/v1/free.palp");
-const FIXED: &[u8] = include_bytes!("../../../data/recordings/v1/fixed.palp");
+/// Round-off of a mass that is a sum over elements [kg].
+const MASS_ROUND_OFF_KG: f64 = 1e-15;
 
 #[test]
 fn files_of_version_1_are_read_and_written_back_to_the_same_bytes() {
@@ -17,12 +18,11 @@ fn files_of_version_1_are_read_and_written_back_to_the_same_bytes() {
 
 #[test]
 fn content_of_version_1_files_is_unchanged() {
-    let free = Recording::from_bytes(FREE).expect("a released recording");
+    let free = free_block();
     assert_eq!((free.surface.positions.len(), free.surface.triangles.len(), free.modes.len()), (12, 20, 12));
     // 0.2 × 0.1 × 0.1 m at 110 kg/m³.
-    assert!((free.mass() - 0.22).abs() < 1e-15);
-    let fixed = Recording::from_bytes(FIXED).expect("a released recording");
-    assert!(fixed.gravity.is_some() && free.gravity.is_none());
+    assert!((free.mass() - 0.22).abs() < MASS_ROUND_OFF_KG);
+    assert!(fixed_block().gravity.is_some() && free.gravity.is_none());
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn errors_have_a_kind_and_a_text() {
 
 #[test]
 fn inconsistent_recordings_are_refused_when_written() {
-    let good = Recording::from_bytes(FREE).expect("a released recording");
+    let good = Recording::clone(&free_block());
     let refused = |change: fn(&mut Recording)| {
         let mut recording = good.clone();
         change(&mut recording);

@@ -2,17 +2,32 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
-    Recording, ResidualFieldCache, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, ObjectStart,
+    ResidualFieldCache, State, Twist, step,
 };
-use std::sync::Arc;
+use palpate_testkit::{
+    GRAVITY_M_S2, finger, free_block, grasp, half_extent, holding, model_and_state, start_at, touching,
+};
+
+/// Round-off of an energy ledger [1], relative above 1 J: four hundred sums.
+const LEDGER_ROUND_OFF: f64 = 1e-12;
+
+/// Round-off of a displacement of millimetres that is a sum over a dozen modes [m].
+const SUMMED_M: f64 = 1e-15;
+
+/// Relative difference of cached residual fields [1]: they are stored as f32.
+const F32_ROUNDING: f64 = 1e-6;
+
+/// Energies [J] and displacements [m] that a hand or finger of a test causes at least, so that there is something to keep.
+const LEAST_ELASTIC_J: f64 = 1e-7;
+const LEAST_KINETIC_J: f64 = 1e-6;
+const LEAST_RESIDUAL_M: f64 = 1e-5;
+const LEAST_DEPTH_M: f64 = 1e-4;
 
 fn model(step_s: f64, gravity: DVec3) -> Model {
-    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
-    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
     let start = ObjectStart {
-        pose: Pose::IDENTITY,
         twist: Twist { linear: DVec3::new(0.1, 0.0, 0.2), angular: DVec3::new(0.5, -1.0, 2.0) },
+        ..start_at(DVec3::ZERO)
     };
     let parameters = ModelParameters {
         step_s,
@@ -20,19 +35,18 @@ fn model(step_s: f64, gravity: DVec3) -> Model {
         devices: vec![DeviceParameters::default()],
         ..ModelParameters::default()
     };
-    Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model")
+    Model::new(parameters, vec![ModelObject::new(free_block(), start)]).expect("a model")
 }
 
 /// State after a point was pulled for 40 steps.
 fn pulled(model: &Model) -> State {
-    let grasp = Grasp { object: 0, point: SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] } };
+    let grasp = grasp(0, 3, [0.2, 0.3, 0.5]);
     let recording = model.recordings().next().expect("an object");
     let rest = recording.surface.rest_position(&grasp.point);
     let mut state = State::new(model);
     for number in 1..=40 {
         let hand = rest + DVec3::new(2e-4, 1e-4, -1e-4) * f64::from(number);
-        let input = Input { devices: vec![DeviceInput::held(hand, grasp)], ..Input::default() };
-        step(model, &mut state, &input);
+        step(model, &mut state, &holding(hand, grasp));
     }
     state
 }
@@ -43,7 +57,7 @@ fn inactive() -> Input {
 
 #[test]
 fn state_resumed_under_equal_parameters_continues_as_after_release() {
-    let model = model(1e-3, DVec3::Y * -9.81);
+    let model = model(1e-3, DVec3::Y * -GRAVITY_M_S2);
     let mut state = pulled(&model);
     let mut other = State::resume(&model, &state.snapshots());
     assert_eq!(other.output().objects[0].pose, state.output().objects[0].pose);
@@ -58,7 +72,7 @@ fn state_resumed_under_equal_parameters_continues_as_after_release() {
 
 #[test]
 fn initial_state_resumes_to_itself() {
-    let model = model(1e-3, DVec3::Y * -9.81);
+    let model = model(1e-3, DVec3::Y * -GRAVITY_M_S2);
     let start = State::new(&model);
     let mut other = State::resume(&model, &start.snapshots());
     assert_eq!((other.output(), other.snapshots()), (start.output(), start.snapshots()));
@@ -79,17 +93,17 @@ fn state_resumed_under_other_parameters_keeps_motion_and_energy_except_potential
     assert_eq!(old.energy.kinetic, new.energy.kinetic);
     assert_eq!((old.energy.elastic, new.time_s, new.energy.input), (new.energy.elastic, 0.0, 0.0));
     let begun = new.energy.stored();
-    assert!(old.energy.elastic > 1e-7 && old.energy.kinetic > 1e-6, "{:?}", old.energy);
+    assert!(old.energy.elastic > LEAST_ELASTIC_J && old.energy.kinetic > LEAST_KINETIC_J, "{:?}", old.energy);
     for _ in 0..400 {
         let energy = step(&after, &mut other, &inactive()).energy;
         let missing = energy.stored() + energy.lost() - begun - energy.defect;
-        assert!(missing.abs() < 1e-12 * begun.abs().max(1.0), "{missing} J of {begun} J");
+        assert!(missing.abs() < LEDGER_ROUND_OFF * begun.abs().max(1.0), "{missing} J of {begun} J");
     }
 }
 
 #[test]
 fn surface_displacement_is_modal_plus_residual_displacement() {
-    let model = model(1e-3, DVec3::Y * -9.81);
+    let model = model(1e-3, DVec3::Y * -GRAVITY_M_S2);
     let state = pulled(&model);
     let deformation = state.deformation(0);
     let recording = model.recordings().next().expect("an object");
@@ -102,31 +116,28 @@ fn surface_displacement_is_modal_plus_residual_displacement() {
     for (node, (u, residual)) in whole.iter().zip(&residuals).enumerate() {
         let row = |axis: usize| recording.modes.row(node, axis).iter().zip(q).map(|(a, b)| a * b).sum();
         let modal = DVec3::new(row(0), row(1), row(2));
-        assert!((modal + *residual - *u).length() < 1e-15, "{node}: {modal} {residual} {u}");
+        assert!((modal + *residual - *u).length() < SUMMED_M, "{node}: {modal} {residual} {u}");
         largest = largest.max(residual.length());
     }
-    assert!(largest > 1e-5, "the hand causes residual displacement: {largest} m");
+    assert!(largest > LEAST_RESIDUAL_M, "the hand causes residual displacement: {largest} m");
 }
 
 #[test]
 fn cached_residual_fields_give_equal_displacements() {
-    let finger = DeviceParameters { tip_radius: 0.01, patch_radius: 0.04, ..DeviceParameters::default() };
-    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
-    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let parameters = ModelParameters { devices: vec![finger; 2], ..ModelParameters::default() };
-    let model = Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a model");
-    let surface = &model.recordings().next().expect("an object").surface;
-    let edge = surface.positions.iter().map(|position| position.x).fold(0.0, f64::max);
-    let mut state = State::new(&model);
+    let recording = free_block();
+    let (surface, edge) = (&recording.surface, half_extent(&recording, 0));
+    let fingers = vec![finger(0.01, 0.04, 0.0); 2];
+    let parameters = ModelParameters { devices: fingers, ..ModelParameters::default() };
+    let (model, mut state) =
+        model_and_state(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))]);
     let mut cache = ResidualFieldCache::default();
     let mut deepest = 0.0_f64;
     for number in 0..300 {
         // Fingers press and move over new and cached patches.
         let (press, along) =
             (0.004 * (f64::from(number) / 100.0).min(1.0), 0.02 * (f64::from(number) / 40.0).sin());
-        let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (edge + 0.0105 - press), along, 0.01));
-        step(&model, &mut state, &Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() });
+        let tip = |side: f64| DVec3::new(side * (edge + 0.0105 - press), along, 0.01);
+        step(&model, &mut state, &touching(&[tip(-1.0), tip(1.0)]));
         let mut with = vec![DVec3::ZERO; surface.positions.len()];
         let mut without = with.clone();
         let deformation = state.deformation(0);
@@ -134,8 +145,8 @@ fn cached_residual_fields_give_equal_displacements() {
         deformation.surface_displacement(&model, &mut without);
         let size = without.iter().map(|u| u.length()).fold(0.0, f64::max);
         let difference = with.iter().zip(&without).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
-        assert!(difference <= 1e-6 * size, "{number}: {difference} of {size}");
+        assert!(difference <= F32_ROUNDING * size, "{number}: {difference} of {size}");
         deepest = deepest.max(size);
     }
-    assert!(deepest > 1e-4, "they press: {deepest} m");
+    assert!(deepest > LEAST_DEPTH_M, "they press: {deepest} m");
 }

@@ -2,74 +2,54 @@
 
 use glam::DVec3;
 use palpate::{
-    Collider, Coupling, DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Obstacle, Output, Pose, Recording, Shape, State, SurfacePoint, Twist, step,
+    Collider, Coupling, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, Obstacle,
+    Output, Pose, Shape, SurfacePoint, step,
 };
-use std::sync::Arc;
+use palpate_testkit::{
+    GRAVITY_M_S2, Random, energy_imbalance, finger, fixed_block, floor, free_block, half_extent, holding,
+    model_and_state, start_at, touching,
+};
 
 const H: f64 = 1e-3;
-const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+const GRAVITY: DVec3 = DVec3::new(0.0, -GRAVITY_M_S2, 0.0);
 
-fn block() -> Arc<Recording> {
-    let bytes = include_bytes!("../../../data/recordings/v1/free.palp");
-    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
-}
+/// Round-off of an energy ledger [J]: thousands of sums of terms below 1 J.
+const LEDGER_ROUND_OFF_J: f64 = 1e-12;
 
-fn fixed() -> Arc<Recording> {
-    let bytes = include_bytes!("../../../data/recordings/v1/fixed.palp");
-    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
-}
+/// Round-off of a momentum [kg·m/s]: thousands of sums of terms below 1 kg·m/s.
+const MOMENTUM_ROUND_OFF: f64 = 1e-12;
 
-fn at(position: DVec3) -> ObjectStart {
-    ObjectStart { pose: Pose { position, ..Pose::IDENTITY }, twist: Twist::ZERO }
-}
+/// Round-off of a momentum that a few hundred contact forces change [kg·m/s].
+const PAIR_MOMENTUM_ROUND_OFF: f64 = 1e-13;
 
-fn scene(parameters: ModelParameters, objects: Vec<ModelObject>) -> (Model, State) {
-    let model = Model::new(parameters, objects).expect("a good model");
-    let state = State::new(&model);
-    (model, state)
-}
+/// Relative round-off of contact forces and of what follows from them [1]: the solver keeps nine digits.
+const SOLVED: f64 = 1e-9;
 
-fn finger(tip_radius: f64, patch_radius: f64, friction: f64) -> DeviceParameters {
-    DeviceParameters { tip_radius, patch_radius, friction, coupling: None }
-}
+/// Relative difference of touch and hold [1]: the tip touches the surface a few micrometres beside the node, on cells of centimetres.
+const BESIDE_THE_NODE: f64 = 1e-5;
 
-fn floor(friction: f64) -> Obstacle {
-    Obstacle { shape: Shape::Plane { normal: DVec3::Y }, pose: Pose::IDENTITY, friction }
-}
+/// Slip speed of a contact that sticks [m/s]: round-off of a displacement over a step.
+const STICKS_M_S: f64 = 1e-9;
 
-fn touching(positions: &[DVec3]) -> Input {
-    Input { devices: positions.iter().map(|&p| DeviceInput::touching(p)).collect(), ..Input::default() }
-}
+/// Gap that the solver leaves at a contact [m].
+const SOLVER_GAP_M: f64 = 1e-6;
 
-/// Half the block's side along an axis [m], from its surface.
-fn half(recording: &Recording, axis: usize) -> f64 {
-    recording.surface.positions.iter().map(|p| p[axis]).fold(0.0, f64::max)
-}
+/// Distance of nodes to the plane of their face [m]: round-off of coordinates below 1 m.
+const ON_THE_FACE_M: f64 = 1e-9;
 
-/// Pseudo-random number between −1 and 1 (xorshift).
-fn random(seed: &mut u64) -> f64 {
-    *seed ^= *seed << 13;
-    *seed ^= *seed >> 7;
-    *seed ^= *seed << 17;
-    (*seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-}
+/// Stretch of a coupling that presses [m], at least.
+const PRESSED_M: f64 = 1e-4;
 
-fn random_vector(seed: &mut u64) -> DVec3 {
-    DVec3::new(random(seed), random(seed), random(seed))
-}
-
-/// Imbalance of the energy ledger since the start [J].
+/// Imbalance of the energy ledger since the start beyond its stated defect [J].
 fn open(output: &Output, start: f64) -> f64 {
-    let e = &output.energy;
-    e.stored() - start - (e.input - e.lost()) - e.defect
+    energy_imbalance(output, start) - output.energy.defect
 }
 
 #[test]
 fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
-    let body = block();
+    let body = free_block();
     // Node nearest to the middle of a side face, where a tip presses along x.
-    let side = half(&body, 0);
+    let side = half_extent(&body, 0);
     let middle = |n: &usize| (body.surface.positions[*n] - DVec3::X * side).length_squared();
     let node =
         (0..body.surface.positions.len()).min_by(|a, b| middle(a).total_cmp(&middle(b))).expect("nodes");
@@ -80,8 +60,9 @@ fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
     let grasp = Grasp { object: 0, point: SurfacePoint { triangle: triangle as u32, weights } };
     let parameters = ModelParameters { devices: vec![finger(0.0, 0.0, 5.0)], ..ModelParameters::default() };
     let (model, mut touched) =
-        scene(parameters.clone(), vec![ModelObject::new(body.clone(), at(DVec3::ZERO))]);
-    let (other, mut held) = scene(parameters, vec![ModelObject::new(body.clone(), at(DVec3::ZERO))]);
+        model_and_state(parameters.clone(), vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
+    let (other, mut held) =
+        model_and_state(parameters, vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
     // The tip has a radius of a thousandth of an edge.
     let tip = 1e-3 * body.surface.mean_edge();
     let path = |t: f64| -DVec3::X * (0.01 * t - 0.2 * t * t * t) + DVec3::Y * (0.002 * t);
@@ -90,18 +71,15 @@ fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
     for number in 1..=105 {
         let displacement = path(f64::from(number - 1) * H);
         let a = step(&model, &mut touched, &touching(&[rest + displacement + DVec3::X * tip])).clone();
-        let input =
-            Input { devices: vec![DeviceInput::held(rest + displacement, grasp)], ..Input::default() };
-        let b = step(&other, &mut held, &input);
+        let b = step(&other, &mut held, &holding(rest + displacement, grasp));
         let (touch, hold) = (a.devices[0].force_on_hand, b.devices[0].force_on_hand);
         // Both begin at the node.
         if number > 2 {
             let share = (touch - hold).length() / hold.length();
-            // The tip touches the surface a few micrometres beside the node, on cells of centimetres.
-            assert!(share < 1e-5, "step {number}: {touch} {hold}");
+            assert!(share < BESIDE_THE_NODE, "step {number}: {touch} {hold}");
             compared += 1;
         }
-        assert!(a.contacts.iter().all(|c| c.slip_speed < 1e-9), "it sticks");
+        assert!(a.contacts.iter().all(|c| c.slip_speed < STICKS_M_S), "it sticks");
     }
     assert!(compared > 90);
 }
@@ -110,10 +88,10 @@ fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
 fn coupling_force_obeys_its_law() {
     let coupling = Coupling { stiffness: 300.0, damping: 0.4 };
     let device = DeviceParameters { coupling: Some(coupling), ..finger(0.005, 0.0, 0.8) };
-    let body = block();
-    let side = half(&body, 0);
+    let body = free_block();
+    let side = half_extent(&body, 0);
     let parameters = ModelParameters { devices: vec![device; 2], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let mut before = [DVec3::ZERO; 2];
     for number in 1..=600 {
         let t = f64::from(number) * H;
@@ -124,26 +102,29 @@ fn coupling_force_obeys_its_law() {
             let stretch = hand - output.devices[device].proxy;
             let force = -output.devices[device].force_on_hand;
             let law = stretch * coupling.stiffness + (stretch - before[device]) * (coupling.damping / H);
-            assert!(force == DVec3::ZERO || (force - law).length() < 1e-9 * (1.0 + law.length()), "{number}");
+            assert!(
+                force == DVec3::ZERO || (force - law).length() < SOLVED * (1.0 + law.length()),
+                "{number}"
+            );
             before[device] = stretch;
         }
-        assert!(open(output, 0.0).abs() < 1e-12);
-        assert!(output.energy.stored() <= output.energy.input + 1e-12);
+        assert!(open(output, 0.0).abs() < LEDGER_ROUND_OFF_J);
+        assert!(output.energy.stored() <= output.energy.input + LEDGER_ROUND_OFF_J);
     }
-    assert!(before[0].length() > 1e-4, "it was pressed");
+    assert!(before[0].length() > PRESSED_M, "it was pressed");
 }
 
 #[test]
 fn contact_forces_on_a_floor_are_the_change_of_momentum() {
-    let body = block();
+    let body = free_block();
     let mass = body.mass();
     let parameters =
         ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::default() };
-    let mut start = at(DVec3::Y * (half(&body, 1) + 0.004));
+    let mut start = start_at(DVec3::Y * (half_extent(&body, 1) + 0.004));
     start.twist.linear = DVec3::X * 0.3;
-    let low = -half(&body, 1);
-    let face = body.surface.positions.iter().filter(|p| (p.y - low).abs() < 1e-9).count();
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, start)]);
+    let low = -half_extent(&body, 1);
+    let face = body.surface.positions.iter().filter(|p| (p.y - low).abs() < ON_THE_FACE_M).count();
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start)]);
     let stored = state.output().energy.stored();
     let mut momentum = start.twist.linear * mass;
     let mut most = 0;
@@ -152,17 +133,20 @@ fn contact_forces_on_a_floor_are_the_change_of_momentum() {
         let force: DVec3 = output.contacts.iter().map(|c| c.force).sum();
         momentum += (force + GRAVITY * mass) * H;
         let error = (output.objects[0].twist.linear * mass - momentum).length();
-        assert!(error < 1e-12, "step {number}: {error}");
+        assert!(error < MOMENTUM_ROUND_OFF, "step {number}: {error}");
         most = most.max(output.contacts.len());
         for contact in &output.contacts {
             assert_eq!(contact.against, Collider::Obstacle(0));
             let normal = contact.force.dot(-contact.normal);
             let across = (contact.force + contact.normal * normal).length();
-            assert!(normal > 0.0 && across <= 0.4 * normal * (1.0 + 1e-9), "in the cone");
-            assert!(contact.gap > -1e-6, "no deeper than the solver leaves: {}", contact.gap);
+            assert!(normal > 0.0 && across <= 0.4 * normal * (1.0 + SOLVED), "in the cone");
+            assert!(contact.gap > -SOLVER_GAP_M, "no deeper than the solver leaves: {}", contact.gap);
         }
         // The energy never exceeds that at the start, and the ledger closes.
-        assert!(output.energy.stored() <= stored + 1e-12 && open(output, stored).abs() < 1e-12);
+        assert!(
+            output.energy.stored() <= stored + LEDGER_ROUND_OFF_J
+                && open(output, stored).abs() < LEDGER_ROUND_OFF_J
+        );
     }
     let output = state.output();
     assert_eq!(most, face, "the whole face touches");
@@ -177,14 +161,14 @@ fn contact_forces_on_a_floor_are_the_change_of_momentum() {
 #[test]
 fn fast_tip_does_not_pass_through() {
     // A motion of ten times the block's size in a step, through it: contact on the near side.
-    let body = block();
-    let side = half(&body, 1);
+    let body = free_block();
+    let side = half_extent(&body, 1);
     let device = DeviceParameters {
         coupling: Some(Coupling { stiffness: 50.0, damping: 0.0 }),
         ..finger(0.002, 0.0, 0.0)
     };
     let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     step(&model, &mut state, &touching(&[DVec3::Y * 10.0 * side]));
     let output = step(&model, &mut state, &touching(&[-DVec3::Y * 10.0 * side]));
     assert_eq!(output.contacts.len(), 1);
@@ -195,10 +179,10 @@ fn fast_tip_does_not_pass_through() {
 
 #[test]
 fn tip_that_starts_inside_has_no_contact_until_it_has_left() {
-    let body = block();
-    let side = half(&body, 1);
+    let body = free_block();
+    let side = half_extent(&body, 1);
     let parameters = ModelParameters { devices: vec![finger(0.002, 0.0, 0.5)], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     for y in [0.0, 0.3, 0.6, 0.9] {
         let output = step(&model, &mut state, &touching(&[DVec3::Y * y * side]));
         assert_eq!(output.devices[0].force_on_hand, DVec3::ZERO, "inside at {y}");
@@ -212,28 +196,29 @@ fn tip_that_starts_inside_has_no_contact_until_it_has_left() {
 #[test]
 fn random_tips_extract_no_energy_and_the_state_stays_finite() {
     for (seed, coupling) in [(1, None), (2, Some(Coupling { stiffness: 100.0, damping: 0.2 }))] {
-        let mut seed: u64 = 88_172_645 + 7919 * seed;
+        let mut random = Random::new(88_172_645 + 7919 * seed);
         let device = |tip, patch, friction| DeviceParameters { coupling, ..finger(tip, patch, friction) };
         let devices = vec![device(0.01, 0.03, 0.6), device(0.0, 0.0, 0.0), device(0.003, 0.0, 1.2)];
         let parameters = ModelParameters { devices, ..ModelParameters::default() };
-        let (model, mut state) = scene(parameters, vec![ModelObject::new(block(), at(DVec3::ZERO))]);
+        let (model, mut state) =
+            model_and_state(parameters, vec![ModelObject::new(free_block(), start_at(DVec3::ZERO))]);
         let mut hands = [DVec3::ONE; 3];
         let (mut kinds, mut goals) = ([0; 3], [DVec3::ZERO; 3]);
         let mut touches = 0;
         for number in 0..8000 {
             let centre = state.output().objects[0].pose.position;
             for device in 0..3 {
-                if random(&mut seed) > 0.98 {
-                    kinds[device] = (3.5 * (1.0 + random(&mut seed))) as i32;
-                    goals[device] = random_vector(&mut seed) * 0.15;
+                if random.within(-1.0, 1.0) > 0.98 {
+                    kinds[device] = (3.5 * (1.0 + random.within(-1.0, 1.0))) as i32;
+                    goals[device] = random.vector() * 0.15;
                 }
                 hands[device] = match kinds[device] {
                     0 => centre + goals[device],
-                    1 => centre + random_vector(&mut seed) * 0.2,
+                    1 => centre + random.vector() * 0.2,
                     2 => hands[device] + (centre - hands[device]) * 0.03,
                     3 => centre + goals[device] * if number % 2 == 0 { 1.0 } else { 0.85 },
                     4 => DVec3::splat(f64::NAN),
-                    5 => hands[device] + random_vector(&mut seed) * 0.003,
+                    5 => hands[device] + random.vector() * 0.003,
                     _ => centre + goals[device] * 2.0,
                 };
             }
@@ -244,7 +229,7 @@ fn random_tips_extract_no_energy_and_the_state_stays_finite() {
             touches += output.contacts.len();
             let energy = &output.energy;
             let size = 1.0 + energy.input.abs();
-            assert!(energy.stored() <= energy.input + 1e-9 * size, "step {number}: {energy:?}");
+            assert!(energy.stored() <= energy.input + SOLVED * size, "step {number}: {energy:?}");
             assert!(energy.stored().is_finite() && output.objects[0].pose.position.is_finite());
             let sound = |d: &palpate::DeviceOutput| d.force_on_hand.is_finite() && d.proxy.is_finite();
             assert!(output.devices.iter().all(sound), "step {number}");
@@ -256,23 +241,26 @@ fn random_tips_extract_no_energy_and_the_state_stays_finite() {
 #[test]
 fn colliding_objects_have_opposite_forces() {
     // Two blocks collide without gravity: momentum is conserved, energy does not grow.
-    let body = block();
+    let body = free_block();
     let mass = body.mass();
-    let gap = 2.0 * half(&body, 0) + 0.002;
-    let mut left = at(DVec3::ZERO);
-    let mut right = at(DVec3::new(gap, 0.01, 0.0));
+    let gap = 2.0 * half_extent(&body, 0) + 0.002;
+    let mut left = start_at(DVec3::ZERO);
+    let mut right = start_at(DVec3::new(gap, 0.01, 0.0));
     (left.twist.linear, right.twist.linear) = (DVec3::X * 0.2, -DVec3::X * 0.3);
     let objects = vec![ModelObject::new(body.clone(), left), ModelObject::new(body, right)];
-    let (model, mut state) = scene(ModelParameters::default(), objects);
+    let (model, mut state) = model_and_state(ModelParameters::default(), objects);
     let start = state.output().energy.stored();
     let mut met = false;
     for _ in 0..400 {
         let output = step(&model, &mut state, &Input::default());
         met |= !output.contacts.is_empty();
         let momentum: DVec3 = output.objects.iter().map(|o| o.twist.linear * mass).sum();
-        assert!((momentum - DVec3::X * (-0.1 * mass)).length() < 1e-13, "{momentum}");
-        assert!(output.energy.stored() <= start + 1e-12 && open(output, start).abs() < 1e-12);
-        assert!(output.energy.input.abs() < 1e-12, "no work from outside");
+        assert!((momentum - DVec3::X * (-0.1 * mass)).length() < PAIR_MOMENTUM_ROUND_OFF, "{momentum}");
+        assert!(
+            output.energy.stored() <= start + LEDGER_ROUND_OFF_J
+                && open(output, start).abs() < LEDGER_ROUND_OFF_J
+        );
+        assert!(output.energy.input.abs() < LEDGER_ROUND_OFF_J, "no work from outside");
     }
     let output = state.output();
     let apart = output.objects[1].twist.linear.x - output.objects[0].twist.linear.x;
@@ -281,20 +269,20 @@ fn colliding_objects_have_opposite_forces() {
 
 #[test]
 fn work_of_a_moving_obstacle_is_counted() {
-    let body = block();
+    let body = free_block();
     let ball = Obstacle {
         shape: Shape::Sphere { radius: 0.04 },
-        pose: Pose { position: -DVec3::X * (half(&body, 0) + 0.045), ..Pose::IDENTITY },
+        pose: Pose { position: -DVec3::X * (half_extent(&body, 0) + 0.045), ..Pose::IDENTITY },
         friction: 0.3,
     };
     let parameters = ModelParameters { obstacles: vec![ball.clone()], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     for number in 1..=400 {
         let position = ball.pose.position + DVec3::X * (0.2 * f64::from(number) * H);
         let input = Input { obstacles: vec![Pose { position, ..ball.pose }], ..Input::default() };
         let output = step(&model, &mut state, &input);
-        assert!(open(output, 0.0).abs() < 1e-12);
-        assert!(output.energy.stored() <= output.energy.input + 1e-12);
+        assert!(open(output, 0.0).abs() < LEDGER_ROUND_OFF_J);
+        assert!(output.energy.stored() <= output.energy.input + LEDGER_ROUND_OFF_J);
     }
     let output = state.output();
     assert!(output.objects[0].twist.linear.x > 0.15, "{:?}", output.objects[0].twist);
@@ -304,7 +292,7 @@ fn work_of_a_moving_obstacle_is_counted() {
 #[test]
 fn numbers_out_of_range_are_refused_by_name() {
     let refused = |parameters: ModelParameters| {
-        let objects = vec![ModelObject::new(block(), at(DVec3::ZERO))];
+        let objects = vec![ModelObject::new(free_block(), start_at(DVec3::ZERO))];
         Model::new(parameters, objects).err().map(|e| e.to_string()).unwrap_or_default()
     };
     let devices = |device| ModelParameters { devices: vec![device], ..ModelParameters::default() };
@@ -337,28 +325,28 @@ fn numbers_out_of_range_are_refused_by_name() {
 
 #[test]
 fn body_with_fixed_nodes_has_contact_forces() {
-    let body = fixed();
+    let body = fixed_block();
     let top = body.surface.positions.iter().copied().max_by(|a, b| a.y.total_cmp(&b.y)).expect("nodes");
     let parameters =
         ModelParameters { devices: vec![finger(0.003, 0.02, 0.5)], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let mut last = 0.0;
     for number in 1..=300 {
         let depth = 2e-5 * f64::from(number).min(100.0);
         let tip = DVec3::new(0.5 * top.x, top.y + 0.003 + 1e-4 - depth, 0.5 * top.z);
         let output = step(&model, &mut state, &touching(&[tip]));
         last = output.devices[0].force_on_hand.y;
-        assert!(open(output, 0.0).abs() < 1e-12);
+        assert!(open(output, 0.0).abs() < LEDGER_ROUND_OFF_J);
     }
     assert!(last > 0.0, "{last}");
 }
 
 #[test]
 fn scaled_fallback_of_an_unsolved_contact_gives_no_energy() {
-    let body = block();
-    let side = half(&body, 0);
+    let body = free_block();
+    let side = half_extent(&body, 0);
     let parameters = ModelParameters { devices: vec![finger(0.02, 0.0, 0.5)], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let start = state.output().energy.stored();
     let beside = DVec3::new(side + 0.021, 0.03, 0.02);
     step(&model, &mut state, &touching(&[beside]));
@@ -371,20 +359,20 @@ fn scaled_fallback_of_an_unsolved_contact_gives_no_energy() {
     assert!(contact.force.x < 0.0 && output.objects[0].twist.linear.x < 0.0, "pushed on: {contact:?}");
     assert_eq!(output.devices[0].force_on_hand, -contact.force);
     let e = &output.energy;
-    assert!(e.input > 0.0 && e.lost() >= 0.0 && open(output, start).abs() < 1e-9 * e.input, "{e:?}");
-    assert!(e.defect.abs() < 1e-9 * e.input, "{e:?}");
+    assert!(e.input > 0.0 && e.lost() >= 0.0 && open(output, start).abs() < SOLVED * e.input, "{e:?}");
+    assert!(e.defect.abs() < SOLVED * e.input, "{e:?}");
     let after = step(&model, &mut state, &touching(&[beyond]));
     assert_eq!((after.status.unsolved_islands, after.contacts.len()), (0, 0));
 }
 
 #[test]
 fn tip_larger_than_the_body_touches_its_front_only() {
-    let body = block();
-    let (side, thick) = (half(&body, 0), 2.0 * half(&body, 1));
+    let body = free_block();
+    let (side, thick) = (half_extent(&body, 0), 2.0 * half_extent(&body, 1));
     // The tip's centre is outside; the back of the block is within its radius.
     let tip = 4.0 * thick;
     let parameters = ModelParameters { devices: vec![finger(tip, 0.0, 0.0)], ..ModelParameters::default() };
-    let (model, mut state) = scene(parameters, vec![ModelObject::new(body, at(DVec3::ZERO))]);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let centre = DVec3::new(0.1 * side, 0.8 * thick, 0.0);
     step(&model, &mut state, &touching(&[centre]));
     let raised = step(&model, &mut state, &touching(&[centre + DVec3::Y * (0.05 * thick)]));

@@ -17,24 +17,14 @@ import {
 } from "three";
 import { rgb, type Palette } from "./colours";
 import { niceCeil } from "./auto_range";
+import { rigidVertex } from "./rigid_material";
 import { ShadowMap } from "./shadow_map";
 
 // Shadow offset per height: the light comes from the front left.
 const SHEAR_SIDEWAYS = 0.38;
 const SHEAR_BACK = 0.3;
 
-const VERTEX = /* glsl */ `
-precision highp float;
-uniform mat4 modelMatrix, viewMatrix, projectionMatrix;
-in vec3 position;
-out vec3 worldPosition;
-out vec2 onPlane;
-void main() {
-  vec4 world = modelMatrix * vec4(position, 1.0);
-  worldPosition = world.xyz;
-  onPlane = position.xz;
-  gl_Position = projectionMatrix * viewMatrix * world;
-}`;
+const VERTEX = rigidVertex("out vec2 onPlane;", "onPlane = position.xz;");
 
 const FRAGMENT = /* glsl */ `
 precision highp float;

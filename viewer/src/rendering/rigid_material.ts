@@ -4,19 +4,21 @@ import { GLSL3, RawShaderMaterial, Vector3, Vector4 } from "three";
 import { rgb } from "./colours";
 import { LIGHTING } from "./elastic/shaders";
 
-const VERTEX = /* glsl */ `
+/** Vertex shader of a rigid mesh, with `worldPosition` for the fragment; `statements` may use and move `world`. */
+export const rigidVertex = (declarations: string, statements: string) => /* glsl */ `
 precision highp float;
 uniform mat4 modelMatrix, viewMatrix, projectionMatrix;
 in vec3 position;
-in vec3 normal;
 out vec3 worldPosition;
-out vec3 shadingNormal;
+${declarations}
 void main() {
   vec4 world = modelMatrix * vec4(position, 1.0);
   worldPosition = world.xyz;
-  shadingNormal = mat3(modelMatrix) * normal;
+  ${statements}
   gl_Position = projectionMatrix * viewMatrix * world;
 }`;
+
+const VERTEX = rigidVertex("in vec3 normal; out vec3 shadingNormal;", "shadingNormal = mat3(modelMatrix) * normal;");
 
 const FRAGMENT = /* glsl */ `
 precision highp float;
@@ -48,19 +50,10 @@ export function rigidMaterial(colour: string, up: Vector3, opacity = 1, gloss = 
   });
 }
 
-const SHADOW_VERTEX = /* glsl */ `
-precision highp float;
-uniform mat4 modelMatrix, viewMatrix, projectionMatrix;
-uniform vec4 plane;
-uniform vec3 shear;
-in vec3 position;
-out vec3 worldPosition;
-void main() {
-  vec4 world = modelMatrix * vec4(position, 1.0);
-  worldPosition = world.xyz;
-  world.xyz += shear * max(0.0, dot(plane.xyz, world.xyz) - plane.w);
-  gl_Position = projectionMatrix * viewMatrix * world;
-}`;
+const SHADOW_VERTEX = rigidVertex(
+  "uniform vec4 plane; uniform vec3 shear;",
+  "world.xyz += shear * max(0.0, dot(plane.xyz, world.xyz) - plane.w);",
+);
 
 /** Material of shadow casters; `fragmentShader` gives the density. */
 export function shadowCasterMaterial(fragmentShader: string): RawShaderMaterial {

@@ -3,7 +3,8 @@
 use crate::failure::Failure;
 use crate::progress::Bars;
 use crate::terminal::print;
-use clap::{Args, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, value_parser};
 use palpate_reproduce::{Effort, Options, Part};
 use std::path::PathBuf;
 
@@ -24,17 +25,17 @@ pub struct Arguments {
     #[arg(short, long, default_value = "palpate-reproduction", value_name = "DIR")]
     output: PathBuf,
     /// Cells along a side of the cube; the paper's has 12
-    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..=40))]
+    #[arg(long, default_value_t = Effort::default().cells, value_parser = value_parser!(u32).range(2..=40))]
     cells: u32,
     /// Columns of the table that are timed for Table 1
-    #[arg(long, default_value_t = 96, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = Effort::default().columns as u32, value_parser = value_parser!(u32).range(1..=10_000))]
     columns: u32,
     /// Steps that are timed per point of a curve
-    #[arg(long, default_value_t = 4000, value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
+    #[arg(long, default_value_t = Effort::default().steps as u32, value_parser = value_parser!(u32).range(10..=10_000_000))]
     steps: u32,
     /// These parts only, with commas between them
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "PARTS")]
-    only: Vec<PartOption>,
+    #[arg(long, value_parser = part_parser(), value_delimiter = ',', value_name = "PARTS")]
+    only: Vec<Part>,
     /// The browser that draws pictures; by default the first of chromium, chromium-browser, google-chrome, chrome that is found
     #[arg(long, value_name = "PROGRAM")]
     browser: Option<PathBuf>,
@@ -44,7 +45,7 @@ pub struct Arguments {
 pub fn reproduce(arguments: &Arguments) -> Result<(), Failure> {
     let program = std::env::current_exe()
         .map_err(|e| Failure(format!("palpate can't be run in a process of its own: {e}")))?;
-    let parts = if arguments.only.is_empty() { PartOption::value_variants() } else { &arguments.only };
+    let parts = if arguments.only.is_empty() { &Part::ALL[..] } else { &arguments.only };
     let options = Options {
         output: arguments.output.clone(),
         program,
@@ -54,41 +55,15 @@ pub fn reproduce(arguments: &Arguments) -> Result<(), Failure> {
             columns: arguments.columns as usize,
             steps: arguments.steps as usize,
         },
-        parts: parts.iter().map(|part| part.part()).collect(),
+        parts: parts.to_vec(),
     };
     let report = palpate_reproduce::reproduce(&options, &mut Bars::new())?;
     print(&format!("{}\n", report.display()))
 }
 
-/// A part of the report.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PartOption {
-    /// Table 1.
-    Recording,
-    /// Figures 2 and 3, and the arrival of the wave.
-    Impulses,
-    /// Passivity of the samples.
-    Passivity,
-    /// Both forms of the response, both ways of recording.
-    Agreement,
-    /// Section 2.5.
-    Cost,
-    /// Figure 5(a).
-    Fall,
-    /// Figure 5(b).
-    Shake,
-}
-
-impl PartOption {
-    fn part(self) -> Part {
-        match self {
-            Self::Recording => Part::Recording,
-            Self::Impulses => Part::Impulses,
-            Self::Passivity => Part::Passivity,
-            Self::Agreement => Part::Agreement,
-            Self::Cost => Part::Cost,
-            Self::Fall => Part::Fall,
-            Self::Shake => Part::Shake,
-        }
-    }
+/// Parser of a part by its name.
+fn part_parser() -> impl TypedValueParser<Value = Part> {
+    let names = Part::ALL.map(|part| PossibleValue::new(part.name()).help(part.content()));
+    let part = |name: String| Part::ALL.into_iter().find(|part| part.name() == name).ok_or("no such part");
+    PossibleValuesParser::new(names).try_map(part)
 }

@@ -2,6 +2,7 @@
 
 use crate::workplace::{CUBE, Table, Workplace};
 use glam::DVec3;
+use palpate_testkit::GRAVITY_M_S2;
 
 /// Sums of some ten thousand terms keep all but four digits of f64.
 const SUMMED: f64 = 1e-11;
@@ -9,7 +10,7 @@ const SUMMED: f64 = 1e-11;
 /// The cube's mass [kg], the step [s], gravity [m/s²].
 const MASS: f64 = 0.11;
 const STEP: f64 = 1e-3;
-const GRAVITY: DVec3 = DVec3::new(0.0, -9.81, 0.0);
+const GRAVITY: DVec3 = DVec3::new(0.0, -GRAVITY_M_S2, 0.0);
 
 /// The contacts of a run: what touches what, and the numbers.
 struct Contacts {

@@ -7,10 +7,11 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::{DQuat, DVec3};
 use palpate::{
-    Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Obstacle, Pose, Recording, Shape, State, Twist, step,
+    Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelParameters, Obstacle, Pose,
+    Recording, Shape, State, step,
 };
 use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
+use palpate_testkit::{GRAVITY_M_S2, finger, floor, object_at, wait_until};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
@@ -29,24 +30,19 @@ fn logged() -> Workplace {
 /// The scene of `realtime::workplace`, made without the command.
 fn model(workplace: &Workplace) -> Model {
     let recording = Recording::from_bytes(&workplace.read("cube.palp")).expect("a recording");
-    let finger = DeviceParameters {
-        tip_radius: 0.005,
-        patch_radius: 0.005,
-        friction: 0.6,
-        coupling: Some(Coupling { stiffness: 200.0, damping: 0.5 }),
-    };
-    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Z }, pose: Pose::IDENTITY, friction: 0.5 };
+    let coupling = Some(Coupling { stiffness: 200.0, damping: 0.5 });
+    let finger = DeviceParameters { coupling, ..finger(0.005, 0.005, 0.6) };
+    let floor = Obstacle { shape: Shape::Plane { normal: DVec3::Z }, ..floor(0.5) };
     let parameters = ModelParameters {
-        step_s: 0.002,
-        gravity: DVec3::new(0.0, 0.0, -9.81),
+        step_s: STEP_S,
+        gravity: DVec3::Z * -GRAVITY_M_S2,
         max_contact_samples: 8,
         devices: vec![finger; 2],
         obstacles: vec![floor],
         ..ModelParameters::default()
     };
-    let pose = Pose { position: DVec3::new(0.0, 0.0, 0.0501), orientation: DQuat::IDENTITY };
-    let start = ObjectStart { pose, twist: Twist::ZERO };
-    Model::new(parameters, vec![ModelObject::new(Arc::new(recording), start)]).expect("a model")
+    let cube = object_at(&Arc::new(recording), DVec3::Z * 0.0501, DVec3::ZERO);
+    Model::new(parameters, vec![cube]).expect("a model")
 }
 
 /// Where the cube's surface nodes are at the end of each step [m, world], from 0; computed from the log's inputs.
@@ -76,6 +72,33 @@ fn surfaces(workplace: &Workplace) -> Vec<Vec<DVec3>> {
     surfaces
 }
 
+/// Step of the scene [s].
+const STEP_S: f64 = 0.002;
+
+/// Rounding of times below a second to single precision [s].
+const TIME_S: f64 = 1e-6;
+
+/// Round-off of a time that is a sum of steps and was written as text [s].
+const TEXT_S: f64 = 1e-9;
+
+/// Rounding of normals and forces to single precision [1], relative above 1.
+const SINGLE_SHARE: f64 = 1e-6;
+
+/// Rounding of the largest of many displacements, differences of coordinates in single precision [1].
+const LARGEST_SHARE: f64 = 1e-5;
+
+/// Displacement of a cube that deforms [m], at least.
+const DEFORMED_M: f64 = 1e-5;
+
+/// Round-off of a turned unit vector [1].
+const TURNED: f64 = 1e-12;
+
+/// Rounding of a coordinate that is 0 [m].
+const ON_THE_FLOOR_M: f64 = 1e-9;
+
+/// Rounding of the radius of a tip of 5 mm to single precision [m].
+const TIP_M: f64 = 1e-8;
+
 /// The largest distance [m] of a point from the nearest of others.
 fn apart(points: &[DVec3], others: &[DVec3]) -> f64 {
     let nearest = |p: &DVec3| others.iter().map(|other| (*p - *other).length()).fold(f64::INFINITY, f64::min);
@@ -100,7 +123,7 @@ fn an_animation_has_the_surface_at_every_frame_where_the_run_had_it() {
     for (frame, time) in times.iter().enumerate() {
         let number = (time / 0.002).round() as usize;
         assert!(
-            (time - frame as f64 / 30.0) < 0.002 && (time - 0.002 * number as f64).abs() < 1e-6,
+            (time - frame as f64 / 30.0) < STEP_S && (time - STEP_S * number as f64).abs() < TIME_S,
             "{time}"
         );
         let (position, turn) = glb.place("cube", frame);
@@ -110,19 +133,22 @@ fn an_animation_has_the_surface_at_every_frame_where_the_run_had_it() {
         assert!(off < SINGLE, "frame {frame}: {off:e} m");
         // Normals are unit vectors, also of a deformed surface.
         let normals = glb.vertices("cube", "NORMAL", &weights[19 * frame..19 * (frame + 1)]);
-        assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-6));
+        assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < SINGLE_SHARE));
     }
     // It does deform: the last shape is not the first.
     let (first, last) = (&weights[..19], &weights[18 * 19..]);
     let moved = apart(&glb.vertices("cube", "POSITION", last), &glb.vertices("cube", "POSITION", first));
-    assert!(moved > 1e-5, "{moved:e}");
+    assert!(moved > DEFORMED_M, "{moved:e}");
 
     // Gravity points down: the scene's z is up, and glTF's y.
     let up = DQuat::from_array(glb.property("world", "rotation")) * DVec3::Z;
-    assert!((up - DVec3::Y).length() < 1e-12, "{up}");
+    assert!((up - DVec3::Y).length() < TURNED, "{up}");
     // The floor lies where it is, does not move, and is not smaller than the cube.
     let floor = glb.vertices("floor", "POSITION", &[]);
-    assert!(floor.iter().all(|p| p.z.abs() < 1e-9 && p.x.abs() > 0.1 && p.y.abs() > 0.1), "{floor:?}");
+    assert!(
+        floor.iter().all(|p| p.z.abs() < ON_THE_FLOOR_M && p.x.abs() > 0.1 && p.y.abs() > 0.1),
+        "{floor:?}"
+    );
     assert!(glb.channel("floor", "translation", 3).is_none() && glb.channel("floor", "weights", 1).is_none());
     // Tips are where the proxies are.
     workplace.succeed(&["export", "run.mcap", "--csv", "steps.csv"]);
@@ -133,7 +159,7 @@ fn an_animation_has_the_surface_at_every_frame_where_the_run_had_it() {
         assert!((glb.place("left", frame).0 - proxies[number - 1]).length() < SINGLE);
     }
     let tip = glb.vertices("left", "POSITION", &[]);
-    assert!(tip.iter().all(|p| (p.length() - 0.005).abs() < 1e-8));
+    assert!(tip.iter().all(|p| (p.length() - 0.005).abs() < TIP_M));
 }
 
 #[test]
@@ -154,10 +180,10 @@ fn a_part_of_a_run_is_that_part_of_the_whole() {
     let glb = Glb::parse(&workplace.read("part.glb"));
     let (times, _) = glb.channel("cube", "weights", 1).expect("it deforms");
     for (frame, time) in times.iter().enumerate() {
-        assert!((time - 0.02 * frame as f64).abs() < 1e-6, "an animation begins at 0: {times:?}");
+        assert!((time - 0.02 * frame as f64).abs() < TIME_S, "an animation begins at 0: {times:?}");
     }
     let start = glb.json["asset"]["extras"]["start_s"].as_f64().expect("a number");
-    assert!((start - 0.2).abs() < 1e-9, "{start}");
+    assert!((start - 0.2).abs() < TEXT_S, "{start}");
     let text = workplace.succeed(&["export", "run.mcap", "--contacts", "c.csv", "--to", "0.1"]);
     assert_eq!(text, "50 of 300 steps repeated, bit for bit\n  contacts     c.csv\n");
 }
@@ -206,12 +232,14 @@ fn frames_for_paraview_show_obstacles_contacts_and_devices() {
         assert!(off < SINGLE, "frame {frame}: {off:e}");
         let rows = contacts.lines().skip(1).filter_map(|line| {
             let numbers: Vec<f64> = line.split(',').filter_map(|cell| cell.parse().ok()).collect();
-            ((numbers[0] - time).abs() < 1e-9).then(|| DVec3::from_slice(&numbers[7..]))
+            ((numbers[0] - time).abs() < TEXT_S).then(|| DVec3::from_slice(&numbers[7..]))
         });
         let forces = vectors(&file("scene.contacts"), "force");
         let rows: Vec<DVec3> = rows.collect();
         assert_eq!(rows.len(), forces.len(), "frame {frame}");
-        assert!(rows.iter().zip(&forces).all(|(a, b)| (*a - *b).length() < 1e-6 * (1.0 + a.length())));
+        assert!(
+            rows.iter().zip(&forces).all(|(a, b)| (*a - *b).length() < SINGLE_SHARE * (1.0 + a.length()))
+        );
         assert_eq!(vectors(&file("scene.devices"), "Points").len(), 2);
     }
     assert!(vectors(&workplace.text("frames/scene.contacts_00030.vtu"), "force").len() > 2, "it stands");
@@ -244,7 +272,7 @@ fn a_recording_is_exported_as_the_shapes_of_its_modes() {
     }
     let drawn = glb.vertices("box:0.1x0.1x0.1/3x3x3", "POSITION", &[0.0, 0.0, 1.0]);
     let largest = rest.iter().zip(&drawn).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
-    assert!((largest / (0.1 * recording.surface.diagonal()) - 1.0).abs() < 1e-5, "{largest}");
+    assert!((largest / (0.1 * recording.surface.diagonal()) - 1.0).abs() < LARGEST_SHARE, "{largest}");
     let shape: Vec<DVec3> = (0..recording.surface.positions.len())
         .map(|node| DVec3::from_array([0, 1, 2].map(|axis| recording.modes.row(node, axis)[2])))
         .collect();
@@ -400,9 +428,7 @@ fn an_interrupt_leaves_no_frames_behind_and_older_ones_as_they_were() {
             let entries = std::fs::read_dir(workplace.path(folder)).into_iter().flatten().flatten();
             entries.filter(|entry| entry.file_name().to_string_lossy().starts_with('.')).count()
         };
-        while hidden() < 5 {
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
+        wait_until("five frames", || hidden() >= 5);
         let interrupt = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(interrupt.is_ok_and(|status| status.success()));
         assert_eq!(child.wait().expect("a child").code(), Some(130));

@@ -326,7 +326,7 @@ fn the_papers_rules_can_be_chosen_and_change_the_outcome() {
     .into_iter()
     .enumerate()
     {
-        workplace.write("scene.toml", format!("{rules}{SCENE}"));
+        workplace.write("scene.toml", format!("{rules}{}", *SCENE));
         let name = format!("{at}.csv");
         workplace.succeed(&["run", "scene.toml", "--csv", &name]);
         let table = Table::parse(&workplace.text(&name));

@@ -1,10 +1,10 @@
 //! Stores of impulse responses: written, interrupted, shared, damaged, and used in scenes.
 
 use crate::workplace::{CUBE, SCENE, Table, Workplace};
+use palpate_testkit::{Random, made_once_per_run, wait_until};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 /// The table of a cube of 4³ cells by time integration, in 49 shards: some seconds of work.
 const TABLE: [&str; 20] = [
@@ -30,22 +30,54 @@ const TABLE: [&str; 20] = [
     "t.zarr",
 ];
 
-/// Every file below a folder with its bytes.
-fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
+/// Every file below a folder; none where there is no folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
     let mut waiting = vec![folder.to_path_buf()];
     while let Some(place) = waiting.pop() {
-        for entry in std::fs::read_dir(&place).expect("a folder").flatten() {
+        for entry in std::fs::read_dir(&place).into_iter().flatten().flatten() {
             let path = entry.path();
-            if path.is_dir() {
-                waiting.push(path);
-            } else {
-                let bytes = std::fs::read(&path).expect("a file");
-                found.insert(path.strip_prefix(folder).expect("below").to_path_buf(), bytes);
-            }
+            if path.is_dir() { waiting.push(path) } else { found.push(path) }
         }
     }
     found
+}
+
+/// Every file below a folder with its bytes.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let named = |path: &PathBuf| path.strip_prefix(folder).expect("below").to_path_buf();
+    files(folder).iter().map(|path| (named(path), std::fs::read(path).expect("a file"))).collect()
+}
+
+/// Copy of a folder.
+fn copy(from: &Path, to: &Path) {
+    for (name, bytes) in contents(from) {
+        let file = to.join(name);
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("a writable folder");
+        std::fs::write(file, bytes).expect("a writable folder");
+    }
+}
+
+/// The store of [`TABLE`] as an undisturbed run leaves it, and what that run printed; made once per run of the tests.
+fn whole_store() -> (PathBuf, String) {
+    let folder = made_once_per_run(Path::new(env!("CARGO_TARGET_TMPDIR")), "store", |folder| {
+        let workplace = Workplace::new();
+        std::fs::write(folder.join("printed"), workplace.succeed(&TABLE)).expect("a writable folder");
+        copy(&workplace.path("t.zarr"), &folder.join("t.zarr"));
+    });
+    (folder.join("t.zarr"), std::fs::read_to_string(folder.join("printed")).expect("text"))
+}
+
+/// A workplace with a copy of the whole store.
+fn with_whole_store() -> Workplace {
+    let workplace = Workplace::new();
+    copy(&whole_store().0, &workplace.path("t.zarr"));
+    workplace
+}
+
+/// Number of files of a store that are whole: a writer's own files have a `#` in their names.
+fn whole_files(store: &Path) -> usize {
+    files(store).iter().filter(|path| !path.to_string_lossy().contains('#')).count()
 }
 
 fn same(a: &Path, b: &Path) {
@@ -58,10 +90,8 @@ fn same(a: &Path, b: &Path) {
 
 #[test]
 fn a_recording_that_is_killed_ten_times_ends_with_the_same_bytes() {
-    let undisturbed = Workplace::new();
-    undisturbed.succeed(&TABLE);
     let workplace = Workplace::new();
-    let mut random = 88_172_645_463_325_252_u64;
+    let mut random = Random::new(88_172_645_463_325_252);
     let mut interrupted = 0;
     for _ in 0..10 {
         let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
@@ -71,23 +101,25 @@ fn a_recording_that_is_killed_ten_times_ends_with_the_same_bytes() {
             .stdout(Stdio::null())
             .spawn()
             .expect("the command starts");
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        std::thread::sleep(Duration::from_millis(40 + random % 200));
-        interrupted += usize::from(child.try_wait().expect("a child").is_none());
+        // It has written one to four more files, of which there are more than 49.
+        let enough = whole_files(&workplace.path("t.zarr")) + random.one_of([1, 2, 3, 4]);
+        let mut has_ended = false;
+        wait_until("more files", || {
+            has_ended = child.try_wait().expect("a child").is_some();
+            has_ended || whole_files(&workplace.path("t.zarr")) >= enough
+        });
+        interrupted += usize::from(!has_ended);
         child.kill().expect("a child");
         child.wait().expect("a child");
     }
     assert!(interrupted >= 5, "most runs are killed while they work: {interrupted}");
     workplace.succeed(&TABLE);
-    same(&undisturbed.path("t.zarr"), &workplace.path("t.zarr"));
+    same(&whole_store().0, &workplace.path("t.zarr"));
 }
 
 #[test]
 fn what_a_killed_writer_left_unfinished_is_removed_wherever_it_lies() {
-    let workplace = Workplace::new();
-    workplace.succeed(&TABLE);
+    let workplace = with_whole_store();
     let whole = contents(&workplace.path("t.zarr"));
     // A writer's files have such names until they are whole; a run can be killed while it writes any of them.
     for name in [
@@ -104,8 +136,7 @@ fn what_a_killed_writer_left_unfinished_is_removed_wherever_it_lies() {
 
 #[test]
 fn parts_by_several_machines_make_one_store() {
-    let whole = Workplace::new();
-    let printed = whole.succeed(&TABLE);
+    let (whole, printed) = whole_store();
     assert!(printed.contains("49 of 49 done"), "{printed}");
     let workplace = Workplace::new();
     workplace.succeed(&[&TABLE[..], &["--shard", "1/3"]].concat());
@@ -126,7 +157,7 @@ fn parts_by_several_machines_make_one_store() {
         .into_iter()
         .collect();
     assert!(others.iter().all(|output| output.as_ref().is_ok_and(|o| o.status.success())));
-    same(&whole.path("t.zarr"), &workplace.path("t.zarr"));
+    same(&whole, &workplace.path("t.zarr"));
     let inspected = workplace.json(&["inspect", "t.zarr", "--json"]);
     for (key, value) in
         [("shards_done", 49), ("samples", 80), ("touchable_dofs", 294), ("observed_dofs", 294)]
@@ -140,8 +171,6 @@ fn parts_by_several_machines_make_one_store() {
 
 #[test]
 fn two_runs_at_once_on_one_store_do_no_harm() {
-    let whole = Workplace::new();
-    whole.succeed(&TABLE);
     let workplace = Workplace::new();
     let start = || {
         Command::new(env!("CARGO_BIN_EXE_palpate"))
@@ -157,7 +186,7 @@ fn two_runs_at_once_on_one_store_do_no_harm() {
         let output = child.wait_with_output().expect("a child");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
-    same(&whole.path("t.zarr"), &workplace.path("t.zarr"));
+    same(&whole_store().0, &workplace.path("t.zarr"));
 }
 
 #[test]
@@ -185,8 +214,7 @@ fn a_store_of_another_table_is_refused_and_left_as_it_is() {
 
 #[test]
 fn a_damaged_shard_is_told_of_and_can_be_recorded_again() {
-    let workplace = Workplace::new();
-    workplace.succeed(&TABLE);
+    let workplace = with_whole_store();
     let whole = contents(&workplace.path("t.zarr"));
     let shard = workplace.path("t.zarr/impulse_response/c/7/0/0");
     let good = std::fs::read(&shard).expect("a shard");
@@ -208,8 +236,6 @@ fn a_damaged_shard_is_told_of_and_can_be_recorded_again() {
 
 #[test]
 fn a_disk_without_room_loses_nothing() {
-    let whole = Workplace::new();
-    whole.succeed(&TABLE);
     let workplace = Workplace::new();
     // A limit on the size of files acts as a full disk does.
     let limited = Command::new("sh")
@@ -225,7 +251,7 @@ fn a_disk_without_room_loses_nothing() {
         "{text}"
     );
     workplace.succeed(&TABLE);
-    same(&whole.path("t.zarr"), &workplace.path("t.zarr"));
+    same(&whole_store().0, &workplace.path("t.zarr"));
 }
 
 #[test]
@@ -303,7 +329,7 @@ fn both_forms_of_the_response_give_the_same_forces() {
         [("f64", "zstd", 1e-9), ("f64", "none", 1e-9), ("f32", "zstd", 1e-4), ("f32", "none", 1e-4)]
     {
         let workplace = with_table(&["--dtype", dtype, "--compression", compression]);
-        let modal = forces(&workplace, SCENE);
+        let modal = forces(&workplace, &SCENE);
         let beside =
             SCENE.replace("recording = \"cube.palp\"", "recording = \"cube.palp\"\nresponse = \"fir\"");
         let named = beside.replace("\"fir\"", "\"fir\"\ntable = \"cube.zarr\"");

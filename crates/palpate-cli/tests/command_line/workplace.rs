@@ -1,8 +1,10 @@
 //! A folder to work in, the command `palpate` in it, and small files to feed it.
 
+use palpate_testkit::made_once_per_run;
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::LazyLock;
 use tempfile::TempDir;
 
 /// A folder of its own that goes when the test ends.
@@ -30,26 +32,22 @@ pub const CUBE: [&str; 15] = [
     "-o",
 ];
 
-/// Two hands that hold the cube's left and right and press it for 50 ms, the right one for 40 ms only.
-pub const SCENE: &str = r#"step = 0.001
-gravity = [0.0, 0.0, -9.81]
+/// Two hands that hold the cube's left and right and press it for 50 ms, the right one for 40 ms only: the scene of
+/// `palpate demo`, with gravity.
+pub static SCENE: LazyLock<String> = LazyLock::new(|| {
+    let two_hands = include_str!("../../src/commands/demo/two_hands.toml");
+    format!("step = 0.001\ngravity = [0.0, 0.0, -9.81]\n\n{two_hands}")
+});
 
-[[object]]
-name = "cube"
-recording = "cube.palp"
-
-[[device]]
-name = "left"
-mode = "held"
-attach = { object = "cube", point = [-0.05, 0.0, 0.0] }
-path = { file = "left.csv" }
-
-[[device]]
-name = "right"
-mode = "held"
-attach = { object = "cube", point = [0.05, 0.0, 0.0] }
-path = { file = "right.csv" }
-"#;
+/// The recording of [`CUBE`], made once per run.
+fn cube() -> PathBuf {
+    let folder = made_once_per_run(Path::new(env!("CARGO_TARGET_TMPDIR")), "cube", |folder| {
+        let workplace = Workplace::new();
+        workplace.succeed(&[&CUBE[..], &["cube.palp"]].concat());
+        std::fs::copy(workplace.path("cube.palp"), folder.join("cube.palp")).expect("a writable folder");
+    });
+    folder.join("cube.palp")
+}
 
 impl Workplace {
     /// An empty folder.
@@ -65,8 +63,8 @@ impl Workplace {
     /// A folder with `cube.palp`, `scene.toml` and its paths `left.csv` and `right.csv`.
     pub fn with_scene() -> Self {
         let workplace = Self::new();
-        workplace.succeed(&[&CUBE[..], &["cube.palp"]].concat());
-        workplace.write("scene.toml", SCENE);
+        std::fs::copy(cube(), workplace.path("cube.palp")).expect("a writable folder");
+        workplace.write("scene.toml", &*SCENE);
         workplace.write("left.csv", "t,x,y,z\n0,-0.05,0,0\n0.03,-0.045,0.002,0\n0.05,-0.04,0.01,0.002\n");
         workplace.write("right.csv", "# a comment\n0,0.05,0,0\n0.04,0.046,0,0.001\n");
         workplace

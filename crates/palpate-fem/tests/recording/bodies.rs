@@ -1,12 +1,11 @@
 //! Bodies of the tests, and matrices of a recording.
 
 use faer::{Mat, Side};
-use glam::DVec3;
-use palpate::{Damping, Material, ResidualCompliance};
+use palpate::{Damping, ResidualCompliance};
 use palpate_fem::mesh::{Mesh, Region, box_mesh};
-use palpate_fem::{
-    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, SilentProgress,
-};
+use palpate_fem::{ElementOrder, Progress, RecordParameters, RecordedBody};
+use palpate_testkit::undamped;
+pub use palpate_testkit::{isotropic, nodes_where};
 use std::sync::OnceLock;
 
 /// Solves with a factor of condition up to 1e6 keep ten of sixteen digits.
@@ -18,20 +17,10 @@ pub const SUMMED: f64 = 1e-12;
 /// Largest relative rounding error of f32: half a unit in the 24th binary digit.
 pub const F32_ROUNDING: f64 = 1.0 / 16_777_216.0;
 
-pub fn material(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
-    Material { region: String::new(), young_pa, poisson, density_kg_m3 }
-}
-
 pub fn parameters(order: ElementOrder, modes: usize) -> RecordParameters {
     RecordParameters {
-        materials: vec![material(2e4, 0.3, 1000.0)],
-        order,
-        modes,
         damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
-        residual: ResidualChoice::Automatic,
-        fixed_nodes: Vec::new(),
-        source: "test".into(),
-        extent: RecordExtent::Full,
+        ..undamped(2e4, 0.3, 1000.0, order, modes)
     }
 }
 
@@ -39,17 +28,12 @@ pub fn block(size: [f64; 3], cells: [u32; 3]) -> Mesh {
     box_mesh(size, cells).expect("a good box")
 }
 
-/// Nodes of a mesh where a condition holds.
-pub fn nodes_where(mesh: &Mesh, holds: impl Fn(DVec3) -> bool) -> Vec<u32> {
-    (0..mesh.nodes.len() as u32).filter(|&node| holds(mesh.nodes[node as usize])).collect()
-}
-
 pub fn recorded(mesh: Mesh, parameters: &RecordParameters) -> RecordedBody {
-    RecordedBody::new(mesh, parameters, &mut SilentProgress).expect("a good recording")
+    palpate_testkit::recorded(mesh, parameters).expect("a good recording")
 }
 
 pub fn refusal(mesh: Mesh, parameters: &RecordParameters) -> String {
-    RecordedBody::new(mesh, parameters, &mut SilentProgress).err().expect("an error").to_string()
+    palpate_testkit::recorded(mesh, parameters).err().expect("an error").to_string()
 }
 
 /// Listener that keeps the warnings.
@@ -72,7 +56,7 @@ pub fn two_material_bar(modes: usize) -> (Mesh, RecordParameters) {
     for (tet, region) in mesh.tets.iter().zip(&mut mesh.tet_regions) {
         *region = u32::from(tet.iter().map(|&n| mesh.nodes[n as usize].x).sum::<f64>() > 0.0);
     }
-    let materials = vec![material(2e4, 0.45, 1000.0), material(3e5, 0.2, 2500.0)];
+    let materials = vec![isotropic(2e4, 0.45, 1000.0), isotropic(3e5, 0.2, 2500.0)];
     (mesh, RecordParameters { materials, ..parameters(ElementOrder::Quadratic, modes) })
 }
 

@@ -79,7 +79,7 @@ fn gravity_bends_a_fixed_bar_as_its_static_compliance_says() {
 fn a_hanging_bar_without_poisson_effect_sags_by_its_weight_over_twice_its_stiffness() {
     // u = ρg/E·(L·s − s²/2) at s from the support: in the space of quadratic elements, so exact at every node.
     let (mesh, parameters) = fixed_bar(ElementOrder::Quadratic, 15);
-    let parameters = RecordParameters { materials: vec![material(2e4, 0.0, 1000.0)], ..parameters };
+    let parameters = RecordParameters { materials: vec![isotropic(2e4, 0.0, 1000.0)], ..parameters };
     let recording = recorded(mesh, &parameters).recording;
     let gravity = recording.gravity.expect("a fixed body has a gravity response");
     let (m, end) = (recording.modes.len(), 1000.0 / 2e4 * 0.2 * 0.2 / 2.0);
@@ -163,7 +163,7 @@ fn a_cube_fixed_at_three_corners_can_be_recorded() {
 #[test]
 fn materials_and_options_out_of_range_are_refused_with_value_and_range() {
     let with_material = |young, poisson, density| {
-        let materials = vec![material(young, poisson, density)];
+        let materials = vec![isotropic(young, poisson, density)];
         refusal(small_cube(), &RecordParameters { materials, ..parameters(ElementOrder::Linear, 6) })
     };
     assert_eq!(
@@ -210,7 +210,7 @@ fn locking_and_warnings_of_the_mesh_are_reported() {
     let mut mesh = small_cube();
     mesh.nodes.push(DVec3::ZERO);
     let parameters = RecordParameters {
-        materials: vec![material(2e4, 0.49995, 1000.0)],
+        materials: vec![isotropic(2e4, 0.49995, 1000.0)],
         ..parameters(ElementOrder::Linear, 40)
     };
     record(mesh, &parameters, &mut listener).expect("a good recording");

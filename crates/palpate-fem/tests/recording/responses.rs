@@ -3,7 +3,7 @@
 use faer::Mat;
 use glam::DVec3;
 use palpate::{Damping, NearField, SampledOscillator};
-use palpate_fem::{ElementOrder, RecordParameters, RecordedBody, ResidualChoice, SilentProgress};
+use palpate_fem::{ElementOrder, RecordParameters, RecordedBody, ResidualChoice, SilentProgress, paper_cube};
 
 use crate::bodies::*;
 
@@ -172,7 +172,7 @@ fn truncated_response_is_the_sum_over_all_modes() {
     let fixed_nodes = nodes_where(&mesh, |p| p.z < -0.0499);
     for fixed_nodes in [Vec::new(), fixed_nodes] {
         let parameters = RecordParameters {
-            materials: vec![material(2000.0, 0.49, 110.0)],
+            materials: vec![paper_cube::material()],
             fixed_nodes,
             ..parameters(ElementOrder::Linear, KEPT)
         };
@@ -208,7 +208,7 @@ fn certified_errors_fall_with_modes_and_show_what_a_missing_residual_costs() {
     const AT_REST: f64 = 1e-5;
     let certificate = |modes, residual| {
         let parameters = RecordParameters {
-            materials: vec![material(2000.0, 0.49, 110.0)],
+            materials: vec![paper_cube::material()],
             residual,
             ..parameters(ElementOrder::Linear, modes)
         };

@@ -55,6 +55,7 @@ impl Shared {
 
 /// Client that keeps a device connected to a force process elsewhere, until it is dropped.
 pub struct LinkClient {
+    /// Runtime of its own; none in one that others run.
     runtime: Option<Runtime>,
     endpoint: Endpoint,
     shared: Arc<Shared>,
@@ -73,10 +74,6 @@ impl LinkClient {
         start: Instant,
     ) -> Result<(DevicePort, Self), Error> {
         secret.check(address.ip())?;
-        let crypto = QuicClientConfig::try_from(secret.client()?)
-            .map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
-        let mut config = ClientConfig::new(Arc::new(crypto));
-        config.transport_config(transport());
         let runtime = runtime()?;
         let own: SocketAddr = match address {
             SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
@@ -86,6 +83,24 @@ impl LinkClient {
             let _inside = runtime.enter();
             Endpoint::client(own).map_err(|error| LinkError::NoSocket { reason: error.to_string() })?
         };
+        let (port, mut client, connected) = Self::on(endpoint, address, secret, device, start)?;
+        runtime.spawn(connected);
+        client.runtime = Some(runtime);
+        Ok((port, client))
+    }
+
+    /// Client on an endpoint, and the task that keeps it connected.
+    pub(super) fn on(
+        endpoint: Endpoint,
+        address: SocketAddr,
+        secret: &Secret,
+        device: &str,
+        start: Instant,
+    ) -> Result<(DevicePort, Self, impl Future<Output = ()> + Send + use<>), Error> {
+        let crypto = QuicClientConfig::try_from(secret.client()?)
+            .map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
+        let mut config = ClientConfig::new(Arc::new(crypto));
+        config.transport_config(transport());
         let state = Mutex::new(LinkState::Connecting("not tried yet".to_string()));
         let shared = Arc::new(Shared { connection: Mutex::new(None), state });
         let (efforts, newest) = triple_buffer(&Effort::default());
@@ -95,12 +110,11 @@ impl LinkClient {
             address,
             device: device.to_string(),
             shared: shared.clone(),
-            start,
+            start: start.into(),
         };
-        runtime.spawn(link.keep_connected(efforts));
         let sender = shared.clone();
         let port = DevicePort::remote(Box::new(move |motion| sender.send(&motion)), newest);
-        Ok((port, Self { runtime: Some(runtime), endpoint, shared }))
+        Ok((port, Self { runtime: None, endpoint, shared }, link.keep_connected(efforts)))
     }
 
     /// State of the link.
@@ -124,7 +138,8 @@ struct Link {
     address: SocketAddr,
     device: String,
     shared: Arc<Shared>,
-    start: Instant,
+    /// Origin of all times, on the runtime's clock.
+    start: tokio::time::Instant,
 }
 
 impl Link {

@@ -9,6 +9,8 @@ mod identity;
 mod messages;
 mod sequence;
 mod server;
+#[cfg(test)]
+mod simulated;
 mod transport;
 
 pub use client::{LinkClient, LinkState};

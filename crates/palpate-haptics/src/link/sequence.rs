@@ -24,35 +24,32 @@ mod tests {
         Columns, DevicePort, Effort, ForcePort, HapticUpdate, Motion, MotionPath, Safety, SafetyLimits, port,
     };
     use glam::DVec3;
+    use palpate_testkit::Random;
     use std::collections::BTreeMap;
+
+    /// Round-off of a force that is ramped [N].
+    const CLAMPED_N: f64 = 1e-9;
 
     /// Wire in simulated time [ms] that loses, duplicates and delays datagrams.
     struct Wire {
         /// Datagrams by arrival time and order of sending.
         under_way: BTreeMap<(u64, u64), Vec<u8>>,
         sent: u64,
-        random: u64,
+        random: Random,
         cut: bool,
     }
 
     impl Wire {
         fn new(seed: u64) -> Self {
-            Self { under_way: BTreeMap::new(), sent: 0, random: seed, cut: false }
-        }
-
-        /// Random number from 0 to 999.
-        fn thousandth(&mut self) -> u64 {
-            self.random =
-                self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.random >> 33) % 1000
+            Self { under_way: BTreeMap::new(), sent: 0, random: Random::new(seed), cut: false }
         }
 
         /// A fifth is lost, a tenth comes twice, all are late by up to 12 ms each, so that they overtake one another.
         fn send(&mut self, tick: u64, bytes: &[u8]) {
-            let copies =
-                if self.cut || self.thousandth() < 200 { 0 } else { 1 + u64::from(self.thousandth() < 100) };
+            let lost = self.cut || self.random.chance(0.2);
+            let copies = if lost { 0 } else { 1 + u64::from(self.random.chance(0.1)) };
             for _ in 0..copies {
-                let arrival = tick + 12 * self.thousandth() / 1000;
+                let arrival = tick + self.random.within(0.0, 12.0) as u64;
                 self.sent += 1;
                 self.under_way.insert((arrival, self.sent), bytes.to_vec());
             }
@@ -165,6 +162,6 @@ mod tests {
         assert_eq!(update.held_force().x, 0.5, "and it comes back by itself");
         assert!(link.dropped > 500, "{} late or doubled messages", link.dropped);
         let safety = update.counts().safety;
-        assert!(safety.trips >= 1 && update.counts().force_max_n <= 0.5 + 1e-9, "{safety:?}");
+        assert!(safety.trips >= 1 && update.counts().force_max_n <= 0.5 + CLAMPED_N, "{safety:?}");
     }
 }

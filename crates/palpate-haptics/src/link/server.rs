@@ -67,7 +67,22 @@ struct DeviceSlots {
     connected: Mutex<HashMap<String, ConnectedDevice>>,
     names: Vec<String>,
     counters: Counters,
-    start: Instant,
+    /// Origin of all times, on the runtime's clock.
+    start: tokio::time::Instant,
+}
+
+impl DeviceSlots {
+    /// Sends every device its newest effort, if it is new.
+    fn send_new_efforts(&self) {
+        for device in lock(&self.connected).values_mut() {
+            let effort = *device.efforts.read();
+            if effort.sequence > device.sent {
+                device.sent = effort.sequence;
+                // A datagram that can't be sent now would be outdated later.
+                let _ = device.connection.send_datagram(effort_bytes(&effort).to_vec().into());
+            }
+        }
+    }
 }
 
 /// Connected device: source and destination of its efforts.
@@ -80,6 +95,7 @@ struct ConnectedDevice {
 
 /// Server that listens for devices, until it is dropped.
 pub struct LinkServer {
+    /// Runtime of its own; none in one that others run.
     runtime: Option<Runtime>,
     endpoint: Endpoint,
     slots: Arc<DeviceSlots>,
@@ -101,10 +117,7 @@ impl LinkServer {
     ) -> Result<Self, Error> {
         secret.check(address.ip())?;
         let failed = |error: std::io::Error| LinkError::Bind { address, reason: error.to_string() };
-        let crypto = QuicServerConfig::try_from(secret.server()?)
-            .map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
-        let mut config = ServerConfig::with_crypto(Arc::new(crypto));
-        config.transport_config(transport());
+        let config = server_config(secret)?;
         let runtime = runtime()?;
         let endpoint = {
             let _inside = runtime.enter();
@@ -112,22 +125,42 @@ impl LinkServer {
             let quic = Arc::new(quinn::TokioRuntime);
             Endpoint::new(quinn::EndpointConfig::default(), Some(config), socket, quic).map_err(failed)?
         };
-        let names = ports.iter().map(|(name, _)| name.clone()).collect();
-        let free = Mutex::new(ports.into_iter().collect());
-        let connected = Mutex::new(HashMap::new());
-        let slots = Arc::new(DeviceSlots { free, connected, names, counters: Counters::default(), start });
-        runtime.spawn(listen(endpoint.clone(), slots.clone()));
-        let stop = Arc::new(AtomicBool::new(false));
+        let (mut server, listening) = Self::on(endpoint, ports, start);
+        runtime.spawn(listening);
+        server.runtime = Some(runtime);
         let clock = Clock::new(start, step_s).with_phase(SEND_PHASE * step_s).without_spinning();
         let sending = std::thread::Builder::new().name("palpate efforts".to_string()).spawn({
-            let (slots, stop) = (slots.clone(), stop.clone());
+            let (slots, stop) = (server.slots.clone(), server.stop.clone());
             move || send_efforts(&slots, &clock, &stop)
         });
         let sending = sending.map_err(|error| Error::ThreadSpawn {
             purpose: "link's efforts".to_string(),
             reason: error.to_string(),
         })?;
-        Ok(Self { runtime: Some(runtime), endpoint, slots, stop, sending: Some(sending) })
+        server.sending = Some(sending);
+        Ok(server)
+    }
+
+    /// Server on an endpoint, and the task that accepts connections. Efforts are sent by [`Self::send_new_efforts`].
+    pub(super) fn on(
+        endpoint: Endpoint,
+        ports: Vec<(String, DevicePort)>,
+        start: Instant,
+    ) -> (Self, impl Future<Output = ()> + Send + use<>) {
+        let names = ports.iter().map(|(name, _)| name.clone()).collect();
+        let free = Mutex::new(ports.into_iter().collect());
+        let connected = Mutex::new(HashMap::new());
+        let (counters, start) = (Counters::default(), start.into());
+        let slots = Arc::new(DeviceSlots { free, connected, names, counters, start });
+        let listening = listen(endpoint.clone(), slots.clone());
+        let stop = Arc::new(AtomicBool::new(false));
+        (Self { runtime: None, endpoint, slots, stop, sending: None }, listening)
+    }
+
+    /// Sends every device its newest effort, if it is new.
+    #[cfg(test)]
+    pub(super) fn send_new_efforts(&self) {
+        self.slots.send_new_efforts();
     }
 
     /// Address that the server listens at.
@@ -165,6 +198,15 @@ impl Drop for LinkServer {
             runtime.shutdown_timeout(Duration::from_millis(100));
         }
     }
+}
+
+/// QUIC settings of a server with a secret.
+pub(super) fn server_config(secret: &Secret) -> Result<ServerConfig, Error> {
+    let crypto = QuicServerConfig::try_from(secret.server()?)
+        .map_err(|error| LinkError::Encryption { reason: error.to_string() })?;
+    let mut config = ServerConfig::with_crypto(Arc::new(crypto));
+    config.transport_config(transport());
+    Ok(config)
 }
 
 /// Tokio runtime with one thread, for everything that links receive.
@@ -231,14 +273,7 @@ fn send_efforts(slots: &DeviceSlots, clock: &Clock, stop: &AtomicBool) {
     while !stop.load(Ordering::Relaxed) {
         clock.wait(tick);
         tick = clock.next_after(tick);
-        for device in lock(&slots.connected).values_mut() {
-            let effort = *device.efforts.read();
-            if effort.sequence > device.sent {
-                device.sent = effort.sequence;
-                // A datagram that can't be sent now would be outdated later.
-                let _ = device.connection.send_datagram(effort_bytes(&effort).to_vec().into());
-            }
-        }
+        slots.send_new_efforts();
     }
 }
 

@@ -1,8 +1,9 @@
 //! Haply's Inverse Service: axes, its one answer per message, and a service that goes away and comes back.
 
-use super::standin::{Hand, until};
+use super::standin::Hand;
 use glam::{DQuat, DVec3};
 use palpate_haptics::device::Driver;
+use palpate_testkit::wait_until;
 use serde_json::{Value, json};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,6 +11,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use tungstenite::{Error, Message, WebSocket};
+
+/// Round-off of an angle between rotations [rad]: the root of that of their product.
+const TURN_RAD: f64 = 1e-9;
 
 /// Replies of the service.
 #[derive(Clone, Copy, PartialEq)]
@@ -172,7 +176,7 @@ fn open(service: &Service) -> Hand {
 
 /// Push until the service has the force.
 fn push(hand: &mut Hand, service: &Service, force: DVec3, theirs: [f64; 3]) {
-    until("the force arrives", || {
+    wait_until("the force arrives", || {
         hand.set_force(force).expect("it pushes");
         service.force() == theirs
     });
@@ -224,13 +228,13 @@ fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     let reading = hand.next();
     assert_eq!(reading.position, DVec3::new(0.01, 0.15, 0.12), "to the right, up, towards the user");
     let turned = reading.orientation.expect("it has a grip");
-    assert!(turned.angle_between(DQuat::from_rotation_y(2.0 * half)) < 1e-9, "{turned}");
+    assert!(turned.angle_between(DQuat::from_rotation_y(2.0 * half)) < TURN_RAD, "{turned}");
     assert_eq!(reading.buttons, 0b10);
     push(&mut hand, &service, DVec3::new(1.0, 2.0, 3.0), [1.0, -3.0, 2.0]);
     push(&mut hand, &service, DVec3::new(f64::NAN, 2.0, 3.0), [0.0; 3]);
     // Nobody pushes any more: whoever did may have died.
     push(&mut hand, &service, DVec3::X, [1.0, 0.0, 0.0]);
-    until("the force goes", || service.force() == [0.0; 3]);
+    wait_until("the force goes", || service.force() == [0.0; 3]);
     push(&mut hand, &service, DVec3::X, [1.0, 0.0, 0.0]);
     drop(hand);
     assert_eq!(service.force(), [0.0; 3], "it is left without force");
@@ -246,14 +250,14 @@ fn replies_without_a_reading_count_as_silence() {
     for mood in [Mood::Garbage, Mood::NoDevice, Mood::Nothing] {
         service.set(|world| world.mood = mood);
         let mut why = None;
-        until("silence", || {
+        wait_until("silence", || {
             why = hand.read().err();
             why.is_some()
         });
         let why = why.expect("it was waited for");
         assert!(why.starts_with("haply: no reading for 20 ms; last failure: "), "{why}");
         service.set(|world| world.mood = Mood::States);
-        until("it tells again", || hand.read().is_ok());
+        wait_until("it tells again", || hand.read().is_ok());
     }
 }
 
@@ -263,12 +267,14 @@ fn a_service_that_goes_away_is_found_again() {
     let mut hand = open(&service);
     hand.next();
     service.stop();
-    until("it is gone, and said to be", || {
+    wait_until("it is gone, and said to be", || {
         hand.read().is_err_and(|why| why.contains("no Inverse Service at 127.0.0.1:"))
     });
     let again = Service::at(&service.address.to_string(), service.world.clone());
     again.set(|world| world.cursor = [0.0, 0.0, 0.1]);
-    until("it is found", || hand.read().is_ok_and(|reading| reading.position == DVec3::new(0.0, 0.1, 0.0)));
+    wait_until("it is found", || {
+        hand.read().is_ok_and(|reading| reading.position == DVec3::new(0.0, 0.1, 0.0))
+    });
     push(&mut hand, &again, DVec3::Y, [0.0, 0.0, 1.0]);
     // One that has gone for good holds up nobody who leaves.
     drop(again);

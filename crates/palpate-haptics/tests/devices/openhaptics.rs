@@ -1,8 +1,9 @@
 //! OpenHaptics: units, frames of the scheduler, errors, and several devices on one scheduler.
 
-use super::standin::{Hand, Standin, until};
+use super::standin::{Hand, Standin};
 use glam::{DQuat, DVec3};
 use palpate_haptics::device::Driver;
+use palpate_testkit::wait_until;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Transform = extern "C" fn(usize, &[f64; 16]);
@@ -11,6 +12,12 @@ type Code = extern "C" fn(u32);
 type Switch = extern "C" fn(bool);
 type InUse = extern "C" fn() -> bool;
 type Pushed = extern "C" fn(usize) -> bool;
+
+/// Round-off of a place that was converted from millimetres [m].
+const PLACE_M: f64 = 1e-15;
+
+/// Round-off of an angle between rotations [rad]: the root of that of their product.
+const TURN_RAD: f64 = 1e-9;
 
 /// The handle at a place [mm], turned by a quarter about the axis towards the user: its x points up.
 fn at(x: f64, y: f64, z: f64) -> [f64; 16] {
@@ -49,16 +56,16 @@ fn positions_forces_orientations_and_buttons_are_in_the_device_frame() {
     standin.function::<Press>("standin_press")(0, 0b10);
     let mut hand = open(&standin, "0");
     let reading = hand.next();
-    assert!((reading.position - DVec3::new(0.01, 0.02, -0.03)).length() < 1e-15, "{}", reading.position);
+    assert!((reading.position - DVec3::new(0.01, 0.02, -0.03)).length() < PLACE_M, "{}", reading.position);
     let turned = reading.orientation.expect("it tells");
-    assert!(turned.angle_between(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2)) < 1e-9, "{turned}");
+    assert!(turned.angle_between(DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2)) < TURN_RAD, "{turned}");
     assert_eq!(reading.buttons, 0b10);
-    until("the force arrives", || {
+    wait_until("the force arrives", || {
         hand.set_force(DVec3::new(0.1, 0.2, 0.3)).expect("it pushes");
         standin.force(0) == [0.1, 0.2, 0.3]
     });
     // Nobody pushes any more: whoever did may have died.
-    until("the force goes", || standin.force(0) == [0.0; 3]);
+    wait_until("the force goes", || standin.force(0) == [0.0; 3]);
 }
 
 #[test]
@@ -75,8 +82,8 @@ fn a_device_is_opened_once_and_left_without_force() {
         stranger.to_string(),
         "openhaptics: the device \"Right\" can't be had: Communication error (error 0x0302)"
     );
-    until("frames go on after both", || hand.read().is_ok());
-    until("the force arrives", || {
+    wait_until("frames go on after both", || hand.read().is_ok());
+    wait_until("the force arrives", || {
         hand.set_force(DVec3::X).expect("it pushes");
         standin.force(0) == [1.0, 0.0, 0.0]
     });
@@ -90,15 +97,15 @@ fn two_devices_share_the_scheduler_and_one_goes_on_when_the_other_is_left() {
     let (_alone, standin) = standin();
     standin.function::<Transform>("standin_transform")(1, &at(1000.0, 0.0, 0.0));
     let (mut first, mut second) = (open(&standin, "0"), open(&standin, "Left"));
-    until("frames of both", || first.read().is_ok() && second.read().is_ok());
+    wait_until("frames of both", || first.read().is_ok() && second.read().is_ok());
     assert_eq!(second.next().position, DVec3::X);
-    until("both push", || {
+    wait_until("both push", || {
         first.set_force(DVec3::X).and(second.set_force(DVec3::Y)).expect("they push");
         standin.force(0) == [1.0, 0.0, 0.0] && standin.force(1) == [0.0, 1.0, 0.0]
     });
     drop(first);
     assert_eq!(standin.force(0), [0.0; 3]);
-    until("the second goes on", || {
+    wait_until("the second goes on", || {
         second.set_force(DVec3::Z).expect("it pushes");
         second.read().is_ok() && standin.force(1) == [0.0, 0.0, 1.0]
     });
@@ -112,17 +119,17 @@ fn errors_of_forces_are_not_errors_of_places_and_both_pass_with_their_cause() {
     hand.next();
     fault(0x0200);
     let warm = Err("openhaptics: the force was not given: Warm motors (error 0x0200)".to_string());
-    until("motors are warm", || hand.set_force(DVec3::X) == warm);
+    wait_until("motors are warm", || hand.set_force(DVec3::X) == warm);
     hand.next();
     fault(0x0302);
     let gone = "openhaptics: the device reports no position: Communication error (error 0x0302)";
-    until("it is pulled out", || hand.read() == Err(gone.to_string()));
+    wait_until("it is pulled out", || hand.read() == Err(gone.to_string()));
     assert_eq!(hand.set_force(DVec3::X), Ok(()));
     assert_eq!(standin.force(0), [0.0; 3]);
     fault(0);
-    until("it is back", || hand.read().is_ok());
+    wait_until("it is back", || hand.read().is_ok());
     standin.function::<Switch>("standin_hang")(true);
-    until("no frames", || hand.read() == Err("openhaptics: the scheduler makes no frames".to_string()));
+    wait_until("no frames", || hand.read() == Err("openhaptics: the scheduler makes no frames".to_string()));
     drop(hand);
     assert!(!standin.function::<InUse>("standin_in_use")(), "also left while it hangs");
 }
@@ -132,11 +139,14 @@ fn numbers_that_are_not_finite_are_read_and_never_commanded() {
     let (_alone, standin) = standin();
     let mut hand = open(&standin, "0");
     standin.function::<Transform>("standin_transform")(0, &[f64::NAN; 16]);
-    until("garbage", || hand.next().position.is_nan());
+    wait_until("garbage", || hand.next().position.is_nan());
     assert_eq!(hand.next().orientation, None);
-    for _ in 0..20 {
+    for metre in 0..20 {
         hand.set_force(DVec3::new(f64::NAN, 1.0, 1.0)).expect("it pushes");
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        // A place that was given after the force is read: a frame has passed.
+        let x = f64::from(metre);
+        standin.function::<Transform>("standin_transform")(0, &at(1000.0 * x, 0.0, 0.0));
+        wait_until("a frame", || (hand.next().position.x - x).abs() < PLACE_M);
     }
     assert!(!standin.function::<Pushed>("standin_pushed")(0));
 }

@@ -6,8 +6,9 @@ mod compile;
 use glam::DVec3;
 use libloading::Library;
 use palpate_haptics::device::{Device, Driver, Reading};
+use palpate_testkit::wait_until;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tempfile::TempDir;
 
 /// A stand-in in a folder of its own, loaded beside the driver, which gets the same one.
@@ -64,7 +65,7 @@ impl Hand {
     /// The next reading, however busy the machine is.
     pub fn next(&mut self) -> Reading {
         let mut next = None;
-        until("a reading", || {
+        wait_until("a reading", || {
             next = self.read().ok();
             next.is_some()
         });
@@ -73,14 +74,5 @@ impl Hand {
 
     pub fn set_force(&mut self, force: DVec3) -> Result<(), String> {
         self.device.set_force(force, self.start.elapsed().as_secs_f64()).map_err(|error| error.to_string())
-    }
-}
-
-/// Wait until something holds that other threads bring about.
-pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
-    let begun = Instant::now();
-    while !holds() {
-        assert!(begun.elapsed() < Duration::from_secs(20), "never: {what}");
-        std::thread::sleep(Duration::from_millis(1));
     }
 }

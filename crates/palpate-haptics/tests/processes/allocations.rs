@@ -6,41 +6,16 @@ use palpate_haptics::log::{LogWriter, SceneNames};
 use palpate_haptics::{
     Cycle, HapticUpdate, PassivityController, Safety, SafetyLimits, Snapshot, Timing, snapshot_buffer,
 };
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use palpate_testkit::{CountingAllocator, allocations};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::time::Duration;
 
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-// SAFETY: every call goes on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's layout, unchanged.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from the system's allocator with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the pointer came from the system's allocator with this layout.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static COUNTING: CountingAllocator = CountingAllocator;
+
+/// Force of a device that presses [N], at least.
+const PRESSES_N: f64 = 0.01;
 
 #[test]
 fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
@@ -71,7 +46,7 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
     let mut timing = Timing::default();
     force.warm_up();
 
-    let (before, mut pushed) = (ALLOCATIONS.get(), 0.0_f64);
+    let (before, mut pushed) = (allocations(), 0.0_f64);
     for tick in 1..=1500_u64 {
         let now_s = tick as f64 * STEP_S;
         updates.iter_mut().for_each(|update| update.cycle(now_s));
@@ -85,8 +60,8 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         timing.record(Cycle { lateness: late, compute: 2 * late, overrun: None });
         pushed = pushed.max(force.state().output().devices[0].force_on_hand.length());
     }
-    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations in 1500 cycles");
-    assert!(pushed > 0.01 && sender.missed() == 0, "{pushed} N");
+    assert_eq!(allocations() - before, 0, "allocations in 1500 cycles");
+    assert!(pushed > PRESSES_N && sender.missed() == 0, "{pushed} N");
     let probe = Box::new(0_u64);
-    assert!(ALLOCATIONS.get() > before, "{probe}");
+    assert!(allocations() > before, "{probe}");
 }

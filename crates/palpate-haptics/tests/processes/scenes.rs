@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 use palpate::{
-    Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
-    Recording, Shape, State, Twist,
+    Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, Obstacle, Pose, State,
 };
 use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, ObstacleTrajectory, port};
+use palpate_testkit::{finger, floor, free_block, half_extent, start_at};
 use std::sync::Arc;
 
 /// Step of all scenes [s].
@@ -13,33 +13,21 @@ pub const STEP_S: f64 = 1e-3;
 
 /// Half width of the recorded body along x [m].
 pub fn half_width(model: &Model) -> f64 {
-    let positions = model.recordings().next().map(|r| r.surface.positions.clone()).unwrap_or_default();
-    positions.iter().map(|p| p.x).fold(0.0, f64::max)
+    half_extent(model.recordings().next().expect("a body"), 0)
 }
 
 /// A body at rest in the air, a floor far below, and fingers with a coupling.
 pub fn model(fingers: usize, stiffness: f64) -> Arc<Model> {
-    let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
-    let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-    let floor = Obstacle {
-        shape: Shape::Plane { normal: DVec3::Y },
-        pose: Pose { position: DVec3::Y * -10.0, ..Pose::IDENTITY },
-        friction: 0.5,
-    };
-    let finger = DeviceParameters {
-        tip_radius: 0.004,
-        patch_radius: 0.0,
-        friction: 0.5,
-        coupling: Some(Coupling { stiffness, damping: 0.2 }),
-    };
+    let below = Pose { position: DVec3::Y * -10.0, ..Pose::IDENTITY };
+    let coupling = Some(Coupling { stiffness, damping: 0.2 });
     let parameters = ModelParameters {
         step_s: STEP_S,
-        devices: vec![finger; fingers],
-        obstacles: vec![floor],
+        devices: vec![DeviceParameters { coupling, ..finger(0.004, 0.0, 0.5) }; fingers],
+        obstacles: vec![Obstacle { pose: below, ..floor(0.5) }],
         ..ModelParameters::default()
     };
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    Arc::new(Model::new(parameters, vec![ModelObject::new(recording, start)]).expect("a good model"))
+    let body = ModelObject::new(free_block(), start_at(DVec3::ZERO));
+    Arc::new(Model::new(parameters, vec![body]).expect("a good model"))
 }
 
 /// The force process of a model whose devices all touch, with the devices' ends of its ports.

@@ -14,6 +14,7 @@ use palpate::{
     ObjectStart, Pose, Recording, ResponseForm, State, SurfacePoint, Twist, step,
 };
 use palpate_fem::{RecordedBody, SilentProgress};
+use palpate_haptics::percentile_us;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -121,12 +122,6 @@ fn measure(body: &RecordedBody, held: usize, samples: usize, steps: usize) -> Re
         deformation_us: percentile_us(&shapes, 0.5),
         table_bytes,
     })
-}
-
-/// Time [µs] at a share of sorted times [ns].
-fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
-    let at = (share * sorted_ns.len() as f64).ceil() as usize;
-    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
 }
 
 /// Slope of a line through points on logarithmic axes: the power that y grows with.

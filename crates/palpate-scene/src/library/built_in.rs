@@ -2,7 +2,8 @@
 
 use crate::recipe::RecordingRecipe;
 use palpate::{Damping, Material};
-use palpate_fem::ElementOrder;
+use palpate_fem::paper_cube::CELLS;
+use palpate_fem::{ElementOrder, paper_cube};
 use std::f64::consts::TAU;
 
 /// Built-in scene.
@@ -191,15 +192,15 @@ angular_velocity = [0.0, 0.4, 0.0]
     },
 ];
 
-/// The paper's cube (section 3.1), with the damping of the reference series in `data/reference`.
-pub fn paper_cube() -> RecordingRecipe {
+/// The paper's cube with a number of cells along each side, and of modes.
+pub fn paper_cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
     RecordingRecipe {
-        source: "box:0.1x0.1x0.1/12x12x12".into(),
+        source: paper_cube::source(cells),
         scale: 1.0,
-        material: material(2000.0, 0.49, 110.0),
+        material: paper_cube::material(),
         order: ElementOrder::Linear,
-        modes: 200,
-        damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
+        modes,
+        damping: paper_cube::DAMPING,
     }
 }
 
@@ -209,17 +210,20 @@ fn material(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
 
 /// Recipe by its name in a built-in scene.
 pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
+    let cube = || paper_cube_recipe(CELLS, 200);
     let of =
         |source: &str, young: f64, poisson: f64, density: f64, modes: usize, beta: f64| RecordingRecipe {
             source: source.into(),
             material: material(young, poisson, density),
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta },
-            ..paper_cube()
+            ..cube()
         };
     Some(match name {
-        "cube" => paper_cube(),
-        "jelly" => of("box:0.1x0.1x0.1/12x12x12", 2000.0, 0.49, 110.0, 100, 1e-3),
+        "cube" => cube(),
+        "jelly" => {
+            RecordingRecipe { modes: 100, damping: Damping::Rayleigh { alpha: 2.0, beta: 1e-3 }, ..cube() }
+        }
         "block" => of("box:0.14x0.08x0.14/12x7x12", 6000.0, 0.45, 200.0, 120, 5e-4),
         "small" => of("box:0.08x0.08x0.08/8x8x8", 2500.0, 0.45, 110.0, 120, 1e-3),
         "ball" => of("sphere:0.05/8", 4000.0, 0.45, 150.0, 150, 5e-4),

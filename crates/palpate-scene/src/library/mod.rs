@@ -10,7 +10,7 @@ use crate::file::{RunMode, read_edited_scene, read_text};
 use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::{Scene, SceneDevice};
-pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube};
+pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
 use palpate::{Coupling, Damping, Material};
 use palpate_fem::ElementOrder;
 use palpate_fem::Progress;

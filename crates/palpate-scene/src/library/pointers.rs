@@ -57,15 +57,12 @@ fn fingers(names: Vec<String>, objects: &[ModelObject]) -> Option<Vec<Value>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate::{ObjectStart, Pose, Twist};
-    use std::sync::Arc;
+    use glam::DVec3;
+    use palpate_testkit::{free_block, object_at};
 
     #[test]
     fn fingers_stand_below_what_is_there_and_have_names_of_their_own() {
-        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
-        let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-        let objects = [ModelObject::new(recording, start)];
+        let objects = [object_at(&free_block(), DVec3::ZERO, DVec3::ZERO)];
         let names = |text: &str| -> Vec<String> {
             let scene: Table = text.parse().expect("TOML");
             let devices = scene["device"].as_array().expect("devices");

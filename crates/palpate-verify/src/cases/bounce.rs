@@ -7,9 +7,8 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, OscillatorState, Recording, SampledOscillator, State, step};
 use palpate_fem::ElementOrder;
-use palpate_testkit::{
-    ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at, paper_cube_mesh, scene,
-};
+use palpate_fem::paper_cube::{self, CELLS};
+use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at, scene};
 use std::sync::Arc;
 
 /// Height of the fall [m].
@@ -64,7 +63,7 @@ fn rebound(heights: &[f64]) -> f64 {
 
 /// A fall from 5 cm against the solution with all 6585 modes, at its steps and at others.
 pub fn bounce() -> Result<Vec<Check>, VerifyError> {
-    let cube = PAPER_MATERIAL.free_body(paper_cube_mesh(12)?, ElementOrder::Linear, 200)?;
+    let cube = PAPER_MATERIAL.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 200)?;
     let mut checks = Vec::new();
     for (name, step_s, reference) in [("1 ms", 1e-3, FALL_1_MS), ("2 ms", 2e-3, FALL_2_MS)] {
         let (heights, energies) = (column(reference, 1), column(reference, 3));
@@ -114,7 +113,7 @@ fn steps(cube: &Arc<Recording>, name: &str, step_s: f64) -> Result<Vec<Check>, V
 
 /// The fall with as many modes as the rebound needs at every step.
 pub fn bounce_many_modes() -> Result<Vec<Check>, VerifyError> {
-    let cube = PAPER_MATERIAL.free_body(paper_cube_mesh(12)?, ElementOrder::Linear, 1200)?;
+    let cube = PAPER_MATERIAL.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 1200)?;
     let mut checks = Vec::new();
     for (name, step_s) in [("2 ms", 2e-3), ("1 ms", 1e-3), ("0.5 ms", 5e-4), ("0.25 ms", 2.5e-4)] {
         checks.extend(steps(&cube, name, step_s)?);
@@ -185,7 +184,7 @@ fn rest() -> Result<Vec<Check>, VerifyError> {
     /// 0.9 nm·2m/h² = 2e-4 of the weight; the errors of 169 contacts average to a twentieth of it.
     const ALTERNATION: f64 = 1e-5;
     let calm = ElasticMaterial { stiffness_damping_s: 4e-3, ..PAPER_MATERIAL };
-    let cube = calm.free_body(paper_cube_mesh(12)?, ElementOrder::Linear, 200)?;
+    let cube = calm.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 200)?;
     let weight = cube.mass() * GRAVITY_M_S2;
     let mut checks = Vec::new();
     for friction in [0.0, 0.5] {

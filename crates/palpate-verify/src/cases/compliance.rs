@@ -5,9 +5,9 @@ use crate::error::{VerifyError, numerics};
 use faer::Mat;
 use glam::DVec3;
 use palpate::SampledOscillator;
-use palpate_fem::mesh::box_mesh;
+use palpate_fem::paper_cube::{self, CELLS, DENSITY_KG_M3, POISSON, YOUNG_PA};
 use palpate_fem::{ElementOrder, SilentProgress};
-use palpate_testkit::{paper_cube_parameters, recorded, undamped};
+use palpate_testkit::{recorded, undamped};
 
 /// Vertical compliance of three points of the paper's cube, elastic part: static, and at the end of a step of 1 ms.
 pub fn points() -> Result<Vec<Check>, VerifyError> {
@@ -22,8 +22,8 @@ pub fn points() -> Result<Vec<Check>, VerifyError> {
     const STEP_S: f64 = 1e-3;
     /// Undamped, the fastest modes turn by a radian or more in a step: that needs a larger space than a certificate's.
     const BLOCKS: usize = 40;
-    let parameters = undamped(2000.0, 0.49, 110.0, ElementOrder::Linear, 100);
-    let body = recorded(box_mesh([0.1; 3], [12; 3])?, &parameters)?;
+    let parameters = undamped(YOUNG_PA, POISSON, DENSITY_KG_M3, ElementOrder::Linear, 100);
+    let body = recorded(paper_cube::mesh(CELLS)?, &parameters)?;
     let unreduced = body.unreduced();
     let nodes = TABLE.map(|(_, position, ..)| body.nearest_node(DVec3::from_array(position)));
     let mut loads = vec![vec![0.0; body.dofs()]; 9];
@@ -59,7 +59,7 @@ pub fn identities() -> Result<Vec<Check>, VerifyError> {
     const ORTHONORMAL: f64 = 1e-11;
     /// Rounding of an eigenvalue of a matrix of 654 rows: 1e-15 of the largest each.
     const NEGATIVE: f64 = 1e-12;
-    let body = recorded(box_mesh([0.1; 3], [6; 3])?, &paper_cube_parameters(6, 60))?;
+    let body = recorded(paper_cube::mesh(6)?, &paper_cube::parameters(6, 60))?;
     let unreduced = body.unreduced();
     let mut checks = vec![Check::new(
         "largest entry of |ΦᵀMΦ − I|",

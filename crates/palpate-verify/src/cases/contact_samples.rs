@@ -7,6 +7,7 @@ use glam::DVec3;
 use palpate::{Collider, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
 use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{ball_mesh, box_mesh};
+use palpate_fem::paper_cube::{self, CELLS};
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at};
 use std::sync::Arc;
 
@@ -52,7 +53,7 @@ pub fn contact_samples() -> Result<Vec<Check>, VerifyError> {
     let mut checks = Vec::new();
     let calm = ElasticMaterial { stiffness_damping_s: 4e-3, ..PAPER_MATERIAL };
     for cells in [12, 18] {
-        let cube = calm.free_body(box_mesh([0.1; 3], [cells; 3])?, ElementOrder::Linear, 200)?;
+        let cube = calm.free_body(paper_cube::mesh(cells)?, ElementOrder::Linear, 200)?;
         checks.extend(rest(&format!("cube of {cells}³ cells"), &cube, 0.05, &SAG)?);
     }
     let ball = calm.free_body(ball_mesh(0.05, 8)?, ElementOrder::Linear, 200)?;
@@ -102,7 +103,7 @@ fn rest(
 
 /// Rebound [m] of the paper's cube from a flat fall.
 fn fall() -> Result<Vec<Check>, VerifyError> {
-    let cube = PAPER_MATERIAL.free_body(box_mesh([0.1; 3], [12; 3])?, ElementOrder::Linear, 200)?;
+    let cube = PAPER_MATERIAL.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 200)?;
     let rebound = |most: usize, step_s: f64| -> Result<(f64, RunInvariants), VerifyError> {
         let model = scene(most, step_s, 0.0, vec![object_at(&cube, DVec3::Y * 0.1, DVec3::ZERO)])?;
         let (mut state, mut invariants) = (State::new(&model), RunInvariants::default());
@@ -133,7 +134,7 @@ fn stacked() -> Result<Vec<Check>, VerifyError> {
     const STEPS: u32 = 3000;
     const LATE: u32 = 1000;
     let calm = ElasticMaterial { stiffness_damping_s: 4e-3, ..PAPER_MATERIAL };
-    let cube = calm.free_body(box_mesh([0.1; 3], [8; 3])?, ElementOrder::Linear, 200)?;
+    let cube = calm.free_body(paper_cube::mesh(8)?, ElementOrder::Linear, 200)?;
     let weight = cube.mass() * GRAVITY_M_S2;
     let lie = |most: usize| -> Result<([f64; 2], f64, RunInvariants), VerifyError> {
         let cubes = [0.05, 0.15].map(|y| object_at(&cube, DVec3::Y * y, DVec3::ZERO));

@@ -5,8 +5,7 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Grasp, Input, Recording, State, step};
-use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_fem::{ElementOrder, paper_cube};
 use palpate_testkit::{ElasticMaterial, PAPER_MATERIAL, object_at, scene, smoothstep};
 use std::sync::Arc;
 
@@ -65,8 +64,7 @@ fn forces(
 
 /// One path by touch and by hold.
 pub fn fingers_hold() -> Result<Vec<Check>, VerifyError> {
-    let body =
-        JELLY.fixed_body(box_mesh([0.1; 3], [8; 3])?, ElementOrder::Linear, 100, |node| node.y < -0.0499)?;
+    let body = JELLY.fixed_body(paper_cube::mesh(8)?, ElementOrder::Linear, 100, |node| node.y < -0.0499)?;
     let mut invariants = RunInvariants::default();
     let (held, _) = forces(&body, true, &mut invariants)?;
     let mut checks = Vec::from(invariants.checks("held"));

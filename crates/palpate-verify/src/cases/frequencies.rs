@@ -3,17 +3,15 @@
 use crate::check::Check;
 use crate::error::VerifyError;
 use crate::modal::{frequencies_hz, lowest, mean};
-use palpate_fem::mesh::box_mesh;
+use palpate_fem::paper_cube::{
+    CELLS, DENSITY_KG_M3 as DENSITY, POISSON, SIDE_M as SIDE, YOUNG_PA as YOUNG, mesh,
+};
 use palpate_fem::{ElementOrder, RecordedBody};
 use palpate_testkit::undamped;
 use std::f64::consts::{PI, SQRT_2};
 
-const SIDE: f64 = 0.1;
-const YOUNG: f64 = 2000.0;
-const DENSITY: f64 = 110.0;
-
 fn cube(cells: u32, order: ElementOrder, poisson: f64, modes: usize) -> Result<RecordedBody, VerifyError> {
-    lowest(box_mesh([SIDE; 3], [cells; 3])?, &undamped(YOUNG, poisson, DENSITY, order, modes))
+    lowest(mesh(cells)?, &undamped(YOUNG, poisson, DENSITY, order, modes))
 }
 
 /// Ω = ωL/c_s to Hz.
@@ -27,7 +25,7 @@ pub fn paper_cube() -> Result<Vec<Check>, VerifyError> {
     const TABLE: [(usize, f64); 6] =
         [(2, 11.650), (3, 15.536), (3, 15.593), (2, 17.597), (1, 18.051), (3, 20.191)];
     const HALF_DIGIT: f64 = 0.5e-3;
-    let computed = frequencies_hz(&cube(12, ElementOrder::Linear, 0.49, 14)?);
+    let computed = frequencies_hz(&cube(CELLS, ElementOrder::Linear, POISSON, 14)?);
     let expected = TABLE.iter().flat_map(|&(times, f)| std::iter::repeat_n(f, times));
     let check = |(at, (&computed, expected)): (usize, (&f64, f64))| {
         Check::new(format!("mode {} [Hz]", at + 1), computed, expected, HALF_DIGIT / expected)

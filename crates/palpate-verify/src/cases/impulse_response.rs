@@ -5,9 +5,10 @@ use crate::error::{VerifyError, numerics};
 use crate::reference::{IMPULSE_RESPONSE_1_MS, column};
 use glam::DVec3;
 use palpate::Sampling;
+use palpate_fem::paper_cube::{self, CELLS};
 use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 use palpate_fem::{RecordExtent, RecordParameters};
-use palpate_testkit::{paper_cube_mesh, paper_cube_parameters, recorded};
+use palpate_testkit::recorded;
 
 /// Nodes of the reference's columns: middle of the top and of the bottom, a top corner, the middle of a side.
 const PLACES: [DVec3; 4] = [
@@ -27,8 +28,8 @@ const SAMPLES: usize = 40;
 pub fn impulse_response() -> Result<Vec<Check>, VerifyError> {
     // Three columns a place, after the number of the sample.
     let reference: Vec<Vec<f64>> = (1..=12).map(|number| column(IMPULSE_RESPONSE_1_MS, number)).collect();
-    let parameters = RecordParameters { extent: RecordExtent::NoModes, ..paper_cube_parameters(12, 1) };
-    let body = recorded(paper_cube_mesh(12)?, &parameters)?;
+    let parameters = RecordParameters { extent: RecordExtent::NoModes, ..paper_cube::parameters(CELLS, 1) };
+    let body = recorded(paper_cube::mesh(CELLS)?, &parameters)?;
     let observed = PLACES.map(|p| body.nearest_node(p) as u32);
     let mut order: Vec<usize> = (0..4).collect();
     order.sort_by_key(|&at| observed[at]);

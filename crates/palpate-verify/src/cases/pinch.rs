@@ -4,12 +4,10 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use crate::reference::{PINCH_1_MS, column};
 use glam::DVec3;
-use palpate::{
-    DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
-    Recording, State, Twist, step,
-};
+use palpate::{DeviceInput, DeviceParameters, Grasp, Input, Model, ModelParameters, Recording, State, step};
+use palpate_fem::paper_cube::{self, CELLS};
 use palpate_fem::{RecordParameters, ResidualChoice};
-use palpate_testkit::{paper_cube_mesh, paper_cube_parameters, recorded, smoothstep};
+use palpate_testkit::{object_at, recorded, smoothstep};
 use std::sync::Arc;
 
 /// Errors of the force that were found independently with so many modes and S.
@@ -39,10 +37,9 @@ fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, VerifyError> 
     let surface = &recording.surface;
     let grasps =
         [-REACH, REACH].map(|x| surface.nearest(DVec3::X * x).map(|(point, _)| Grasp { object: 0, point }));
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
     let parameters =
         ModelParameters { devices: vec![DeviceParameters::default(); 2], ..ModelParameters::default() };
-    let model = Model::new(parameters, vec![ModelObject::new(Arc::new(recording), start)])?;
+    let model = Model::new(parameters, vec![object_at(&Arc::new(recording), DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     let forces = (1..=steps).map(|number| {
         let inward = 0.005 * smoothstep(number as f64 / 50.0);
@@ -68,7 +65,7 @@ pub fn pinch() -> Result<Vec<Check>, VerifyError> {
     let reference = column(PINCH_1_MS, 1);
     let mut checks = Vec::new();
     for (modes, error) in ERRORS {
-        let body = recorded(paper_cube_mesh(12)?, &paper_cube_parameters(12, modes))?;
+        let body = recorded(paper_cube::mesh(CELLS)?, &paper_cube::parameters(CELLS, modes))?;
         let certified = body.recording.metadata.certificate.as_ref().map_or(f64::NAN, |c| c.force_error_max);
         let forces = pinched(body.recording, reference.len())?;
         let quantity = format!("force over 1 s, {modes} modes + S, error");
@@ -85,8 +82,8 @@ pub fn pinch() -> Result<Vec<Check>, VerifyError> {
             ));
         }
     }
-    let alone = RecordParameters { residual: ResidualChoice::None, ..paper_cube_parameters(12, 200) };
-    let body = recorded(paper_cube_mesh(12)?, &alone)?;
+    let alone = RecordParameters { residual: ResidualChoice::None, ..paper_cube::parameters(CELLS, 200) };
+    let body = recorded(paper_cube::mesh(CELLS)?, &alone)?;
     let certified = body.recording.metadata.certificate.as_ref().map_or(f64::NAN, |c| c.force_error_max);
     let error = apart(&pinched(body.recording, reference.len())?, &reference);
     checks.push(Check::new("error of 200 modes without S", error, ERROR_WITHOUT_RESIDUAL, LAST_DIGIT));

@@ -6,9 +6,8 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Collider, Coupling, DeviceInput, DeviceParameters, Input, Output, State, step};
 use palpate_fem::ElementOrder;
-use palpate_testkit::{
-    ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at, paper_cube_mesh, scene, smoothstep,
-};
+use palpate_fem::paper_cube::{self, CELLS};
+use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at, scene, smoothstep};
 use std::f64::consts::{PI, TAU};
 
 const TIP: f64 = 0.005;
@@ -66,7 +65,7 @@ fn slip(output: &Output) -> f64 {
 
 /// Without and with virtual couplings.
 pub fn pinch_lift() -> Result<Vec<Check>, VerifyError> {
-    let cube = JELLY.free_body(paper_cube_mesh(12)?, ElementOrder::Linear, 100)?;
+    let cube = JELLY.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 100)?;
     let mut checks = Vec::new();
     for (name, coupling) in [("rigid", None), ("coupled", Some(Coupling { stiffness: 500.0, damping: 1.0 }))]
     {

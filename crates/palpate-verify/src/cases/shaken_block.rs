@@ -4,12 +4,12 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
-    ObjectStart, Pose, State, SurfacePoint, Twist, step,
+    DeviceInput, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelParameters, State, SurfacePoint,
+    step,
 };
 use palpate_fem::ElementOrder;
 use palpate_fem::mesh::box_mesh;
-use palpate_testkit::{recorded, undamped};
+use palpate_testkit::{object_at, recorded, undamped};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -56,8 +56,7 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, VerifyError> {
         devices: vec![DeviceParameters::default(); grasps.len()],
         ..ModelParameters::default()
     };
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let model = Model::new(parameters, vec![ModelObject::new(Arc::new(body.recording), start)])?;
+    let model = Model::new(parameters, vec![object_at(&Arc::new(body.recording), DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     let (mut in_phase, mut quadrature, mut count) = (0.0, 0.0, 0.0);
     for number in 1..=(PERIODS * 200.0) as usize {

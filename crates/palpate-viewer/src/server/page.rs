@@ -4,9 +4,9 @@ use axum::http::{StatusCode, Uri, header};
 use axum::response::{Html, IntoResponse, Response};
 use rust_embed::{EmbeddedFile, RustEmbed};
 
-/// Output of `npm run build`. Debug builds read it from disk at each request.
+/// Output of `npm run build`, behind a link so that packages of the crate have it. Debug builds read it from disk at each request.
 #[derive(RustEmbed)]
-#[folder = "../../viewer/dist/"]
+#[folder = "page/"]
 #[allow_missing = true]
 struct PageFiles;
 

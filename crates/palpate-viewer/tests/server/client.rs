@@ -1,11 +1,9 @@
 //! Test client that acts as a page, and a test scene.
 
 use glam::DVec3;
-use palpate::{
-    Coupling, DeviceParameters, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording,
-    Shape, Twist,
-};
+use palpate::{Coupling, DeviceParameters, Model, ModelObject, ModelParameters, Obstacle, Pose};
 use palpate_haptics::Scheduling;
+use palpate_testkit::{finger, floor, free_block, start_at};
 use palpate_viewer::{
     Live, MaterialDescription, ObjectDescription, PhysicsSettings, ProgressCallback, SceneDescription,
     SceneError, SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice,
@@ -14,42 +12,29 @@ use palpate_viewer::{
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-pub fn recording() -> Arc<Recording> {
-    let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
-    Arc::new(Recording::from_bytes(bytes).expect("a released recording"))
-}
-
 /// Scene: a body above a floor, with two pointers.
 pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
-    let recording = recording();
+    let recording = free_block();
     let radius = recording.surface.radius();
-    let finger = DeviceParameters {
-        tip_radius: 0.1 * radius,
-        patch_radius: 0.2 * radius,
-        friction: 0.5,
-        coupling: Some(Coupling { stiffness: 200.0, damping: 0.5 }),
-    };
+    let coupling = Some(Coupling { stiffness: 200.0, damping: 0.5 });
+    let below = Pose { position: DVec3::Y * -5.0 * radius, ..Pose::IDENTITY };
     let parameters = ModelParameters {
         step_s,
         gravity,
-        devices: vec![finger; 2],
-        obstacles: vec![Obstacle {
-            shape: Shape::Plane { normal: DVec3::Y },
-            pose: Pose { position: DVec3::Y * -5.0 * radius, ..Pose::IDENTITY },
-            friction: 0.5,
-        }],
+        devices: vec![DeviceParameters { coupling, ..finger(0.1 * radius, 0.2 * radius, 0.5) }; 2],
+        obstacles: vec![Obstacle { pose: below, ..floor(0.5) }],
         ..ModelParameters::default()
     };
-    let start = ObjectStart { pose: Pose::IDENTITY, twist: Twist::ZERO };
-    let floor = parameters.obstacles[0].pose;
-    let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start)]).expect("a model");
+    let body = ModelObject::new(recording.clone(), start_at(DVec3::ZERO));
+    let model = Model::new(parameters, vec![body]).expect("a model");
     let model = Arc::new(model);
     let object = ObjectDescription::new("body", &recording, vec!["a line".into()], true);
     let devices = [("left".to_string(), true), ("right".to_string(), true)];
@@ -59,12 +44,21 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
         description,
         model,
         devices: vec![ViewerDevice::Pointer; 2],
-        obstacle_trajectories: vec![Arc::new(move |_: f64| floor)],
+        obstacle_trajectories: vec![Arc::new(move |_: f64| below)],
         log: None,
     }
 }
 
-struct OneScene;
+/// Time after which a wait has failed: it bounds a failure, not a success.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// Provider of one scene, and of recordings that fail; one of `slow.msh` does so only when its gate is opened.
+struct OneScene {
+    gate: Gate,
+}
+
+/// Gate that a recording waits at until a test opens it, or is over.
+type Gate = Arc<Mutex<Receiver<()>>>;
 
 impl SceneProvider for OneScene {
     fn scenes(&self) -> Vec<SceneSummary> {
@@ -96,7 +90,8 @@ impl SceneProvider for OneScene {
 
     fn record(&self, upload: Upload, _: ProgressCallback) -> Result<ViewerScene, SceneError> {
         if upload.name == "slow.msh" {
-            std::thread::sleep(Duration::from_secs(2));
+            // A test that has ended opens it as well.
+            let _ = self.gate.lock().expect("no panic").recv();
         }
         Err(format!("{} bytes of {}", upload.bytes.len(), upload.name).into())
     }
@@ -111,9 +106,16 @@ pub struct TestServer {
 
 impl TestServer {
     pub fn live() -> Self {
+        Self::live_with_gate().0
+    }
+
+    /// Server, and what opens the gate of recordings of `slow.msh`.
+    pub fn live_with_gate() -> (Self, Sender<()>) {
+        let (open, gate) = channel();
+        let provider = Arc::new(OneScene { gate: Arc::new(Mutex::new(gate)) });
         let scheduling = Scheduling { priority: None, core: None };
         let first = scene(DVec3::ZERO, 1e-3);
-        Self::new(ServedContent::Live(Box::new(Live { provider: Arc::new(OneScene), first, scheduling })))
+        (Self::new(ServedContent::Live(Box::new(Live { provider, first, scheduling }))), open)
     }
 
     pub fn new(content: ServedContent) -> Self {
@@ -130,7 +132,7 @@ impl TestServer {
         let address = format!("ws://{}/session", self.address);
         let (socket, _) = tungstenite::connect(address).expect("a session");
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-            stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+            stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         }
         Page { socket }
     }
@@ -138,7 +140,7 @@ impl TestServer {
     /// HTTP status and body.
     pub fn request(&self, head: &str, body: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a timeout");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
         let host = if head.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
         let length = body.len();
         write!(stream, "{head} HTTP/1.1\r\n{host}Content-Length: {length}\r\nConnection: close\r\n\r\n")
@@ -238,7 +240,7 @@ pub fn decode_frame(bytes: &[u8], shapes: &[Vec<DVec3>]) -> Frame {
     cursor.skip(2);
     let position = cursor.vector();
     cursor.skip(4);
-    let mut positions = recording().surface.positions.clone();
+    let mut positions = free_block().surface.positions.clone();
     let count = cursor.u32() as usize;
     if format == 1 {
         for shape in &shapes[..count] {
@@ -281,7 +283,7 @@ impl Page {
 
     /// Next message of a type.
     pub fn wait(&mut self, kind: &str) -> Value {
-        let until = Instant::now() + Duration::from_secs(20);
+        let until = Instant::now() + TIMEOUT;
         while Instant::now() < until {
             if let Message::Text(text) = self.socket.read().expect("a message") {
                 let value: Value = serde_json::from_str(&text).expect("JSON");
@@ -290,12 +292,12 @@ impl Page {
                 }
             }
         }
-        panic!("no {kind} within 20 s");
+        panic!("no {kind} within {TIMEOUT:?}");
     }
 
     /// Next frame that satisfies a condition.
     pub fn frame(&mut self, shapes: &[Vec<DVec3>], mut condition: impl FnMut(&Frame) -> bool) -> Frame {
-        let until = Instant::now() + Duration::from_secs(20);
+        let until = Instant::now() + TIMEOUT;
         while Instant::now() < until {
             if let Message::Binary(bytes) = self.socket.read().expect("a message") {
                 let frame = decode_frame(&bytes, shapes);
@@ -304,6 +306,6 @@ impl Page {
                 }
             }
         }
-        panic!("no such frame within 20 s");
+        panic!("no such frame within {TIMEOUT:?}");
     }
 }

@@ -1,7 +1,14 @@
 //! Live scene.
 
-use super::client::{TestServer, mode_shapes, recording};
+use super::client::{TestServer, mode_shapes};
 use glam::DVec3;
+use palpate_testkit::{free_block, half_extent};
+
+/// Difference of modal and vertex frames, as a share of the largest displacement [1]: half floats, and residuals to 1/127.
+const FORMAT_ROUNDING: f64 = 0.006;
+
+/// Displacement of a body that is pressed [m], at least.
+const PRESSED_M: f64 = 1e-5;
 
 #[test]
 fn a_page_receives_the_scene_its_static_data_and_frames() {
@@ -12,7 +19,7 @@ fn a_page_receives_the_scene_its_static_data_and_frames() {
     assert_eq!(hello["scenes"][0]["id"], "float");
     let scene = page.wait("scene");
     let generation = scene["generation"].as_u64().expect("a generation");
-    let recording = recording();
+    let recording = free_block();
     assert_eq!(scene["objects"][0]["nodes"], recording.surface.positions.len());
     assert_eq!(scene["obstacles"][0]["shape"], serde_json::json!({ "plane": {} }));
     assert_eq!(scene["devices"][1]["pointer"], true);
@@ -41,8 +48,8 @@ fn a_pointer_presses_the_body_and_both_formats_give_the_same_surface() {
     let (mut page, mut other) = (served.page(), served.page());
     let generation = page.wait("scene")["generation"].as_u64().expect("a generation");
     let shapes = mode_shapes(&served.get(&format!("/scene/{generation}/object/0/mode_shapes")).1);
-    let radius = recording().surface.radius();
-    let low = recording().surface.positions.iter().map(|place| place.x).fold(0.0, f64::min);
+    let radius = free_block().surface.radius();
+    let low = -half_extent(&free_block(), 0);
     let at = |x: f64| format!("[{x:?},0.001,-0.001]");
     let start = low - 0.15 * radius;
     page.send(&format!(r#"{{"type":"press","pointer":3,"mode":"touch","position":{}}}"#, at(start)));
@@ -67,15 +74,14 @@ fn a_pointer_presses_the_body_and_both_formats_give_the_same_surface() {
     page.send(r#"{"type":"single_step"}"#);
     let vertices = other.frame(&shapes, |frame| frame.format == 2 && frame.step > 0);
     let modal = page.frame(&shapes, |frame| frame.step == vertices.step);
-    let rest = recording().surface.positions.clone();
+    let rest = free_block().surface.positions.clone();
     let moved = |positions: &[DVec3]| -> f64 {
         positions.iter().zip(&rest).map(|(place, rest)| (*place - *rest).length()).fold(0.0, f64::max)
     };
     let most = moved(&vertices.positions);
-    assert!(most > 1e-5, "{most} m");
+    assert!(most > PRESSED_M, "{most} m");
     for (node, (a, b)) in modal.positions.iter().zip(&vertices.positions).enumerate() {
-        // Rounding of half floats and of residuals to 1/127.
-        assert!((*a - *b).length() < 0.006 * most, "{node}: {a} {b} of {most}");
+        assert!((*a - *b).length() < FORMAT_ROUNDING * most, "{node}: {a} {b} of {most}");
     }
     assert!(modal.bytes < vertices.bytes, "{} {}", modal.bytes, vertices.bytes);
     // A page that leaves releases its pointers.
@@ -100,7 +106,7 @@ fn a_held_point_follows_the_pointer_and_invalid_grasps_are_refused() {
         let text = page.wait("error")["text"].to_string();
         assert!(text.contains("a hold needs an object"), "{text}");
     }
-    let surface = &recording().surface;
+    let surface = &free_block().surface;
     let corners = surface.triangles[5].map(|node| surface.positions[node as usize]);
     let place = (corners[0] + corners[1] + corners[2]) / 3.0;
     let at = |place: DVec3| format!("[{:?},{:?},{:?}]", place.x, place.y, place.z);
@@ -146,7 +152,7 @@ fn physics_changes_keep_the_state_and_reset_restarts() {
 
 #[test]
 fn only_one_job_runs_at_a_time() {
-    let served = TestServer::live();
+    let (served, open_gate) = TestServer::live_with_gate();
     let mut page = served.page();
     page.wait("scene");
     let record = |name: &str| {
@@ -158,6 +164,7 @@ fn only_one_job_runs_at_a_time() {
     assert_eq!((status, String::from_utf8_lossy(&text).as_ref()), (409, busy));
     page.send(r#"{"type":"open_scene","scene":"float"}"#);
     assert_eq!(page.wait("error")["text"], busy);
+    open_gate.send(()).expect("it waits");
     assert_eq!(page.wait("error")["text"], "3 bytes of slow.msh");
     assert_eq!(record("c.msh").0, 202);
     assert_eq!(page.wait("error")["text"], "3 bytes of c.msh");

@@ -1,10 +1,11 @@
 //! Logs of a live scene: one per start of the scene.
 
-use super::client::{TestServer, mode_shapes, recording, scene};
+use super::client::{TestServer, mode_shapes, scene};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, State, step};
 use palpate_haptics::Scheduling;
 use palpate_haptics::log::{LogReader, LogSummary, LogWriter, SceneNames};
+use palpate_testkit::{GRAVITY_M_S2, free_block, half_extent};
 use palpate_viewer::{
     Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, ProgressCallback,
     SceneError, SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,
@@ -12,6 +13,11 @@ use palpate_viewer::{
 use std::collections::BTreeMap;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex};
+
+/// Force of a pointer that presses the body [N], and how far it pushes and gravity moves it [m], at least.
+const FELT_N: f64 = 0.02;
+const PUSHED_M: f64 = 1e-4;
+const FALLEN_M: f64 = 1e-3;
 
 type FinishedLogs = Arc<Mutex<Vec<Vec<u8>>>>;
 
@@ -118,8 +124,8 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
     let mut page = served.page();
     let generation = page.wait("scene")["generation"].as_u64().expect("a generation");
     let shapes = mode_shapes(&served.get(&format!("/scene/{generation}/object/0/mode_shapes")).1);
-    let radius = recording().surface.radius();
-    let low = recording().surface.positions.iter().map(|place| place.x).fold(0.0, f64::min);
+    let radius = free_block().surface.radius();
+    let low = -half_extent(&free_block(), 0);
     let at = |x: f64| format!("[{x:?},0.001,-0.001]");
     page.send(&format!(
         r#"{{"type":"press","pointer":3,"mode":"touch","position":{}}}"#,
@@ -127,7 +133,7 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
     ));
     let deep = at(low + 0.05 * radius);
     page.send(&format!(r#"{{"type":"move","pointers":[{{"pointer":3,"position":{deep}}}]}}"#));
-    page.frame(&shapes, |frame| frame.devices[0].2.length() > 0.02 && frame.position.x > 1e-4);
+    page.frame(&shapes, |frame| frame.devices[0].2.length() > FELT_N && frame.position.x > PUSHED_M);
     // Pauses and single steps leave no trace in the log.
     page.send(r#"{"type":"pause","paused":true}"#);
     while page.wait("status")["paused"] != true {}
@@ -135,7 +141,7 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
     page.send(r#"{"type":"set_physics","gravity":[0,-9.81,0]}"#);
     page.wait("scene");
     page.send(r#"{"type":"pause","paused":false}"#);
-    page.frame(&shapes, |frame| frame.generation as u64 == generation + 1 && frame.position.y < -1e-3);
+    page.frame(&shapes, |frame| frame.generation as u64 == generation + 1 && frame.position.y < -FALLEN_M);
     page.send(r#"{"type":"reset"}"#);
     page.wait("scene");
     page.frame(&shapes, |frame| frame.generation as u64 == generation + 2 && frame.step > 20);
@@ -144,7 +150,8 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
     let logs = logs.lock().expect("no panic");
     assert_eq!(logs.len(), 3);
     let mut before = None;
-    for (bytes, gravity) in logs.iter().zip([DVec3::ZERO, DVec3::Y * -9.81, DVec3::Y * -9.81]) {
+    for (bytes, gravity) in logs.iter().zip([DVec3::ZERO, DVec3::Y * -GRAVITY_M_S2, DVec3::Y * -GRAVITY_M_S2])
+    {
         let reader = LogReader::new(bytes).expect("a whole log");
         let model = scene(gravity, 1e-3).model;
         let motions = reader.start(&names()).expect("readable").expect("how the body begins");
@@ -159,7 +166,7 @@ fn each_start_of_a_scene_is_a_log_that_replays_and_a_resumed_scene_starts_from_t
         }
         assert!(steps > 0, "an empty log");
         match before {
-            None => assert!(max_force > 0.02, "{max_force} N"),
+            None => assert!(max_force > FELT_N, "{max_force} N"),
             Some(before) if std::ptr::eq(bytes, &logs[1]) => assert_eq!(motions, before),
             Some(_) => assert_eq!(motions, State::new(&model).snapshots()),
         }

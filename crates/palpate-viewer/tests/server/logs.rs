@@ -4,13 +4,17 @@ use super::client::{TestServer, decode_frame, mode_shapes, scene};
 use glam::DVec3;
 use palpate::{DeviceInput, Input, State, step};
 use palpate_haptics::Snapshot;
+use palpate_testkit::GRAVITY_M_S2;
 use palpate_viewer::{LogFrames, RenderJob, RenderRequest, ServedContent};
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 
+/// Error of a fall over 80 steps [m]: ½·g·t·h, first order in the step, is 0.4 mm.
+const FALL_M: f64 = 1e-3;
+
 /// Frames of a falling body, one every 20 steps.
 fn log(number: usize, frames: u64) -> Arc<LogFrames> {
-    let scene = scene(DVec3::Y * -9.81, 1e-3);
+    let scene = scene(DVec3::Y * -GRAVITY_M_S2, 1e-3);
     let model = scene.model.clone();
     let (log, mut builder) =
         LogFrames::new(number, format!("{number}.mcap"), model.clone(), scene.description, frames, 0.02);
@@ -57,8 +61,8 @@ fn two_logs_are_announced_and_their_frames_and_series_are_fetched() {
     assert_eq!((status, frames.len()), (200, 5));
     let frame = decode_frame(frames[0], &shapes);
     assert_eq!((frame.step, frame.generation), (80, 1));
-    // ½·g·t², to the first order of the step.
-    assert!((frame.position.y + 0.5 * 9.81 * 0.08 * 0.08).abs() < 1e-3, "{}", frame.position);
+    // ½·g·t².
+    assert!((frame.position.y + 0.5 * GRAVITY_M_S2 * 0.08 * 0.08).abs() < FALL_M, "{}", frame.position);
     assert_eq!(split_frames(&served.get("/log/1/frames?from=10&count=1000").1).len(), 2);
     assert!(served.get("/log/1/frames?from=12&count=1").1.is_empty());
     assert_eq!(served.get("/log/1/frames?from=-1&count=1").0, 400);

@@ -4,7 +4,6 @@ mod frames;
 mod touch;
 
 use crate::commands::demo::cached_cube;
-use crate::commands::run::percentile_us;
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
 use clap::Args;
@@ -13,6 +12,7 @@ use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
     Recording, State, Twist, step,
 };
+use palpate_haptics::percentile_us;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -11,9 +11,7 @@ use crate::terminal::{notify, print};
 use clap::Args;
 use palpate::Recording;
 use palpate_export::write_atomically;
-use palpate_scene::{
-    BUILT_IN_SCENES, RecordingRecipe, RunMode, cache_folder, paper_cube as paper_recipe, read_scene,
-};
+use palpate_scene::{BUILT_IN_SCENES, RunMode, cache_folder, paper_cube_recipe, read_scene};
 use plot::{Curve, plot};
 use std::f64::consts::PI;
 use std::io::IsTerminal;
@@ -49,11 +47,6 @@ const FREQUENCY_HZ: f64 = 2.0;
 const DURATION_S: f64 = 2.0;
 const SQUEEZE_M: f64 = 0.003;
 
-/// Recipe of the paper's cube with a number of cells a side.
-fn cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
-    RecordingRecipe { source: format!("box:0.1x0.1x0.1/{cells}x{cells}x{cells}"), modes, ..paper_recipe() }
-}
-
 /// Runs the command.
 pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let person = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
@@ -74,7 +67,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
         write_atomically(&output.join(format!("{name}.csv")), shake_path(side).as_bytes())?;
     }
     let scene_path = output.join("shake.toml");
-    write_atomically(&scene_path, SCENE.as_bytes())?;
+    write_atomically(&scene_path, format!("{RULES}{TWO_HANDS}").as_bytes())?;
     let scene = read_scene(&scene_path, RunMode::Offline)?;
     let options = run::Arguments {
         scene: scene_path.clone(),
@@ -117,26 +110,15 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     print("\nTouch one yourself, in the browser:\n  palpate serve\n")
 }
 
-const SCENE: &str = r#"# The paper's figure 5(b): two hands hold a free cube and shake it at 2 Hz.
+/// Beginning of the scene.
+const RULES: &str = r#"# The paper's figure 5(b): two hands hold a free cube and shake it at 2 Hz.
 step = 0.001                       # s
 gravity = [0.0, 0.0, 0.0]          # m/s²
 
-[[object]]
-name = "cube"
-recording = "cube.palp"
-
-[[device]]
-name = "left"
-mode = "held"
-attach = { object = "cube", point = [-0.05, 0.0, 0.0] }
-path = { file = "left.csv" }
-
-[[device]]
-name = "right"
-mode = "held"
-attach = { object = "cube", point = [0.05, 0.0, 0.0] }
-path = { file = "right.csv" }
 "#;
+
+/// A cube whose left and right face are held by two hands.
+const TWO_HANDS: &str = include_str!("two_hands.toml");
 
 /// Path of the hand on a side (−1 left, 1 right): squeeze within 0.2 s, then shake with a smooth start.
 fn shake_path(side: f64) -> String {
@@ -153,7 +135,7 @@ fn shake_path(side: f64) -> String {
 
 /// Recording of the paper's cube, from the cache or made and cached.
 pub fn cached_cube(cells: u32, modes: usize, cache: Option<&Path>) -> Result<Recording, Failure> {
-    let recipe = cube_recipe(cells, modes);
+    let recipe = paper_cube_recipe(cells, modes);
     let folder = cache_folder(cache);
     if let Some(recording) = folder.as_deref().and_then(|folder| recipe.cached(folder)) {
         return Ok(recording);

@@ -18,7 +18,7 @@ pub use realtime_report::{device_line, percentiles, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;
-pub use summary::{Summary, percentile_us};
+pub use summary::Summary;
 
 /// Run a scene and write forces, contacts, motion and energies
 ///

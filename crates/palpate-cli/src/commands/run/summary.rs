@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use palpate::{Output, State, StepStatus};
+use palpate_haptics::percentile_us;
 use palpate_scene::Scene;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -261,12 +262,6 @@ impl Summary {
             energy.defect.abs()
         )
     }
-}
-
-/// Quantile [µs] of sorted times [ns].
-pub fn percentile_us(sorted_ns: &[u32], share: f64) -> f64 {
-    let at = (share * sorted_ns.len() as f64).ceil() as usize;
-    sorted_ns.get(at.clamp(1, sorted_ns.len().max(1)) - 1).map_or(0.0, |ns| f64::from(*ns) / 1000.0)
 }
 
 fn largest(forces: &[DVec3]) -> f64 {
