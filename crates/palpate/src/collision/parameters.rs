@@ -8,16 +8,19 @@ pub(super) struct CollisionParameters {
     /// Margin within which points become candidates without approaching, and length below which two points count as one
     /// place: contact forces of one step move neighbours by less.
     pub(super) margin: f64,
+    /// Displacement of a free node by the forces on its neighbours, as a share of theirs: an upper bound between neighbours.
+    pub(super) neighbour_displacement: f64,
     /// Safety factor on motions that are predicted without contact force.
     pub(super) motion_factor: f64,
-    /// Depth beyond which a point that was not in contact has not come through this surface; of a tip, a share of its radius.
+    /// Depth beyond which a point that was not in contact has not come through this surface, and motion in a step beyond which
+    /// a tip is swept: of a tip, a share of its radius.
     pub(super) max_depth: f64,
-    /// Motion of a step from which a tip is fast and is swept, as a share of its radius or of half an edge.
-    pub(super) fast_motion: f64,
     /// Least radius of a tip: a point needs a side from which it comes.
     pub(super) min_tip: f64,
     /// Gap at which a sweep has arrived, as a share of the tip's radius.
     pub(super) sweep_gap: f64,
+    /// Distance from a fast tip within which a surface is a present contact, as a share of its radius.
+    pub(super) tip_margin: f64,
     /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated surface.
     /// It saves the responses of a new location.
     pub(super) location_tolerance: [f64; 2],
@@ -29,8 +32,6 @@ pub(super) struct CollisionParameters {
     pub(super) on_edge: f64,
     /// Skin of a triangle cache, as a share of mean edge and reach.
     pub(super) skin: f64,
-    /// Share of the skin that is left when a rebuild begins.
-    pub(super) rebuild_at: f64,
     /// Steps that a rebuild takes, if it visits as many spheres and triangles as the last one.
     pub(super) rebuild_steps: usize,
     /// Number of cached triangles above which only seeds are kept: local minima of the distance, from which a descent leads
@@ -44,17 +45,17 @@ pub(super) struct CollisionParameters {
 /// The parameters.
 pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     margin: 2e-3,
+    neighbour_displacement: 0.3,
     motion_factor: 1.5,
     max_depth: 0.5,
-    fast_motion: 0.5,
     min_tip: 1e-3,
     sweep_gap: 0.02,
+    tip_margin: 0.05,
     location_tolerance: [1e-3, 1e-2],
     crease_cosine: 0.85,
     opposed_cosine: -0.5,
     on_edge: 0.02,
     skin: 0.5,
-    rebuild_at: 0.5,
     rebuild_steps: 4,
     seed_above: 48,
     refine_after_steps: 50,

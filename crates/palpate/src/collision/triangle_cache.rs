@@ -98,7 +98,7 @@ impl TriangleCache {
             query.found.clone_from(&self.found);
             return;
         }
-        if self.traversal.is_finished() && left < COLLISION.rebuild_at * skin {
+        if self.traversal.is_finished() && left < 0.5 * skin {
             self.begin_rebuild(surface, p, reach);
         }
         let found = &mut query.found;

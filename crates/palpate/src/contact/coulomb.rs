@@ -64,7 +64,7 @@ pub(crate) fn solve_contact(W: &DMat3, stiffness: &DMat3, b: DVec3, friction: f6
         let turns = *W * DVec3::new(lambda_turns, tangent_turns.x, tangent_turns.y);
         let slip_turns = -DVec2::new(turns.y, turns.z);
         let turn = -direction.perp_dot(slip) / (aside.perp_dot(slip) + direction.perp_dot(slip_turns));
-        let newton = direction.dot(slip) > 0.0 && turn.abs() < SOLVER.max_newton_turn;
+        let newton = direction.dot(slip) > 0.0 && turn.abs() < SOLVER.max_turn;
         let next = if newton {
             (direction + aside * turn).normalize()
         } else {

@@ -5,8 +5,11 @@
 
 /// Parameters of the contact solver.
 pub(crate) struct SolverParameters {
-    /// Residual of a contact's law at which an island is solved.
+    /// Residual of a contact's law at which an island is solved; and that for islands of few contacts, whose friction sticks
+    /// without creep.
     pub(super) tolerance: f64,
+    pub(super) exact_tolerance: f64,
+    pub(super) few_contacts: usize,
     /// Residual that is enough after a number of contact visits: `visits`, or `visits_with_samples` where contact samples stand
     /// for nodes, since they are no more exact.
     pub(super) loose_tolerance: f64,
@@ -18,19 +21,22 @@ pub(crate) struct SolverParameters {
     /// h·|ω| + strain, and of sweeps over all of them.
     pub(super) max_evaluations: u32,
     pub(super) max_sweeps: u32,
-    /// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at; and change of a point's
-    /// displacement that is not propagated, as a share of the tolerance.
+    /// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at.
     pub(super) skip: f64,
+    /// Change of force that is not propagated, by the displacement of its own point.
+    pub(super) min_change: f64,
     /// Goal of the sweeps between two evaluations, as a share of the residual before them.
     pub(super) sweep_goal: f64,
     /// Rotation within an evaluation [rad] from which contacts are linearised again.
     pub(super) relinearise: f64,
-    /// Scaled fallback: rotation [rad], and deformation as a share of the radius, to which forces are scaled; and the upper
-    /// limit of its sweeps, scales and evaluations.
-    pub(super) fallback_change: f64,
+    /// Rotation [rad] up to which a linearisation is trusted: of a Newton step for the direction of slip, beyond which a
+    /// fixed-point step is taken, and of an object in the scaled fallback (or its deformation, as a share of its radius).
+    pub(super) max_turn: f64,
+    /// Upper limits of the scaled fallback: scales, and sweeps and evaluations with each.
+    pub(super) fallback_scales: u32,
     pub(super) fallback_iterations: u32,
-    /// Upper limit of a Newton step for the direction of slip [rad]; beyond it a fixed-point step is taken.
-    pub(super) max_newton_turn: f64,
+    /// Upper limit of evaluations that end a step, from where contacts are solved.
+    pub(super) final_evaluations: u32,
     /// Denominator of a slipping contact's normal force, as a share of its normal compliance, below which it jams; the
     /// remainder shows as residual.
     pub(super) jam: f64,
@@ -41,6 +47,8 @@ pub(crate) struct SolverParameters {
 /// The parameters.
 pub(crate) const SOLVER: SolverParameters = SolverParameters {
     tolerance: 1e-8,
+    exact_tolerance: 1e-12,
+    few_contacts: 24,
     loose_tolerance: 1e-5,
     visits: 600,
     visits_with_samples: 60,
@@ -48,11 +56,13 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     max_evaluations: 40,
     max_sweeps: 120,
     skip: 0.1,
+    min_change: 3e-10,
     sweep_goal: 0.02,
     relinearise: 0.01,
-    fallback_change: 0.3,
+    max_turn: 0.3,
+    fallback_scales: 4,
     fallback_iterations: 20,
-    max_newton_turn: 0.3,
+    final_evaluations: 6,
     jam: 0.05,
     recovery: 0.1,
 };

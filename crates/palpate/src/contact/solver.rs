@@ -93,12 +93,12 @@ impl Solver {
 
     fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
-        // Held points are solved exactly.
-        let least_change = if touches { SOLVER.skip * SOLVER.tolerance } else { 0.0 };
+        let is_small = self.members.len() <= SOLVER.few_contacts;
+        let min_change = if is_small { 0.0 } else { SOLVER.min_change };
         let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
-            problem.states[at].points.least_move = least_change * radius;
+            problem.states[at].points.least_move = min_change * radius;
             reach = reach.max(problem.states[at].reach(&problem.objects[at]));
             size = size.min(radius);
         }
@@ -158,7 +158,7 @@ impl Solver {
             }
         }
         // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
-        (0..SOLVER.fallback_iterations).any(|_| self.evaluate(problem) <= round_off);
+        (0..SOLVER.final_evaluations).any(|_| self.evaluate(problem) <= round_off);
         for &object in &self.bodies {
             problem.finish(object as usize);
         }
@@ -182,22 +182,26 @@ impl Solver {
             }
         }
         let largest = self.bodies.iter().map(|&at| problem.change(at as usize)).fold(0.0, larger);
-        let mut share = (SOLVER.fallback_change / largest).min(0.5);
-        for _ in 0..SOLVER.fallback_iterations {
+        let mut share = (SOLVER.max_turn / largest).min(0.5);
+        for _ in 0..SOLVER.fallback_scales {
             self.start(problem);
             problem.scale_forces(&self.members, share);
             let is_met = (0..SOLVER.fallback_iterations).any(|_| self.evaluate(problem) <= round_off);
             if is_met && problem.write_ends(&self.members) >= 0.0 {
                 return true;
             }
-            share *= 0.5;
+            share = 0.25;
         }
         false
     }
 
     /// Tolerance after so many contact visits, as a share of the size.
     fn tolerance(&self, visits: u32) -> f64 {
-        if visits > self.visits_until_loose { SOLVER.loose_tolerance } else { SOLVER.tolerance }
+        match visits {
+            visits if visits > self.visits_until_loose => SOLVER.loose_tolerance,
+            _ if self.members.len() <= SOLVER.few_contacts => SOLVER.exact_tolerance,
+            _ => SOLVER.tolerance,
+        }
     }
 
     /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].

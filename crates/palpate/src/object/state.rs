@@ -19,6 +19,8 @@ pub(crate) struct ObjectState {
     pub(crate) increment: RigidIncrement,
     /// Upper bound of the deformation of any surface node over the step without contact force [m].
     pub(crate) surface_motion: f64,
+    /// Largest displacement of a contact point by contact forces in the last step [m].
+    pub(crate) contact_displacement: f64,
     pub(crate) ledger: EnergyLedger,
     pub(crate) stored_at_start: f64,
 }
@@ -42,6 +44,7 @@ impl ObjectState {
             end: still,
             increment: RigidIncrement::default(),
             surface_motion: 0.0,
+            contact_displacement: 0.0,
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };

@@ -257,6 +257,8 @@ fn integrate(model: &Model, state: &mut State) {
     for (object, own) in model.objects.iter().zip(objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
+        let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
+        own.contact_displacement = displaced.fold(0.0, f64::max);
         own.rigid = own.end.end;
         let mut view = object.view(gravity, &own.rigid, &mut own.response);
         own.ledger.dissipated += view.advance(&mut own.points.points);

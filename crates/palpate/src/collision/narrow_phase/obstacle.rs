@@ -66,7 +66,8 @@ impl CollisionContext<'_> {
             obstacle_from_body: start.relative_to(&before),
             obstacle_from_body_after: free.relative_to(&after),
             travel,
-            margin: COLLISION.margin * body.edge,
+            margin: COLLISION.margin * body.edge
+                + COLLISION.neighbour_displacement * own.contact_displacement,
             sweep_margin: if travel > 0.5 * obstacle.shape.size() { travel } else { 0.0 },
         };
         let max_samples = self.scene.max_contact_samples;

@@ -93,12 +93,12 @@ impl CollisionContext<'_> {
         let mut motion = motion;
         if let Some(nearest) = query.found.first().copied() {
             let local = COLLISION.motion_factor * surface.predicted_motion(nearest.triangle);
-            motion = motion.min(travel + local + COLLISION.margin * body.edge);
+            motion = motion.min(travel + local + 5.0 * COLLISION.margin * body.edge);
         }
         // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
-        let is_fast = motion > COLLISION.fast_motion * tip.max(0.5 * body.edge);
+        let is_fast = motion > COLLISION.max_depth * tip.max(0.5 * body.edge);
         let needed =
-            if is_fast { (1.0 + COLLISION.sweep_gap) * tip } else { tip + COLLISION.motion_factor * motion };
+            if is_fast { (1.0 + COLLISION.tip_margin) * tip } else { tip + COLLISION.motion_factor * motion };
         if needed > reach {
             triangles.find(query, &mut surface, start, needed);
         }
@@ -173,7 +173,7 @@ impl CollisionContext<'_> {
                     query.triangles_within(
                         &mut surface,
                         p,
-                        contacts.tip + gap + COLLISION.sweep_gap * contacts.tip,
+                        contacts.tip + gap + COLLISION.tip_margin * contacts.tip,
                     );
                     query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
                     for found in &query.found {
@@ -193,7 +193,7 @@ impl CollisionContext<'_> {
         for contact in contacts.all() {
             slide -= contact.normal_in_body * slide.dot(contact.normal_in_body).min(0.0);
         }
-        let count = libm::ceil(slide.length() / (COLLISION.fast_motion * contacts.tip.max(0.5 * body.edge)))
+        let count = libm::ceil(slide.length() / (COLLISION.max_depth * contacts.tip.max(0.5 * body.edge)))
             .min(MAX_SLIDE_SAMPLES);
         for k in 1..=count as u32 {
             let t = f64::from(k) / count;
