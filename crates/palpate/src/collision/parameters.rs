@@ -6,7 +6,8 @@
 /// Parameters of collision detection.
 pub(super) struct CollisionParameters {
     /// Margin within which points become candidates without approaching, and length below which two points count as one
-    /// place: contact forces of one step move neighbours by less.
+    /// place: contact forces of one step move neighbours by less. A point has half of it as the radius of its tip, since it needs
+    /// a side from which it comes.
     pub(super) margin: f64,
     /// Displacement of a free node by the forces on its neighbours, as a share of theirs: an upper bound between neighbours.
     pub(super) neighbour_displacement: f64,
@@ -15,19 +16,13 @@ pub(super) struct CollisionParameters {
     /// Depth beyond which a point that was not in contact has not come through this surface, and motion in a step beyond which
     /// a tip is swept: of a tip, a share of its radius.
     pub(super) max_depth: f64,
-    /// Least radius of a tip: a point needs a side from which it comes.
-    pub(super) min_tip: f64,
-    /// Gap at which a sweep has arrived, as a share of the tip's radius.
-    pub(super) sweep_gap: f64,
-    /// Distance from a fast tip within which a surface is a present contact, as a share of its radius.
+    /// Gap between a fast tip and a surface at which they are in contact, and a sweep has arrived, as a share of its radius.
     pub(super) tip_margin: f64,
     /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated surface.
     /// It saves the responses of a new location.
     pub(super) location_tolerance: [f64; 2],
     /// Cosine between the normals of two triangles below which there is a crease between them (within 32° they are one face).
     pub(super) crease_cosine: f64,
-    /// Cosine below which two faces are the front and the back of one wall.
-    pub(super) opposed_cosine: f64,
     /// Barycentric weight below which a point lies on the opposite edge.
     pub(super) on_edge: f64,
     /// Skin of a triangle cache, as a share of mean edge and reach.
@@ -48,12 +43,9 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     neighbour_displacement: 0.3,
     motion_factor: 1.5,
     max_depth: 0.5,
-    min_tip: 1e-3,
-    sweep_gap: 0.02,
     tip_margin: 0.05,
     location_tolerance: [1e-3, 1e-2],
     crease_cosine: 0.85,
-    opposed_cosine: -0.5,
     on_edge: 0.02,
     skin: 0.5,
     rebuild_steps: 4,

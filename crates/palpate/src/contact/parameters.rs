@@ -32,11 +32,8 @@ pub(crate) struct SolverParameters {
     /// Rotation [rad] up to which a linearisation is trusted: of a Newton step for the direction of slip, beyond which a
     /// fixed-point step is taken, and of an object in the scaled fallback (or its deformation, as a share of its radius).
     pub(super) max_turn: f64,
-    /// Upper limits of the scaled fallback: scales, and sweeps and evaluations with each.
+    /// Upper limit of scales that the fallback tries.
     pub(super) fallback_scales: u32,
-    pub(super) fallback_iterations: u32,
-    /// Upper limit of evaluations that end a step, from where contacts are solved.
-    pub(super) final_evaluations: u32,
     /// Denominator of a slipping contact's normal force, as a share of its normal compliance, below which it jams; the
     /// remainder shows as residual.
     pub(super) jam: f64,
@@ -61,8 +58,6 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     relinearise: 0.01,
     max_turn: 0.3,
     fallback_scales: 4,
-    fallback_iterations: 20,
-    final_evaluations: 6,
     jam: 0.05,
     recovery: 0.1,
 };

@@ -149,16 +149,18 @@ impl Solver {
                 }
             }
         };
-        if is_solved {
+        // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
+        let is_solved = is_solved && {
             problem.project_forces(&self.members);
-        } else {
+            self.evaluate_to(problem, round_off) <= UNSOLVED * reach
+        };
+        if !is_solved {
             report.unsolved_islands += 1;
             if !(touches && self.solve_scaled(problem, round_off)) {
                 problem.release_forces(&self.bodies, &self.members);
             }
+            self.evaluate_to(problem, round_off);
         }
-        // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
-        (0..SOLVER.final_evaluations).any(|_| self.evaluate(problem) <= round_off);
         for &object in &self.bodies {
             problem.finish(object as usize);
         }
@@ -175,7 +177,7 @@ impl Solver {
         problem.release_forces(&self.bodies, &self.members);
         self.start(problem);
         self.linearise(problem);
-        for _ in 0..SOLVER.fallback_iterations {
+        for _ in 0..SOLVER.max_evaluations {
             let moved = self.sweep(problem, 0.0);
             if moved <= round_off {
                 break;
@@ -186,8 +188,7 @@ impl Solver {
         for _ in 0..SOLVER.fallback_scales {
             self.start(problem);
             problem.scale_forces(&self.members, share);
-            let is_met = (0..SOLVER.fallback_iterations).any(|_| self.evaluate(problem) <= round_off);
-            if is_met && problem.write_ends(&self.members) >= 0.0 {
+            if self.evaluate_to(problem, round_off) <= round_off && problem.write_ends(&self.members) >= 0.0 {
                 return true;
             }
             share = 0.25;
@@ -207,6 +208,19 @@ impl Solver {
     /// Evaluate all objects under the present forces. Gives the residual of their rotations [m].
     fn evaluate(&self, problem: &mut ContactProblem) -> f64 {
         self.bodies.iter().map(|&object| problem.evaluate(object as usize)).fold(0.0, larger)
+    }
+
+    /// Evaluate until the residual of the rotations is down to a goal [m], or gets no smaller. Gives it.
+    fn evaluate_to(&self, problem: &mut ContactProblem, goal: f64) -> f64 {
+        let mut last = f64::INFINITY;
+        for _ in 0..SOLVER.max_evaluations {
+            let residual = self.evaluate(problem);
+            if residual <= goal || residual >= last {
+                return residual;
+            }
+            last = residual;
+        }
+        last
     }
 
     /// Linearise all unilateral contacts about the last evaluation.

@@ -55,7 +55,7 @@ impl CollisionContext<'_> {
         let parameters = &self.scene.devices[number];
         let body = &object.body;
         let footprint = body.footprint(parameters.patch_radius);
-        let tip = parameters.tip_radius.max(COLLISION.min_tip * body.edge);
+        let tip = parameters.tip_radius.max(0.5 * COLLISION.margin * body.edge);
         let start = own.rigid.pose.body_from_world(device.proxy);
         let free = own.free.end.pose.body_from_world(device.proxy_under_force());
         let travel = (free - start).length();
@@ -169,7 +169,7 @@ impl CollisionContext<'_> {
                 let reach = motion * (1.0 - t) + 2.0 * contacts.tip;
                 let Some(nearest) = ProximityQuery::nearest(&mut surface, p, reach) else { return };
                 let gap = nearest.distance - contacts.tip;
-                if gap < COLLISION.sweep_gap * contacts.tip {
+                if gap < COLLISION.tip_margin * contacts.tip {
                     query.triangles_within(
                         &mut surface,
                         p,
@@ -205,7 +205,7 @@ impl CollisionContext<'_> {
             query.triangles_within(
                 &mut surface,
                 p,
-                (1.0 - COLLISION.sweep_gap) * contacts.tip.max(slide.length() / count),
+                (1.0 - COLLISION.tip_margin) * contacts.tip.max(slide.length() / count),
             );
             query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
             for found in &query.found {
@@ -319,8 +319,7 @@ impl TipContacts {
         let foot = phong_project(surface, found, proxy, self.tip);
         // Two nearest points of one smooth surface are one contact; the back of a wall whose front is touched is none.
         let is_known = |c: &TipContact| c.normal_in_body.dot(foot.normal) > COLLISION.crease_cosine;
-        let is_back =
-            |c: &TipContact| clearance < 0.0 && c.normal_in_body.dot(foot.normal) < COLLISION.opposed_cosine;
+        let is_back = |c: &TipContact| clearance < 0.0 && c.normal_in_body.dot(foot.normal) < 0.0;
         if self.all().any(|c| is_known(c) || is_back(c)) {
             return;
         }
