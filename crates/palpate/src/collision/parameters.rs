@@ -18,8 +18,8 @@ pub(super) struct CollisionParameters {
     pub(super) max_depth: f64,
     /// Gap between a fast tip and a surface at which they are in contact, and a sweep has arrived, as a share of its radius.
     pub(super) tip_margin: f64,
-    /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated surface.
-    /// It saves the responses of a new location.
+    /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated
+    /// surface. A new location costs its responses.
     pub(super) location_tolerance: [f64; 2],
     /// Cosine between the normals of two triangles below which there is a crease between them (within 32° they are one face).
     pub(super) crease_cosine: f64,

@@ -65,6 +65,5 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
 /// Round-off of a length, as a share of (distance from the origin + size): a few roundings of x + R·(r + u).
 pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
-/// Residual, as a share of the reach, and pivot, as a share of its diagonal, that are more than round-off. Residual
-/// compliances in single precision have a relative error of 6e-8; a point at a thousandth of a triangle keeps about 1e-6.
+/// Residual that counts as unsolved, as a share of the reach: more than round-off.
 pub(crate) const UNSOLVED: f64 = 1e-9;

@@ -143,6 +143,7 @@ impl CollapsingMesh<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::poisson_disk_sample;
+    use super::super::test_surfaces::{ball, cut_in_four, sheet};
     use super::*;
     use alloc::collections::BTreeMap;
 
@@ -151,38 +152,6 @@ mod tests {
         cut_in_four(&cut_in_four(
             &crate::recording::Recording::from_bytes(bytes).expect("a released recording").surface,
         ))
-    }
-
-    /// Every triangle cut in four.
-    fn cut_in_four(surface: &Surface) -> Surface {
-        let mut positions = surface.positions.clone();
-        let mut middles = BTreeMap::new();
-        let mut triangles = Vec::new();
-        for &[a, b, c] in &surface.triangles {
-            let mut middle = |i: u32, j: u32| {
-                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                    positions.push((positions[i as usize] + positions[j as usize]) * 0.5);
-                    positions.len() as u32 - 1
-                })
-            };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        Surface { source_nodes: (0..positions.len() as u32).collect(), positions, triangles }
-    }
-
-    fn ball() -> Surface {
-        let (a, b) = (DVec3::X, DVec3::Y);
-        let positions = vec![a, b, -a, -b, DVec3::Z, -DVec3::Z];
-        let upper = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
-        let lower = upper.map(|[i, j, _]: [u32; 3]| [j, i, 5]);
-        let mut ball =
-            Surface { source_nodes: (0..6).collect(), positions, triangles: [upper, lower].concat() };
-        for _ in 0..4 {
-            ball = cut_in_four(&ball);
-            ball.positions.iter_mut().for_each(|p| *p = p.normalize());
-        }
-        ball
     }
 
     fn volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
@@ -197,7 +166,7 @@ mod tests {
     fn a_closed_surface_stays_closed_and_keeps_its_sides() {
         let block = block();
         let whole = volume(&block.positions, &block.triangles);
-        for (surface, spacings) in [(&block, [0.02, 0.035, 0.06, 0.09]), (&ball(), [0.15, 0.25, 0.4, 0.6])] {
+        for (surface, spacings) in [(&block, [0.02, 0.035, 0.06, 0.09]), (&ball(4), [0.15, 0.25, 0.4, 0.6])] {
             for spacing in spacings {
                 let nodes = poisson_disk_sample(surface, spacing);
                 let triangles = decimate(surface, &nodes).expect("a surface");
@@ -229,12 +198,7 @@ mod tests {
 
     #[test]
     fn a_sheet_of_no_thickness_has_no_decimated_surface() {
-        let positions: Vec<DVec3> =
-            (0..25).map(|k| DVec3::new(f64::from(k % 5), f64::from(k / 5), 0.0)).collect();
-        let cells = (0..16_u32).map(|k| k % 4 + k / 4 * 5);
-        let front = cells.flat_map(|i| [[i, i + 1, i + 6], [i, i + 6, i + 5]]);
-        let triangles: Vec<[u32; 3]> = front.flat_map(|[a, b, c]| [[a, b, c], [a, c, b]]).collect();
-        let sheet = Surface { source_nodes: (0..25).collect(), positions, triangles };
+        let sheet = sheet();
         assert!(decimate(&sheet, &poisson_disk_sample(&sheet, 2.0)).is_none());
     }
 }

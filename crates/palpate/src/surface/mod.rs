@@ -9,6 +9,8 @@ mod poisson_disk;
 mod quadratic_face;
 mod sample_level;
 mod sphere_tree;
+#[cfg(test)]
+mod test_surfaces;
 mod triangle;
 
 pub(crate) use decimation::decimate;

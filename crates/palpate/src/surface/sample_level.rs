@@ -102,36 +102,9 @@ fn one_sided_distance(
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_surfaces::{ball, sheet};
     use super::*;
     use alloc::vec;
-
-    /// Octahedron whose triangles are cut in four repeatedly, with its nodes on the unit sphere.
-    fn ball(times: usize) -> Surface {
-        let octant = |k: u32| {
-            let sign = |bit: u32| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
-            let corners = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
-            if k.count_ones().is_multiple_of(2) { corners } else { [corners[0], corners[2], corners[1]] }
-        };
-        let mut faces: Vec<[DVec3; 3]> = (0..8).map(octant).collect();
-        for _ in 0..times {
-            let quarter = |[a, b, c]: [DVec3; 3]| {
-                let [ab, bc, ca] = [a + b, b + c, c + a].map(DVec3::normalize);
-                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-            };
-            faces = faces.into_iter().flat_map(quarter).collect();
-        }
-        let mut positions: Vec<DVec3> = Vec::new();
-        let mut numbers = alloc::collections::BTreeMap::new();
-        let mut number = |p: DVec3| {
-            // + 0.0: no negative zeros.
-            *numbers.entry((p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert_with(|| {
-                positions.push(p);
-                positions.len() as u32 - 1
-            })
-        };
-        let triangles: Vec<[u32; 3]> = faces.into_iter().map(|face| face.map(&mut number)).collect();
-        Surface { source_nodes: (0..positions.len() as u32).collect(), positions, triangles }
-    }
 
     /// Depth [m] below the unit sphere of the deepest point of a triangle with corners on it: the foot of the centre, or the
     /// middle of the longest chord where the foot lies outside.
@@ -205,12 +178,7 @@ mod tests {
 
     #[test]
     fn a_sheet_of_no_thickness_has_samples_without_surface() {
-        let positions: Vec<DVec3> =
-            (0..25).map(|k| DVec3::new(f64::from(k % 5), f64::from(k / 5), 0.0)).collect();
-        let cells = (0..16_u32).map(|k| k % 4 + k / 4 * 5);
-        let front = cells.flat_map(|i| [[i, i + 1, i + 6], [i, i + 6, i + 5]]);
-        let triangles: Vec<[u32; 3]> = front.flat_map(|[a, b, c]| [[a, b, c], [a, c, b]]).collect();
-        let sheet = Surface { source_nodes: (0..25).collect(), positions, triangles };
+        let sheet = sheet();
         let levels = sheet.sample_levels(MIN_CONTACT_SAMPLES);
         assert!(!levels.is_empty());
         for level in levels {
