@@ -1,6 +1,7 @@
 //! The cases, one per file.
 
 mod adversarial;
+mod aligned_faces;
 mod bounce;
 mod closed_loop;
 mod compliance;
@@ -119,6 +120,11 @@ pub const CASES: &[Case] = &[
         compute: drop_block::drop_block,
     },
     Case { name: "stack", about: "two cubes rest on one another for a minute", compute: stack::stack },
+    Case {
+        name: "faces",
+        about: "flat faces on one another: St Venant's two bars; cubes on cubes, aligned, shifted and turned",
+        compute: aligned_faces::aligned_faces,
+    },
     Case {
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",

@@ -23,6 +23,11 @@ pub(super) struct CollisionParameters {
     pub(super) location_tolerance: [f64; 2],
     /// Cosine between the normals of two triangles below which there is a crease between them (within 32° they are one face).
     pub(super) crease_cosine: f64,
+    /// Cosine between the outward normals of a node and of a face below which they can press on each other. On the paper's cube a
+    /// face opposes an edge by −0.7 and a corner by −0.58; strain turns normals by some hundredths.
+    pub(super) opposing_cosine: f64,
+    /// Distance over the rim of a face that a node in contact may slide before it leaves the face.
+    pub(super) overhang: f64,
     /// Barycentric weight below which a point lies on the opposite edge.
     pub(super) on_edge: f64,
     /// Skin of a triangle cache, as a share of mean edge and reach.
@@ -46,6 +51,8 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     tip_margin: 0.05,
     location_tolerance: [1e-3, 1e-2],
     crease_cosine: 0.85,
+    opposing_cosine: -0.2,
+    overhang: 0.1,
     on_edge: 0.02,
     skin: 0.5,
     rebuild_steps: 4,

@@ -12,6 +12,12 @@ use glam::DVec3;
 /// Upper limit of triangles that a query keeps; of more, the nearest count.
 pub(super) const MAX_TRIANGLES: usize = 1024;
 
+/// Whether two surfaces with these outward normals can press on each other; always, where one has none (zero). A node on an
+/// edge or corner does not meet a face that is beside it.
+pub(super) fn opposes(normal: DVec3, facing: DVec3) -> bool {
+    facing == DVec3::ZERO || normal.dot(facing) < COLLISION.opposing_cosine
+}
+
 /// Distance below which two points are one [m].
 fn coincidence(body: &Body) -> f64 {
     ROUND_OFF * body.edge
@@ -40,8 +46,8 @@ impl ProximityQuery {
     }
 
     /// Find all triangles that share the nearest point of the surface, if it is within a reach [m] of a body point.
-    /// Triangles that face the same way as `facing` (zero for none) do not count; `known`, the nearest triangle of the last
-    /// step, shortens the search.
+    /// Only triangles that [`opposes`] a normal `facing` count (zero for all); `known`, the nearest triangle of the last step,
+    /// shortens the search.
     ///
     /// # Real time
     /// Costs the triangles that come near to the nearest distance.
@@ -55,7 +61,7 @@ impl ProximityQuery {
         let coincident = coincidence(surface.body);
         let found = &mut self.found;
         found.clear();
-        let counts = |one: &TriangleProjection| one.normal.dot(facing) <= 0.0;
+        let counts = |one: &TriangleProjection| opposes(one.normal, facing);
         let first = known.map(|triangle| surface.project_on_triangle(triangle, p)).filter(counts);
         let first = first.map_or(f64::INFINITY, |one| one.distance + coincident);
         let least = core::cell::Cell::new(reach.min(first));

@@ -6,7 +6,7 @@ use super::dot_products::{dot3, dot3_single};
 use super::patch_field::{FactoredForce, ModalDistances, PatchField, SampleSurface, residual_size};
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, triangles_around,
+    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals, triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -70,6 +70,8 @@ pub(crate) struct Body {
     /// Triangles around every surface node, node after node, and the index of each node's first.
     around: Vec<u32>,
     first_around: Vec<u32>,
+    /// Outward unit normal of every surface node at rest [body].
+    normals: Vec<DVec3>,
     /// Bounding box at rest [m, body].
     low: DVec3,
     high: DVec3,
@@ -95,8 +97,20 @@ impl Body {
             first_around.push(around.len() as u32);
         }
         let (low, high) = recording.surface.extent();
-        let device_patches = radii.len();
-        Self { recording, patches, device_patches, tree, bounds, edge, around, first_around, low, high }
+        let (device_patches, normals) = (radii.len(), node_normals(&recording.surface));
+        Self {
+            recording,
+            patches,
+            device_patches,
+            tree,
+            bounds,
+            edge,
+            around,
+            first_around,
+            normals,
+            low,
+            high,
+        }
     }
 
     /// Whether a point [m, body] is within a reach [m] of the bounding box at rest.
@@ -181,9 +195,9 @@ impl Body {
         self.surface(location.footprint).corners(&location.point)
     }
 
-    /// Outward unit normal of a contact sample at rest [body]; zero at level 0, where every node is its own sample.
-    pub(crate) fn outward_normal(&self, footprint: Footprint, node: usize) -> DVec3 {
-        self.samples(footprint).map_or(DVec3::ZERO, |samples| samples.normal(node))
+    /// Outward unit normal of a surface node at rest [body]; zero on a sheet of no thickness.
+    pub(crate) fn outward_normal(&self, node: usize) -> DVec3 {
+        self.normals[node]
     }
 
     /// Rest position of a location [m, body].

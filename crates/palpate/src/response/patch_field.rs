@@ -12,9 +12,7 @@
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{
-    Bands, Bounds, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, band, node_normals,
-};
+use crate::surface::{Bands, Bounds, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, band};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -58,8 +56,6 @@ pub(crate) struct SampleSurface {
     pub(crate) surface: Surface,
     /// Whether the level has a decimated surface.
     pub(crate) is_surface: bool,
-    /// Outward unit normal of each sample at rest; zero where it has none.
-    normals: Vec<DVec3>,
     /// One triangle of each sample.
     triangle: Vec<u32>,
     pub(crate) tree: SphereTree,
@@ -80,21 +76,14 @@ impl SampleSurface {
         for (t, corners) in triangles.iter().enumerate() {
             corners.iter().for_each(|node| triangle[indices[*node as usize] as usize] = t as u32);
         }
-        let normals = node_normals(surface);
-        let normals = nodes.iter().map(|&node| normals[node as usize]).collect();
         let tree = SphereTree::new(&surface.positions, &triangles);
         let surface = Surface { triangles, ..surface.clone() };
-        Self { indices, nodes: nodes.clone(), surface, is_surface, normals, triangle, tree }
+        Self { indices, nodes: nodes.clone(), surface, is_surface, triangle, tree }
     }
 
     /// Surface nodes of the samples.
     pub(super) fn nodes(&self) -> &[u32] {
         &self.nodes
-    }
-
-    /// Outward unit normal of a sample at rest.
-    pub(super) fn normal(&self, node: usize) -> DVec3 {
-        self.normals[self.indices[node] as usize]
     }
 
     /// Sample as a point of the decimated surface.

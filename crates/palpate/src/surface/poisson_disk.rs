@@ -3,8 +3,9 @@
 //! Equations: docs/theory.md (C30).
 
 use super::patch_weights::area_vector;
-use super::{Surface, triangles_around};
+use super::{Surface, area_normal, triangles_around};
 use alloc::collections::BTreeMap;
+use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
@@ -12,11 +13,19 @@ use glam::DVec3;
 const CORNER_COSINE: f64 = 0.65;
 const EDGE_COSINE: f64 = 0.85;
 
-/// Outward unit normal of every node at rest: mean of the normals of its triangles; zero where they cancel.
+/// Outward unit normal of every node at rest, angle-weighted: the mean of its triangles' normals by their angles at the node,
+/// whatever the triangulation of a face (Thürmer & Wüthrich 1998, J. Graph. Tools 3, 43); zero where they cancel.
 pub(crate) fn node_normals(surface: &Surface) -> Vec<DVec3> {
-    let unit = |t: &u32| area_vector(surface, *t as usize).normalize_or_zero();
-    let sum = |own: &Vec<u32>| own.iter().map(unit).sum::<DVec3>().normalize_or_zero();
-    triangles_around(surface).iter().map(sum).collect()
+    let mut normals = vec![DVec3::ZERO; surface.positions.len()];
+    for corners in &surface.triangles {
+        let positions = corners.map(|node| surface.positions[node as usize]);
+        let Some(normal) = area_normal(positions).try_normalize() else { continue };
+        for (at, node) in corners.iter().enumerate() {
+            let [own, next, last] = [0, 1, 2].map(|k| positions[(at + k) % 3]);
+            normals[*node as usize] += normal * (next - own).angle_between(last - own);
+        }
+    }
+    normals.into_iter().map(|sum| if sum.length() > 1e-9 { sum.normalize() } else { DVec3::ZERO }).collect()
 }
 
 /// Poisson-disk sample of the nodes: samples keep a spacing [m], and every node lies within it of a sample. Corners come

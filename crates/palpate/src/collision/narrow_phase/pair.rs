@@ -214,7 +214,7 @@ fn approach(
     let moving = MovingPoint {
         point: nodes.point_in(base, modal),
         travel: travel + deformation,
-        facing: nodes.direction_in(base, nodes.object.body.outward_normal(nodes.footprint, node)),
+        facing: nodes.direction_in(base, nodes.object.body.outward_normal(node)),
         known: known.map(|(_, location)| location.point.triangle),
         edge: nodes.object.body.edge.min(base.object.body.edge),
     };

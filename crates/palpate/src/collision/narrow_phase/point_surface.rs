@@ -4,7 +4,7 @@
 
 use crate::collision::deformed_surface::DeformedSurface;
 use crate::collision::parameters::{COLLISION, ROUND_OFF};
-use crate::collision::proximity::ProximityQuery;
+use crate::collision::proximity::{ProximityQuery, opposes};
 use crate::surface::SurfacePoint;
 use glam::DVec3;
 
@@ -15,8 +15,7 @@ pub(crate) struct MovingPoint {
     pub(crate) point: DVec3,
     /// Relative motion of point and surface over the step, the surface's deformation excluded [m].
     pub(crate) travel: f64,
-    /// Outward direction of the surface that the point belongs to [body]; zero for none. It does not meet triangles that face
-    /// the same way.
+    /// Outward normal of the surface that the point belongs to [body]; zero for none. It meets triangles that oppose it.
     pub(crate) facing: DVec3,
     /// Triangle that it was in contact with.
     pub(crate) known: Option<u32>,
@@ -46,18 +45,35 @@ pub(crate) fn point_against_surface(
     let (margin, reach) = (COLLISION.margin * edge, moving.reach());
     query.nearest_triangles(surface, (point, facing), reach, known);
     let nearest = query.found.first().copied()?;
-    let inside = query.is_inside(surface.body, point);
-    let gap = if inside { -nearest.distance } else { nearest.distance };
-    // From outside, points that can close the gap; from inside, those that were in contact or have just come in.
-    let closes =
-        gap < margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
-    if !closes || gap < -COLLISION.max_depth * edge && known.is_none() {
+    let allowed = margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
+    let on_face = nearest.weights.iter().all(|w| *w > ROUND_OFF);
+    let mut inside = query.is_inside(surface.body, point);
+    let mut at_border = false;
+    if facing != DVec3::ZERO && (!on_face || inside && known.is_none()) {
+        // All faces tell on which side the point is, and whether it is beside those that oppose it.
+        query.nearest_triangles(surface, (point, DVec3::ZERO), nearest.distance * (1.0 + ROUND_OFF), known);
+        inside = query.is_inside(surface.body, point);
+        at_border = query.found.iter().any(|one| !opposes(one.normal, facing));
+    }
+    let height = nearest.normal.dot(point - nearest.position);
+    let overhang = (point - nearest.position - nearest.normal * height).length();
+    // A point in contact that has slid over a border stays on the face for a while, or rims of aligned faces would lose
+    // each other.
+    let overhangs = !inside && at_border && known.is_some() && overhang < COLLISION.overhang * edge;
+    let gap = match inside {
+        _ if overhangs => height,
+        true => -nearest.distance,
+        false => nearest.distance,
+    };
+    // From outside, points that can close the gap; from inside, those that were in contact or have just come in, beside a face
+    // only by the motion of a step.
+    let depth = if at_border { allowed } else { COLLISION.max_depth * edge };
+    if gap > allowed || gap < -depth && known.is_none() {
         return None;
     }
     // Outside an edge the normal leads to the point, on a face it is the face's.
-    let on_face = nearest.weights.iter().all(|w| *w > ROUND_OFF);
-    let is_clear = !inside && nearest.distance > margin && !on_face;
+    let is_clear = !inside && nearest.distance > margin && !on_face && !overhangs;
     let normal = if is_clear { (point - nearest.position) / nearest.distance } else { nearest.normal };
     let location = SurfacePoint { triangle: nearest.triangle, weights: nearest.weights };
-    (normal != DVec3::ZERO && normal.dot(facing) <= 0.0).then_some((location, normal))
+    (normal != DVec3::ZERO && opposes(normal, facing)).then_some((location, normal))
 }
