@@ -280,7 +280,21 @@ impl Response {
 
     /// Instantaneous compliance R[0] of the recording [m/N].
     fn modelled_instantaneous(&self, damping: Damping) -> DMat3 {
-        Self::sum(&self.kept, |m| oscillator(m, damping).instantaneous_compliance()) + self.residual
+        let decay = self.residual_decay(damping);
+        Self::sum(&self.kept, |m| oscillator(m, damping).instantaneous_compliance())
+            + self.residual * (1.0 - decay)
+    }
+
+    /// Relaxation time of the residual compliance [s], as [`palpate::ModalBasis::residual_relaxation_s`] has it.
+    fn residual_relaxation_s(&self, damping: Damping) -> f64 {
+        let relaxation = |omega: f64| 2.0 * damping.ratio(omega) / omega;
+        self.kept.last().map_or(0.0, |highest| relaxation(highest.square.sqrt()))
+    }
+
+    /// Factor by which the displacement of the residual compliance decays in a step.
+    fn residual_decay(&self, damping: Damping) -> f64 {
+        let relaxation = self.residual_relaxation_s(damping);
+        if relaxation > 0.0 { (-EVENT.step_s / relaxation).exp() } else { 0.0 }
     }
 
     /// Frequency [Hz] up to which the truncated modes respond quasi-statically. The kept modes are equal in both models.
@@ -299,8 +313,11 @@ impl Response {
                 );
                 (a / (a * a + b * b), -b / (a * a + b * b))
             };
-            let real = Self::sum(&self.truncated, |m| parts(m).0) - self.residual;
-            let imaginary = Self::sum(&self.truncated, |m| parts(m).1);
+            // S/(1 + iωτ).
+            let relaxed = omega * self.residual_relaxation_s(damping);
+            let residual = self.residual * (1.0 / (1.0 + relaxed * relaxed));
+            let real = Self::sum(&self.truncated, |m| parts(m).0) - residual;
+            let imaginary = Self::sum(&self.truncated, |m| parts(m).1) + residual * relaxed;
             if norm(real).hypot(norm(imaginary)) > allowed {
                 return within;
             }
@@ -324,13 +341,16 @@ impl Response {
             modes.map(|m| (oscillator(m, damping), m.gain, OscillatorState::default())).collect();
         let compliance = if all { self.instantaneous(damping) } else { self.modelled_instantaneous(damping) };
         let inverse = compliance.inverse();
+        let decay = if all { 0.0 } else { self.residual_decay(damping) };
+        let mut residual = DVec3::ZERO;
         (1..=steps)
             .map(|step| {
                 let share = (step as f64 * EVENT.step_s / EVENT.rise_s).min(1.0);
                 let target = axis * (0.5 - 0.5 * (std::f64::consts::PI * share).cos());
                 let free: DVec3 =
                     modes.iter().map(|(map, gain, state)| *gain * map.advance(*state, 0.0).q).sum();
-                let force = inverse * (target - free);
+                let force = inverse * (target - free - residual * decay);
+                residual = residual * decay + self.residual * force * (1.0 - decay);
                 for (map, gain, state) in &mut modes {
                     *state = map.advance(*state, gain.dot(force));
                 }

@@ -74,7 +74,9 @@ struct Sample {
 pub struct ClosedLoop {
     timing: LoopTiming,
     body: Vec<(DiscreteOscillator, f64)>,
+    /// Residual compliance [m/N], and its decay in a step.
     residual: f64,
+    residual_decay: f64,
     device: DiscreteOscillator,
     /// Mobility of device and hand, 1/mass [1/kg].
     mobility: f64,
@@ -92,6 +94,7 @@ impl ClosedLoop {
             timing,
             body: point.discrete_oscillators(timing.step_s),
             residual: point.residual(),
+            residual_decay: point.residual_decay(timing.step_s),
             device: DiscreteOscillator::mass(mass, hand.stiffness_n_m, damping, timing.step_s),
             mobility: 1.0 / mass,
             samples: Vec::new(),
@@ -253,7 +256,8 @@ impl ClosedLoop {
         let w = Complex64::from_polar(1.0 / (1.0 + step_s / SLOWEST_GROWTH_S), -angle);
         let elastic: Complex64 = self.body.iter().map(|(map, gain)| map.response(w) * *gain).sum();
         let device = self.device.response(w) * self.mobility * w.powu(1 + delay_updates);
-        Sample { angle, w, body: elastic + self.residual, device }
+        let residual = self.residual * (1.0 - self.residual_decay) / (1.0 - self.residual_decay * w);
+        Sample { angle, w, body: elastic + residual, device }
     }
 
     /// Samples from 0 to π, dense enough to resolve every resonance: around every pole at doubling distances, then refined wherever

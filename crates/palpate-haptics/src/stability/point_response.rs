@@ -1,11 +1,12 @@
 //! Driving-point response of an object at a point of its surface, along a direction n.
 //!
 //! ```text
-//! C(z) = Σᵢ φᵢ²·gᵢ(z) + s + m·g₀(z)        φ = nᵀ·J·Φ,  s = nᵀ·J·S·Jᵀ·n,  m = 1/M + (r×n)ᵀ·I⁻¹·(r×n)
+//! C(z) = Σᵢ φᵢ²·gᵢ(z) + s·(1 − e)/(1 − e/z) + m·g₀(z)
+//! φ = nᵀ·J·Φ,  s = nᵀ·J·S·Jᵀ·n,  m = 1/M + (r×n)ᵀ·I⁻¹·(r×n),  e = exp(−h/τ)
 //! ```
 //!
 //! C [m/N] is the displacement at the end of a step per held force; C(∞) = R[0]. gᵢ is the response of mode i (see
-//! `discrete_oscillator`), g₀ that of a free mass of 1 kg, s [m/N] the residual compliance, m [1/kg] the mobility of the rigid body, 0 if
+//! `discrete_oscillator`), g₀ that of a free mass of 1 kg, s [m/N] the residual compliance with its relaxation time τ, m [1/kg] the mobility of the rigid body, 0 if
 //! nodes are fixed.
 
 use super::discrete_oscillator::DiscreteOscillator;
@@ -19,8 +20,9 @@ pub struct PointResponse {
     modes: Vec<[f64; 3]>,
     /// Mobility m of the rigid body [1/kg].
     mobility: f64,
-    /// Residual compliance s [m/N].
+    /// Residual compliance s [m/N], and its relaxation time τ [s].
     residual: f64,
+    relaxation_s: f64,
 }
 
 impl PointResponse {
@@ -53,7 +55,8 @@ impl PointResponse {
         };
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let modes = pairs.zip(shapes).map(|((&omega, &zeta), phi)| [omega, zeta, phi * phi]).collect();
-        Self { modes, mobility, residual }
+        let relaxation_s = recording.modes.residual_relaxation_s();
+        Self { modes, mobility, residual, relaxation_s }
     }
 
     /// R[0] [m/N]: displacement per force within one step [s].
@@ -62,7 +65,7 @@ impl PointResponse {
             .iter()
             .map(|(map, gain)| gain * map.instantaneous_compliance())
             .sum::<f64>()
-            + self.residual
+            + self.residual * (1.0 - self.residual_decay(step_s))
     }
 
     /// Static compliance [m/N], without rigid motion.
@@ -73,6 +76,11 @@ impl PointResponse {
     /// Residual compliance s [m/N].
     pub fn residual(&self) -> f64 {
         self.residual
+    }
+
+    /// Factor e by which the displacement of the residual compliance decays in a step [s].
+    pub fn residual_decay(&self, step_s: f64) -> f64 {
+        if self.relaxation_s > 0.0 { (-step_s / self.relaxation_s).exp() } else { 0.0 }
     }
 
     /// Oscillators: ω [rad/s], ζ and gain φ² [1/kg] of every mode, and of the rigid motion with ω = 0.

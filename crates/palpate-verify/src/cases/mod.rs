@@ -15,6 +15,7 @@ mod impulse_response;
 mod pinch;
 mod pinch_lift;
 mod press;
+mod residual_relaxation;
 mod rigid_motion;
 mod shaken_block;
 mod sphere;
@@ -68,6 +69,11 @@ pub const CASES: &[Case] = &[
         name: "pinch",
         about: "pinching the paper's cube against the solution with all 6585 modes",
         compute: pinch::pinch,
+    },
+    Case {
+        name: "relaxation",
+        about: "held points of a damped cube moved quickly, 200 modes and S against all modes",
+        compute: residual_relaxation::residual_relaxation,
     },
     Case {
         name: "impulse",

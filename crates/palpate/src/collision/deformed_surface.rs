@@ -9,7 +9,7 @@
 
 use super::node_cache::NodePositionCache;
 use crate::response::{
-    AppliedForce, Body, ContactLocation, ContactPoints, Footprint, NodalForces, ResponseState,
+    Body, ContactLocation, ContactPoints, Footprint, NodalForces, ResponseState, SpringForce,
 };
 use crate::surface::{
     Centre, DeformationBound, DeformingNodes, Surface, Traversal, area_normal, at_weights,
@@ -54,8 +54,8 @@ pub(crate) struct DeformedSurface<'a> {
     pub(super) q: &'a [f64],
     /// Modal coordinates at the end of the step without contact force.
     free: &'a [f64],
-    /// Forces of the last step, and those of them that act at points, by nodes.
-    applied_forces: &'a [AppliedForce],
+    /// Spring forces of the residual compliance, and those of them that act at points, by nodes.
+    spring_forces: &'a [SpringForce],
     nodal: Option<&'a NodalForces>,
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
     own: OwnContacts,
@@ -86,13 +86,10 @@ impl<'a> DeformedSurface<'a> {
                 cache.take_contact_points(points, footprint);
             }
         }
-        // Residual displacement is largest at the contacts: twice theirs bounds that of all nodes.
-        let same = points.points.iter().filter(|p| p.location.footprint == footprint);
-        let largest = same.map(|p| p.state.residual.length()).fold(0.0, f64::max);
         let bound = DeformationBound {
             modal: body.band_norms(q),
             residual: libm::sqrt(2.0 * state.residual_energy()),
-            max_residual: 2.0 * largest,
+            max_residual: state.max_residual(),
             slope: body.residual_slope(footprint),
         };
         Self {
@@ -100,7 +97,7 @@ impl<'a> DeformedSurface<'a> {
             footprint,
             q,
             free,
-            applied_forces: state.applied_forces(),
+            spring_forces: state.spring_forces(),
             nodal: state.nodal(),
             own: [None; MAX_TIP_CONTACTS],
             flat_radius: 0.0,
@@ -119,8 +116,8 @@ impl<'a> DeformedSurface<'a> {
         if own.iter().any(Option::is_some) {
             let own_displacement = |location: ContactLocation| {
                 let is_its =
-                    |force: &&AppliedForce| self.footprint == Footprint::Point && force.location == location;
-                let force = self.applied_forces.iter().find(is_its);
+                    |force: &&SpringForce| self.footprint == Footprint::Point && force.location == location;
+                let force = self.spring_forces.iter().find(is_its);
                 let displacement =
                     force.map_or(DVec3::ZERO, |f| self.body.residual(&location, &location) * f.force);
                 (location, displacement)
@@ -217,14 +214,14 @@ impl<'a> DeformedSurface<'a> {
 
     /// Position with the residual displacement of a node added [m], that of excluded contacts left out.
     fn add_residual(&self, node: usize, modal: DVec3) -> DVec3 {
-        let forces = self.applied_forces.iter().filter(|force| force.location.footprint == self.footprint);
+        let forces = self.spring_forces.iter().filter(|force| force.location.footprint == self.footprint);
         let own = || self.own.iter().flatten();
         if self.footprint != Footprint::Point {
-            let flat = |force: &AppliedForce| {
+            let flat = |force: &SpringForce| {
                 if own().any(|(own, _)| *own == force.location) { self.flat_radius } else { 0.0 }
             };
             let displacement =
-                |force: &AppliedForce| self.body.residual_displacement(node, force, flat(force));
+                |force: &SpringForce| self.body.residual_displacement(node, force, flat(force));
             return modal + forces.map(displacement).sum::<DVec3>();
         }
         let mut position = modal;
@@ -233,7 +230,7 @@ impl<'a> DeformedSurface<'a> {
         }
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
         for (own, displacement) in own() {
-            let is_beside = |force: &&AppliedForce| {
+            let is_beside = |force: &&SpringForce| {
                 force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
             };
             if let Some(force) = forces.clone().find(is_beside) {

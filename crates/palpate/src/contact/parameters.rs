@@ -15,7 +15,7 @@ pub(crate) struct SolverParameters {
     pub(super) loose_tolerance: f64,
     pub(super) visits: u32,
     pub(super) visits_with_samples: u32,
-    /// Residual that is used, and reported as unsolved, at the limit of sweeps: a tenth of the penetration that a body may have.
+    /// Residual that is used, and reported as unsolved, at the limit of sweeps.
     pub(super) rough_tolerance: f64,
     /// Upper limits of exact evaluations, each of which reduces the residual of the rotation by a factor of about
     /// h·|ω| + strain, and of sweeps over all of them.
@@ -49,7 +49,7 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     loose_tolerance: 1e-5,
     visits: 600,
     visits_with_samples: 60,
-    rough_tolerance: 1e-3,
+    rough_tolerance: 1e-4,
     max_evaluations: 40,
     max_sweeps: 120,
     skip: 0.1,

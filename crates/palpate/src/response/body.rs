@@ -43,9 +43,9 @@ pub(crate) struct LocationState {
     pub(crate) sag: DVec3,
 }
 
-/// Force that acted over the last step.
+/// Force g in the springs of the residual compliance at a location (see `modal`).
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct AppliedForce {
+pub(crate) struct SpringForce {
     pub(crate) location: ContactLocation,
     /// Force [N, body].
     pub(crate) force: DVec3,
@@ -53,6 +53,20 @@ pub(crate) struct AppliedForce {
     pub(crate) rest: DVec3,
     /// Factored forces of a patch; those between contact samples act at each corner.
     factored: [FactoredForce; 3],
+}
+
+impl SpringForce {
+    /// Multiply the force.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.force *= factor;
+        self.factored.iter_mut().for_each(|factored| factored.value *= factor);
+    }
+
+    /// Add another force at the same location.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.force += other.force;
+        self.factored.iter_mut().zip(other.factored).for_each(|(own, other)| own.value += other.value);
+    }
 }
 
 /// Elastic body of one object; immutable.
@@ -297,14 +311,14 @@ impl Body {
         }
     }
 
-    /// Record of a force [N, body] for the next step.
+    /// Spring force [N, body] at a location.
     ///
     /// # Real time
-    pub(crate) fn applied_force(&self, location: ContactLocation, force: DVec3) -> AppliedForce {
+    pub(crate) fn spring_force(&self, location: ContactLocation, force: DVec3) -> SpringForce {
         let rest = self.rest_position(&location);
         let patch = self.patch(location.footprint);
         let factored = patch.map(|patch| patch.factored(&self.recording, &location.point, rest, force));
-        AppliedForce { location, force, rest, factored: factored.unwrap_or_default() }
+        SpringForce { location, force, rest, factored: factored.unwrap_or_default() }
     }
 
     /// Residual displacement of a surface node under a force [m, body], averaged over the force's footprint. That of a patch
@@ -314,7 +328,7 @@ impl Body {
     pub(crate) fn residual_displacement(
         &self,
         node: usize,
-        applied: &AppliedForce,
+        applied: &SpringForce,
         flat_radius: f64,
     ) -> DVec3 {
         match self.patch(applied.location.footprint) {

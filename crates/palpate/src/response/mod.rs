@@ -13,7 +13,7 @@ mod oscillator;
 mod patch_field;
 mod residual_fields;
 
-pub(crate) use body::{AppliedForce, Body, ContactLocation, Footprint, LocationState};
+pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
 pub(crate) use dot_products::dot;
 pub(crate) use nodal_forces::NodalForces;
@@ -121,7 +121,9 @@ impl Response {
     /// State at rest, for the body's number of surface nodes and a capacity of contact points.
     pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), nodes, capacity)),
+            Self::Modal(modes) => {
+                ResponseState::Modal(ModalState::new(modes.len(), modes.relaxes(), nodes, capacity))
+            }
             Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
         }
     }
@@ -196,7 +198,7 @@ impl ResponseView<'_> {
     /// # Real time
     pub(crate) fn free(&mut self, slot: usize, start: &LocationState) -> DVec3 {
         match (self.response, &mut *self.state) {
-            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot) + start.sag,
+            (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot, start),
             (Response::Fir(fir), ResponseState::Fir(state)) => state.free(fir, slot, self.gravity),
             _ => DVec3::ZERO,
         }
@@ -246,19 +248,27 @@ impl ResponseState {
         }
     }
 
-    /// Forces of the last step with their locations; none with a table.
-    pub(crate) fn applied_forces(&self) -> &[AppliedForce] {
+    /// Spring forces of the residual compliance with their locations; none with a table.
+    pub(crate) fn spring_forces(&self) -> &[SpringForce] {
         match self {
-            Self::Modal(state) => &state.applied_forces,
+            Self::Modal(state) => &state.spring_forces,
             Self::Fir(_) => &[],
         }
     }
 
-    /// Forces of the last step at points, distributed to nodes; none with a table.
+    /// Spring forces at points, distributed to nodes; none with a table.
     pub(crate) fn nodal(&self) -> Option<&NodalForces> {
         match self {
             Self::Modal(state) => Some(&state.nodal),
             Self::Fir(_) => None,
+        }
+    }
+
+    /// Upper bound of the residual displacement of any node [m].
+    pub(crate) fn max_residual(&self) -> f64 {
+        match self {
+            Self::Modal(state) => state.max_residual,
+            Self::Fir(_) => 0.0,
         }
     }
 

@@ -1,9 +1,14 @@
 //! Modal form of a body's response: u = Φ·q + S·f.
 //!
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (`oscillator`). The residual compliance S [m/N] is the
-//! static compliance of the modes that are not kept: a massless spring within the step.
+//! static compliance of the modes that are not kept: massless springs with dampers, whose forces g relax to the applied forces f
+//! with the time constant τ. Sampled exactly over a step h:
 //!
-//! Equations: docs/theory.md (C3), (C7).
+//! ```text
+//! u = Φ·q + S·g        g⁺ = e·g + (1 − e)·f        e = exp(−h/τ)
+//! ```
+//!
+//! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
 
 use super::ContactPoint;
 use super::dot_products::{dot, dot3, dot9, dots};
@@ -11,7 +16,7 @@ use super::nodal_compliance::NodalCompliance;
 use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
-use super::{AppliedForce, Body, ContactLocation, Footprint, LocationState};
+use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 use crate::recording::{ModalBasis, Recording};
 use alloc::sync::Arc;
 use alloc::vec;
@@ -21,10 +26,18 @@ use glam::{DMat3, DVec3};
 /// States below this size [√J] are set to zero: denormal numbers cost 40 times as much.
 const FLUSH_BELOW: f64 = 1e-150;
 
+/// Spring force that is forgotten, as a share of the largest one of the object: an error of that share of S·g.
+const FORGOTTEN: f64 = 1e-6;
+
+/// Room for relaxing forces on places that contacts have left.
+const RELAXING: usize = 256;
+
 /// Modes of one object at the scene's step.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
     step_s: f64,
+    /// Factor e by which the residual's spring forces decay in a step.
+    decay: f64,
     oscillators: Vec<SampledOscillator>,
     /// Precomputed R[0] between nodes, by footprint.
     pub(super) nodal_compliance: Vec<Arc<NodalCompliance>>,
@@ -45,16 +58,19 @@ pub(crate) struct ModalState {
     rows: Vec<f64>,
     /// Three rows J·Φ·B.
     weighted: Vec<f64>,
-    /// Forces of the last step with their locations, for the residual compliance.
-    pub(super) applied_forces: Vec<AppliedForce>,
-    /// Forces of the last step at points, distributed to nodes.
+    /// Spring forces g of the residual compliance with their locations.
+    pub(super) spring_forces: Vec<SpringForce>,
+    /// Spring forces at points, distributed to nodes.
     pub(super) nodal: NodalForces,
-    /// Elastic energy of the residual compliance [J], ½·fᵀ·S·f.
+    /// Elastic energy of the residual compliance [J], ½·gᵀ·S·g.
     pub(super) residual_energy: f64,
+    /// Upper bound of the residual displacement of any node [m].
+    pub(super) max_residual: f64,
 }
 
 impl ModalState {
-    pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
+    /// State at rest; `relaxes` says whether spring forces outlast a step.
+    pub(crate) fn new(modes: usize, relaxes: bool, nodes: usize, capacity: usize) -> Self {
         Self {
             modes: vec![OscillatorState::default(); modes],
             q: vec![0.0; modes],
@@ -63,13 +79,14 @@ impl ModalState {
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
-            applied_forces: Vec::with_capacity(capacity),
-            nodal: NodalForces::new(nodes, capacity),
+            spring_forces: Vec::with_capacity(capacity + if relaxes { RELAXING } else { 0 }),
+            nodal: NodalForces::new(nodes, if relaxes { nodes } else { capacity }),
             residual_energy: 0.0,
+            max_residual: 0.0,
         }
     }
 
-    /// Residual displacement of a location under the forces of the last step [m, body].
+    /// Residual displacement of a location at the start of the step [m, body].
     fn residual_displacement(&mut self, body: &Body, location: &ContactLocation) -> DVec3 {
         if location.footprint == Footprint::Point {
             let corners = body.recording.surface.corners(&location.point).into_iter();
@@ -80,7 +97,32 @@ impl ModalState {
                 })
                 .sum();
         }
-        self.applied_forces.iter().map(|other| body.residual(location, &other.location) * other.force).sum()
+        self.spring_forces.iter().map(|other| body.residual(location, &other.location) * other.force).sum()
+    }
+
+    /// Let all spring forces decay by a factor, and forget those that are small.
+    fn relax(&mut self, decay: f64) {
+        let largest = self.spring_forces.iter().map(|spring| spring.force.length()).fold(0.0, f64::max);
+        let least = FORGOTTEN * largest / decay;
+        self.spring_forces.retain(|spring| decay > 0.0 && spring.force.length() > least);
+        self.spring_forces.iter_mut().for_each(|spring| spring.scale(decay));
+        self.nodal.relax(decay, least);
+    }
+
+    /// Add a spring force to that of its location; without room, the smallest one is forgotten.
+    fn add_spring_force(&mut self, spring: SpringForce) {
+        let springs = &mut self.spring_forces;
+        if let Some(same) = springs.iter_mut().find(|other| other.location == spring.location) {
+            same.add(&spring);
+            return;
+        }
+        if springs.len() == springs.capacity() {
+            let size = |at: &usize| springs[*at].force.length();
+            if let Some(least) = (0..springs.len()).min_by(|a, b| size(a).total_cmp(&size(b))) {
+                springs.swap_remove(least);
+            }
+        }
+        springs.push(spring);
     }
 
     /// Set the modal states.
@@ -99,7 +141,19 @@ impl SampledModes {
     pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
-        Self { step_s, oscillators, nodal_compliance: Vec::new() }
+        let relaxation = modes.residual_relaxation_s();
+        let decay = if relaxation > 0.0 { libm::exp(-step_s / relaxation) } else { 0.0 };
+        Self { step_s, decay, oscillators, nodal_compliance: Vec::new() }
+    }
+
+    /// Whether the residual's spring forces outlast a step.
+    pub(super) fn relaxes(&self) -> bool {
+        self.decay > FORGOTTEN
+    }
+
+    /// Share of the residual compliance that answers within a step, 1 − e.
+    pub(super) fn residual_share(&self) -> f64 {
+        1.0 - self.decay
     }
 
     /// Number of modes.
@@ -143,7 +197,7 @@ impl SampledModes {
         LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }
 
-    /// R[0] = J_a·Φ·B·Φᵀ·J_bᵀ + S [m/N] between the location of a slot and every contact point.
+    /// R[0] = J_a·Φ·B·Φᵀ·J_bᵀ + (1 − e)·S [m/N] between the location of a slot and every contact point.
     ///
     /// # Real time
     /// Costs modes × points, or points where it is precomputed.
@@ -170,7 +224,8 @@ impl SampledModes {
                 self.weigh(of(slot), weighted);
                 weighed = true;
             }
-            give(index, dot9(weighted, of(point.slot)) + body.residual(location, &point.location));
+            let residual = body.residual(location, &point.location) * self.residual_share();
+            give(index, dot9(weighted, of(point.slot)) + residual);
         }
     }
 
@@ -199,11 +254,11 @@ impl SampledModes {
         false
     }
 
-    /// Modal displacement of a slot's location at the end of the step without contact force [m, body].
+    /// Displacement of a slot's location at the end of the step without contact force [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&self, state: &ModalState, slot: usize) -> DVec3 {
-        dot3(state.rows(slot), &state.free)
+    pub(crate) fn free(&self, state: &ModalState, slot: usize, start: &LocationState) -> DVec3 {
+        dot3(state.rows(slot), &state.free) + start.sag + (start.residual - start.sag) * self.decay
     }
 
     /// Advance over the predicted step under the held forces of the contact points, and predict the next step with its
@@ -240,29 +295,36 @@ impl SampledModes {
         state.predicted = None;
         self.predict(&body.recording, state, next_gravity);
 
-        // Residual spring: work g·Δ(S·g), stored ½·gᵀ·S·g; the difference is dissipated.
-        let (mut work, mut energy) = (0.0, 0.0);
-        state.applied_forces.clear();
-        state.nodal.clear();
+        // Residual springs with dampers: work f·Δ(S·g), stored ½·gᵀ·S·g; the difference, ½·(1 − e²)·(f − g)ᵀ·S·(f − g), is
+        // dissipated.
+        let (decay, share) = (self.decay, self.residual_share());
+        let (mut work, mut energy) = (0.0, decay * decay * state.residual_energy);
+        let mut largest = 0.0_f64;
+        state.relax(decay);
         for point in points.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let [modal, free] = dots(rows, [&state.q, &state.free]);
-            point.free = free + point.state.sag;
             let residual = point.displacement - modal;
-            work += point.force_in_body.dot(residual - point.state.residual);
-            energy += 0.5 * point.force_in_body.dot(residual - point.state.sag);
+            let LocationState { residual: start, sag, .. } = point.state;
+            let (before, after) = ((start - sag) * decay, residual - sag);
+            point.free = free + sag + after * decay;
+            work += point.force_in_body.dot(residual - start);
+            energy += 0.5 * share * point.force_in_body.dot(after + before);
+            largest = largest.max((after - before).length());
             point.state.residual = residual;
             if let Some(node) = point.single_node() {
-                state.nodal.store(node, residual - point.state.sag);
+                state.nodal.store(node, after);
             }
-            if point.force_in_body != DVec3::ZERO {
-                state.applied_forces.push(body.applied_force(point.location, point.force_in_body));
+            let force = point.force_in_body * share;
+            if force != DVec3::ZERO {
+                state.add_spring_force(body.spring_force(point.location, force));
                 if point.location.footprint == Footprint::Point {
-                    let corners = body.recording.surface.corners(&point.location.point);
-                    state.nodal.add(corners, point.force_in_body);
+                    state.nodal.add(body.recording.surface.corners(&point.location.point), force);
                 }
             }
         }
+        // It is largest at the contacts: twice theirs bounds that of all nodes.
+        state.max_residual = decay * state.max_residual + 2.0 * largest;
         let dissipated = dissipated + work - (energy - state.residual_energy);
         state.residual_energy = energy;
         dissipated
@@ -281,7 +343,7 @@ impl SampledModes {
         sum
     }
 
-    /// Displacement of every surface node [m, body], u = Φ·q + S·f.
+    /// Displacement of every surface node [m, body], u = Φ·q + S·g.
     pub(crate) fn surface_displacement(
         &self,
         body: &Body,
@@ -298,7 +360,7 @@ impl SampledModes {
         }
     }
 
-    /// Displacement of every surface node beyond the modes [m, body]: S·f, and the sag of a fixed body.
+    /// Displacement of every surface node beyond the modes [m, body]: S·g, and the sag of a fixed body.
     pub(crate) fn residual_displacements(
         &self,
         body: &Body,
@@ -318,7 +380,7 @@ impl SampledModes {
         let mut loads = deformed.loaded.clone();
         if !residual_fields.add(body, &deformed.patches, out) {
             // All forces as nodal forces, since patches overlap.
-            for AppliedForce { location, force, .. } in &deformed.patches {
+            for SpringForce { location, force, .. } in &deformed.patches {
                 body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
             }
             loads.sort_unstable_by_key(|(node, _)| *node);
@@ -341,7 +403,7 @@ pub(crate) struct ModalDeformation {
     /// Forces on nodes [N, body].
     loaded: Vec<(u32, DVec3)>,
     /// Forces on patches.
-    patches: Vec<AppliedForce>,
+    patches: Vec<SpringForce>,
 }
 
 impl Clone for ModalDeformation {
@@ -360,7 +422,7 @@ impl ModalDeformation {
         let mut new = Self {
             q: state.q.clone(),
             loaded: Vec::with_capacity(state.nodal.capacity()),
-            patches: Vec::with_capacity(state.applied_forces.capacity()),
+            patches: Vec::with_capacity(state.spring_forces.capacity()),
         };
         new.copy_from(state);
         new
@@ -380,7 +442,7 @@ impl ModalDeformation {
         self.loaded.extend_from_slice(state.nodal.loaded());
         self.patches.clear();
         let patches =
-            state.applied_forces.iter().filter(|applied| applied.location.footprint != Footprint::Point);
+            state.spring_forces.iter().filter(|applied| applied.location.footprint != Footprint::Point);
         self.patches.extend(patches.copied());
     }
 }

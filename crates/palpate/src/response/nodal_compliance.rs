@@ -48,7 +48,8 @@ impl NodalCompliance {
         for a in 0..count {
             modes.weigh(of(a), &mut weighted);
             let residual = |b: usize| body.residual(&location(a), &location(b));
-            blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + residual(b)));
+            let share = modes.residual_share();
+            blocks.extend((0..=a).map(|b| dot9(&weighted, of(b)) + residual(b) * share));
         }
         Some(Self { footprint, blocks })
     }

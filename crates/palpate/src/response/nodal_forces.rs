@@ -1,4 +1,4 @@
-//! Nodal forces of the last step, and their residual displacements.
+//! Spring forces of the residual compliance on nodes, and their displacements.
 
 use crate::recording::ResidualCompliance;
 use alloc::vec;
@@ -37,9 +37,16 @@ impl NodalForces {
         self.loaded.capacity()
     }
 
-    pub(super) fn clear(&mut self) {
-        self.loaded.drain(..).for_each(|(node, _)| self.at[node as usize] = 0);
-        self.cached.drain(..).for_each(|node| self.displacements[node as usize] = None);
+    /// Let all forces decay by a factor, and forget those below a limit [N].
+    pub(super) fn relax(&mut self, decay: f64, least: f64) {
+        let Self { loaded, at, displacements, cached } = self;
+        cached.drain(..).for_each(|node| displacements[node as usize] = None);
+        loaded.iter().for_each(|(node, _)| at[*node as usize] = 0);
+        loaded.retain(|(_, force)| decay > 0.0 && force.length() > least);
+        for (index, (node, force)) in loaded.iter_mut().enumerate() {
+            *force *= decay;
+            at[*node as usize] = index as u32 + 1;
+        }
     }
 
     pub(super) fn add(&mut self, corners: [(usize, f64); 3], force: DVec3) {

@@ -42,7 +42,7 @@ pub(crate) struct FactoredForce {
     /// Rest position [m, body].
     rest: DVec3,
     /// Aᵀ·f [√J].
-    value: DVec3,
+    pub(super) value: DVec3,
 }
 
 /// Contact samples of a surface, with the decimated surface between them.

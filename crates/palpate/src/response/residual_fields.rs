@@ -7,7 +7,7 @@
 //! w are the weights of the patch about node c, S [m/N] the residual compliance. The patches of a resting face press in every
 //! rendered frame, and each loads dozens of nodes of a whole S.
 
-use super::body::{AppliedForce, Body, Footprint};
+use super::body::{Body, Footprint, SpringForce};
 use crate::recording::ResidualCompliance;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -27,12 +27,12 @@ pub(crate) struct ResidualFields {
 
 impl ResidualFields {
     /// Add the residual displacements under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
-    pub(super) fn add(&mut self, body: &Body, patches: &[AppliedForce], out: &mut [DVec3]) -> bool {
+    pub(super) fn add(&mut self, body: &Body, patches: &[SpringForce], out: &mut [DVec3]) -> bool {
         if !matches!(body.recording.residual, ResidualCompliance::Whole(_)) {
             return false;
         }
         self.frame += 1;
-        for AppliedForce { location, force, .. } in patches {
+        for SpringForce { location, force, .. } in patches {
             let Footprint::Patch(index) = location.footprint else { continue };
             for (corner, weight) in body.corners(location).into_iter().filter(|(_, weight)| *weight != 0.0) {
                 let entry = self.fields.entry((index, corner as u32));
@@ -95,19 +95,19 @@ mod tests {
             let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (0.111 - inwards), 0.01, 0.01));
             let input = Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() };
             crate::step::step(&model, &mut state, &input);
-            let (body, applied_forces) = (&model.objects[0].body, state.objects[0].response.applied_forces());
+            let (body, spring_forces) = (&model.objects[0].body, state.objects[0].response.spring_forces());
             let mut displacements = vec![DVec3::ZERO; body.recording.surface.positions.len()];
-            assert!(residual_fields.add(body, applied_forces, &mut displacements));
+            assert!(residual_fields.add(body, spring_forces, &mut displacements));
             for (node, displacement) in displacements.into_iter().enumerate() {
                 let by_nodes =
-                    |applied: &AppliedForce| body.residual_of_node(node, &applied.location) * applied.force;
-                let expected: DVec3 = applied_forces.iter().map(by_nodes).sum();
+                    |applied: &SpringForce| body.residual_of_node(node, &applied.location) * applied.force;
+                let expected: DVec3 = spring_forces.iter().map(by_nodes).sum();
                 assert!(
                     (displacement - expected).length() <= 1e-6 * expected.length() + 1e-12,
                     "{number}, {node}"
                 );
             }
         }
-        assert!(state.objects[0].response.applied_forces().len() > 1, "they press");
+        assert!(state.objects[0].response.spring_forces().len() > 1, "they press");
     }
 }
