@@ -285,10 +285,9 @@ impl Response {
             + self.residual * (1.0 - decay)
     }
 
-    /// Relaxation time of the residual compliance [s], as [`palpate::ModalBasis::residual_relaxation_s`] has it.
+    /// Relaxation time of the residual compliance [s].
     fn residual_relaxation_s(&self, damping: Damping) -> f64 {
-        let relaxation = |omega: f64| 2.0 * damping.ratio(omega) / omega;
-        self.kept.last().map_or(0.0, |highest| relaxation(highest.square.sqrt()))
+        self.kept.last().map_or(0.0, |highest| damping.residual_relaxation_s(highest.square.sqrt()))
     }
 
     /// Factor by which the displacement of the residual compliance decays in a step.

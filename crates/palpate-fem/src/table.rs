@@ -94,6 +94,8 @@ struct ClosedForm {
     surface_index: Vec<Option<u32>>,
     /// Whether interior nodes are observed.
     observes_interior: bool,
+    /// Response of the residual compliance in each sample, as a share of it: (1 − e)·eˢ.
+    residual_shares: Vec<f64>,
 }
 
 impl<'a> TableRecorder<'a> {
@@ -224,9 +226,10 @@ impl<'a> TableRecorder<'a> {
             Evaluation::ClosedForm(form) => {
                 let gains = modes.shapes.transpose() * &loads;
                 let residual = truncated_displacements(system, modes, loads, &gains);
-                (0..gains.ncols())
-                    .map(|j| form.response(self.parameters, |i| gains[(i, j)], |dof| residual[(dof, j)]))
-                    .collect()
+                // A body that starts under gravity has the part of its sag beyond the modes at once, as in modal form.
+                let respond =
+                    |j| form.response(self.parameters, |i| gains[(i, j)], |dof| residual[(dof, j)], &[1.0]);
+                (0..gains.ncols()).map(respond).collect()
             }
             Evaluation::Transient { integrator, substeps } => {
                 system.balance(&mut loads);
@@ -308,10 +311,20 @@ impl ClosedForm {
         }
         let is_interior = |node: &u32| surface_index[*node as usize].is_none();
         let observes_interior = parameters.observed_nodes.iter().any(is_interior);
-        Self { modal_responses, observed, surface_index, observes_interior }
+        let highest = modes.squares.last().map_or(f64::INFINITY, |square| square.sqrt());
+        let relaxation = damping.residual_relaxation_s(highest);
+        let interval = evaluation_interval_s(parameters);
+        let decay = if relaxation > 0.0 { (-interval / relaxation).exp() } else { 0.0 };
+        let mut residual_shares = vec![0.0; parameters.samples];
+        let mut share = 0.0;
+        for evaluation in 0..parameters.samples * evaluations {
+            share = decay * share + if evaluation < evaluations { 1.0 - decay } else { 0.0 };
+            residual_shares[evaluation / evaluations] += share / evaluations as f64;
+        }
+        Self { modal_responses, observed, surface_index, observes_interior, residual_shares }
     }
 
-    /// One column [m/N]: the response of the modes, and the residual compliance in the first sample.
+    /// One column [m/N]: the response of the modes, and the relaxation of the residual compliance.
     fn column(&self, body: &RecordedBody, parameters: &TableParameters, touchable: usize) -> Vec<f64> {
         let load = dof(&parameters.touchable_nodes, touchable);
         let shapes = &body.modes.shapes;
@@ -331,15 +344,16 @@ impl ClosedForm {
             }
             _ => computed.as_ref().map_or(0.0, |computed| computed[(row, 0)]),
         };
-        self.response(parameters, |i| shapes[(load, i)], residual)
+        self.response(parameters, |i| shapes[(load, i)], residual, &self.residual_shares)
     }
 
-    /// Response Φ·g(s)·gain in every sample, and the residual displacement in the first.
+    /// Response Φ·g(s)·gain in every sample, and a share of the residual displacement.
     fn response(
         &self,
         parameters: &TableParameters,
         gain: impl Fn(usize) -> f64,
         residual: impl Fn(usize) -> f64,
+        shares: &[f64],
     ) -> Vec<f64> {
         let (rows, m) = (self.observed.nrows(), self.observed.ncols());
         let coordinates =
@@ -347,8 +361,10 @@ impl ClosedForm {
         let mut values = vec![0.0; rows * parameters.samples];
         let target = MatMut::from_column_major_slice_mut(&mut values, rows, parameters.samples);
         matmul(target, Accum::Replace, self.observed.as_ref(), coordinates.as_ref(), 1.0, Par::Seq);
-        for (row, value) in values[..rows].iter_mut().enumerate() {
-            *value += residual(dof(&parameters.observed_nodes, row));
+        let residuals: Vec<f64> =
+            (0..rows).map(|row| residual(dof(&parameters.observed_nodes, row))).collect();
+        for (values, share) in values.chunks_exact_mut(rows.max(1)).zip(shares) {
+            values.iter_mut().zip(&residuals).for_each(|(value, residual)| *value += residual * share);
         }
         values
     }

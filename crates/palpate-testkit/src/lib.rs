@@ -19,7 +19,9 @@ mod recording_cache;
 pub use allocations::{CountingAllocator, allocations};
 pub use once_per_run::made_once_per_run;
 pub use random::Random;
-pub use sample_recordings::{FIXED_BLOCK_FILE, FREE_BLOCK_FILE, fixed_block, free_block};
+pub use sample_recordings::{
+    FIXED_BLOCK_FILE, FREE_BLOCK_FILE, fixed_block, free_block, with_stiffness_damping,
+};
 pub use scenes::{
     GRAVITY_M_S2, energy_imbalance, finger, floor, grasp, half_extent, holding, model_and_state, object_at,
     scene, smoothstep, start_at, touching,

@@ -1,6 +1,6 @@
 //! The released sample recordings: a block of 0.2 × 0.1 × 0.1 m, free and with one end fixed.
 
-use palpate::Recording;
+use palpate::{Damping, Recording};
 use std::sync::{Arc, OnceLock};
 
 /// File of the block that moves freely.
@@ -24,4 +24,12 @@ pub fn free_block() -> Arc<Recording> {
 pub fn fixed_block() -> Arc<Recording> {
     static FIXED: OnceLock<Arc<Recording>> = OnceLock::new();
     read_once(&FIXED, FIXED_BLOCK_FILE)
+}
+
+/// A recording with damping βK in place of its own, β [s].
+pub fn with_stiffness_damping(recording: &Recording, beta: f64) -> Arc<Recording> {
+    let mut damped = recording.clone();
+    damped.metadata.damping = Damping::Rayleigh { alpha: 0.0, beta };
+    damped.modes.damping_ratios = damped.modes.angular_frequencies.iter().map(|w| 0.5 * beta * w).collect();
+    Arc::new(damped)
 }

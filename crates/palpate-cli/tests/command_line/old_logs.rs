@@ -1,4 +1,5 @@
-//! Logs of every form that was ever written (`data/logs`) still open, and replay with the same numbers but for last digits.
+//! Logs of every form that was ever written (`data/logs`) still open and replay to their end: with the same numbers but for last
+//! digits since the residual compliance relaxes, with other ones before.
 
 use crate::workplace::Workplace;
 use std::path::{Path, PathBuf};
@@ -16,10 +17,16 @@ fn logs(form: &str) -> Vec<PathBuf> {
     logs
 }
 
+/// Largest ratio of a force before the residual compliance relaxed and with it: a finger that touches a fixed block feels in its
+/// first step only the share of S that answers at once.
+const INSTANT: f64 = 3.0;
+
 #[test]
 fn logs_of_every_form_replay_to_their_end() {
     let workplace = Workplace::new();
-    for (form, number) in [("v1", 2), ("v2", 1), ("v3", 4)] {
+    for (form, number, relaxes) in
+        [("v1", 2, false), ("v2", 1, false), ("v3", 4, false), ("v3_relaxing", 2, true)]
+    {
         let logs = logs(form);
         assert_eq!(logs.len(), number, "{form}: {logs:?}");
         for log in logs {
@@ -30,7 +37,12 @@ fn logs_of_every_form_replay_to_their_end() {
             if let Some(first) = replayed["first_difference"].as_object() {
                 let number = |key: &str| first[key].as_f64().expect("a number");
                 let (logged, computed) = (number("logged"), number("computed"));
-                assert!((computed - logged).abs() <= LAST_DIGITS * logged.abs(), "{name}: {replayed}");
+                let is_near = if relaxes {
+                    (computed - logged).abs() <= LAST_DIGITS * logged.abs()
+                } else {
+                    (1.0 / INSTANT..INSTANT).contains(&(computed / logged))
+                };
+                assert!(is_near, "{name}: {replayed}");
             }
         }
     }

@@ -55,7 +55,7 @@ impl PointResponse {
         };
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let modes = pairs.zip(shapes).map(|((&omega, &zeta), phi)| [omega, zeta, phi * phi]).collect();
-        let relaxation_s = recording.modes.residual_relaxation_s();
+        let relaxation_s = recording.residual_relaxation_s();
         Self { modes, mobility, residual, relaxation_s }
     }
 

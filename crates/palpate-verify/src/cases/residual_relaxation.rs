@@ -40,8 +40,10 @@ fn forces(
             Ok((Grasp { object: 0, point }, body.surface.rest_position(&point)))
         })
         .collect::<Result<_, VerifyError>>()?;
-    let parameters =
-        ModelParameters { devices: vec![DeviceParameters::default(); hands.len()], ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters::default(); hands.len()],
+        ..ModelParameters::default()
+    };
     let model = Model::new(parameters, vec![object_at(body, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     invariants.observe(state.output());

@@ -51,7 +51,7 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     visits_with_samples: 60,
     rough_tolerance: 1e-4,
     max_evaluations: 40,
-    max_sweeps: 120,
+    max_sweeps: 400,
     skip: 0.1,
     min_change: 3e-10,
     sweep_goal: 0.02,

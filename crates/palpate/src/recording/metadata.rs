@@ -130,6 +130,15 @@ impl Damping {
             Self::Ratio(zeta) => zeta,
         }
     }
+
+    /// Relaxation time τ of truncated modes [s], above the highest angular frequency that is kept [rad/s]. They are stiff, so
+    /// that their inertia counts little: u + τ·u̇ = S·f. β of Rayleigh damping, or 2ζ/ω; 0 without damping.
+    pub fn residual_relaxation_s(&self, highest: f64) -> f64 {
+        match *self {
+            Self::Rayleigh { beta, .. } => beta,
+            Self::Ratio(zeta) => 2.0 * zeta / highest,
+        }
+    }
 }
 
 /// Size of the finite element model.

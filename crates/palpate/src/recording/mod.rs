@@ -70,13 +70,6 @@ impl ModalBasis {
         self.angular_frequencies.is_empty()
     }
 
-    /// Relaxation time τ of the residual compliance [s]: truncated modes are stiff, so that damping and stiffness alone
-    /// determine them, u + τ·u̇ = S·f. τ = 2ζ/ω of the highest mode kept, which is β for damping βK; 0 without damping.
-    pub fn residual_relaxation_s(&self) -> f64 {
-        let highest = self.angular_frequencies.last().zip(self.damping_ratios.last());
-        highest.map_or(0.0, |(omega, zeta)| 2.0 * zeta / omega)
-    }
-
     /// Row of Φ at a surface node and axis: m numbers [1/√kg].
     pub fn row(&self, node: usize, axis: usize) -> &[f64] {
         let m = self.len();
@@ -119,6 +112,12 @@ impl Recording {
             };
             weight != 0.0 && (0..3).any(moves)
         })
+    }
+
+    /// Relaxation time of the residual compliance [s], see [`Damping::residual_relaxation_s`].
+    pub fn residual_relaxation_s(&self) -> f64 {
+        let highest = self.modes.angular_frequencies.last();
+        highest.map_or(0.0, |highest| self.metadata.damping.residual_relaxation_s(*highest))
     }
 
     /// Mass [kg] of the body.

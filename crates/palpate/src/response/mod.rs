@@ -70,7 +70,7 @@ impl Response {
         step_s: f64,
     ) -> Result<Self, ModelError> {
         Ok(match form {
-            ResponseForm::Modal => Self::Modal(SampledModes::new(&recording.modes, step_s)),
+            ResponseForm::Modal => Self::Modal(SampledModes::new(recording, step_s)),
             ResponseForm::Fir(table) => Self::Fir(Fir::new(recording.clone(), table, step_s)?),
         })
     }

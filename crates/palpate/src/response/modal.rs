@@ -17,7 +17,7 @@ use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
 use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
-use crate::recording::{ModalBasis, Recording};
+use crate::recording::Recording;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -26,8 +26,10 @@ use glam::{DMat3, DVec3};
 /// States below this size [√J] are set to zero: denormal numbers cost 40 times as much.
 const FLUSH_BELOW: f64 = 1e-150;
 
-/// Spring force that is forgotten, as a share of the largest one of the object: an error of that share of S·g.
+/// Spring force that is forgotten, as a share of the largest one of the object: an error of that share of S·g. Patches leave one
+/// behind in every place; at points they gather on nodes, so that round-off can do.
 const FORGOTTEN: f64 = 1e-6;
+const FORGOTTEN_AT_NODES: f64 = 1e-13;
 
 /// Room for relaxing forces on places that contacts have left.
 const RELAXING: usize = 256;
@@ -103,10 +105,10 @@ impl ModalState {
     /// Let all spring forces decay by a factor, and forget those that are small.
     fn relax(&mut self, decay: f64) {
         let largest = self.spring_forces.iter().map(|spring| spring.force.length()).fold(0.0, f64::max);
-        let least = FORGOTTEN * largest / decay;
-        self.spring_forces.retain(|spring| decay > 0.0 && spring.force.length() > least);
+        let least = largest / decay;
+        self.spring_forces.retain(|spring| decay > 0.0 && spring.force.length() > FORGOTTEN * least);
         self.spring_forces.iter_mut().for_each(|spring| spring.scale(decay));
-        self.nodal.relax(decay, least);
+        self.nodal.relax(decay, FORGOTTEN_AT_NODES * least);
     }
 
     /// Add a spring force to that of its location; without room, the smallest one is forgotten.
@@ -138,10 +140,11 @@ impl ModalState {
 }
 
 impl SampledModes {
-    pub(crate) fn new(modes: &ModalBasis, step_s: f64) -> Self {
+    pub(crate) fn new(recording: &Recording, step_s: f64) -> Self {
+        let modes = &recording.modes;
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
-        let relaxation = modes.residual_relaxation_s();
+        let relaxation = recording.residual_relaxation_s();
         let decay = if relaxation > 0.0 { libm::exp(-step_s / relaxation) } else { 0.0 };
         Self { step_s, decay, oscillators, nodal_compliance: Vec::new() }
     }

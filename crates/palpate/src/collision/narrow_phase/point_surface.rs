@@ -1,6 +1,6 @@
 //! Point against surface: a node of another object, or a corner of an obstacle, against a deformed surface.
 //!
-//! Equations: docs/theory.md (C25).
+//! Equations: docs/theory.md (C25), (C58).
 
 use crate::collision::deformed_surface::DeformedSurface;
 use crate::collision::parameters::{COLLISION, ROUND_OFF};
