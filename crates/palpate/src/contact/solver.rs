@@ -144,8 +144,12 @@ impl Solver {
                 sweeps += 1;
                 let moved = self.sweep(problem, SOLVER.skip * goal);
                 visits += count;
-                if moved <= goal.max(0.3 * self.tolerance(visits) * size) || !moved.is_finite() {
+                if moved <= goal.max(0.3 * self.tolerance(visits) * size) {
                     break;
+                }
+                // Sweeps that move contacts farther than the objects reach diverge; their forces would leave round-off behind.
+                if !moved.is_finite() || moved > reach {
+                    sweeps = SOLVER.max_sweeps;
                 }
             }
         };
