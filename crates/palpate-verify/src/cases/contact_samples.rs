@@ -4,7 +4,10 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
-use palpate::{Collider, Input, Model, ModelObject, ModelParameters, Pose, Recording, State, Twist, step};
+use palpate::{
+    Collider, Input, Model, ModelObject, ModelParameters, Obstacle, Pose, Recording, Shape, State, Twist,
+    step,
+};
 use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{ball_mesh, box_mesh};
 use palpate_fem::paper_cube::{self, CELLS};
@@ -58,6 +61,10 @@ pub fn contact_samples() -> Result<Vec<Check>, VerifyError> {
     }
     let ball = calm.free_body(ball_mesh(0.05, 8)?, ElementOrder::Linear, 200)?;
     checks.extend(rest("ball", &ball, 0.05, &SAG)?);
+    checks.extend(pressed("ball", &ball, 24, PRESSED_BALL)?);
+    let cube = calm.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 200)?;
+    checks.extend(pressed("cube", &cube, USUAL, PRESSED_CUBE)?);
+    checks.extend(given_back(&ball)?);
     checks.extend(fall()?);
     checks.extend(topple()?);
     checks.extend(stacked()?);
@@ -98,6 +105,81 @@ fn rest(
         checks.push(Check::new(format!("{of}: force of the floor [N]"), force, weight, FLOOR_FORCE));
         checks.extend(invariants.checks(&of));
     }
+    Ok(checks)
+}
+
+/// Tolerances of the force of a plate that presses a body onto the floor: a dozen of the ball's samples are in contact, and
+/// patches of the cube's edges include some of the sides.
+const PRESSED_BALL: f64 = 0.1;
+const PRESSED_CUBE: f64 = 0.08;
+
+/// Tolerance of the energy that contacts give back in a ball's fall, as a share of the ball's energy.
+const GIVEN_BACK: f64 = 0.02;
+
+/// Force [N] of a plate that presses a body by a tenth of its height onto the floor.
+fn pressed(
+    name: &str,
+    body: &Arc<Recording>,
+    most: usize,
+    tolerance: f64,
+) -> Result<Vec<Check>, VerifyError> {
+    let half = 0.05;
+    /// Of all, the last part for the mean of the force.
+    const STEPS: u32 = 2000;
+    const LATE: u32 = 500;
+    let thickness = 0.2 * half;
+    let top = |number: u32| {
+        let pressed = 0.2 * half * (f64::from(number) / 500.0).min(1.0);
+        Pose { position: DVec3::Y * (2.0 * half + thickness - pressed), ..Pose::IDENTITY }
+    };
+    let force = |most: usize| -> Result<(f64, RunInvariants), VerifyError> {
+        let half_extents = DVec3::new(4.0 * half, thickness, 4.0 * half);
+        let plate = Obstacle { shape: Shape::Box { half_extents }, pose: top(0), friction: 0.5 };
+        let parameters = ModelParameters {
+            gravity: DVec3::Y * -GRAVITY_M_S2,
+            obstacles: vec![floor(0.5), plate],
+            max_contact_samples: most,
+            ..ModelParameters::default()
+        };
+        let model = Model::new(parameters, vec![object_at(body, DVec3::Y * half, DVec3::ZERO)])?;
+        let (mut state, mut invariants, mut force) = (State::new(&model), RunInvariants::default(), 0.0);
+        invariants.observe(state.output());
+        for number in 0..STEPS {
+            let obstacles = vec![Pose::IDENTITY, top(number + 1)];
+            let output = step(&model, &mut state, &Input { obstacles, ..Input::default() });
+            invariants.observe(output);
+            if number >= STEPS - LATE {
+                let on_plate = output.contacts.iter().filter(|c| c.against == Collider::Obstacle(1));
+                force -= on_plate.map(|c| c.force.y).sum::<f64>() / f64::from(LATE);
+            }
+        }
+        Ok((force, invariants))
+    };
+    let ((expected, _), (measured, invariants)) = (force(ALL)?, force(most)?);
+    let of = format!("{name} under a plate, {most} places");
+    let mut checks =
+        vec![Check::new(format!("{of}: force, by all nodes [N]"), measured, expected, tolerance)];
+    checks.extend(invariants.checks(&of));
+    Ok(checks)
+}
+
+/// Energy [J] that contacts give back in the fall of a ball, whose level of detail changes with the area in contact.
+fn given_back(ball: &Arc<Recording>) -> Result<Vec<Check>, VerifyError> {
+    const HEIGHT: f64 = 0.05;
+    let model = scene(USUAL, 1e-3, 0.5, vec![object_at(ball, DVec3::Y * (0.05 + HEIGHT), DVec3::ZERO)])?;
+    let (mut state, mut invariants) = (State::new(&model), RunInvariants::default());
+    invariants.observe(state.output());
+    let (mut given, mut before) = (0.0, 0.0);
+    for _ in 0..1500 {
+        let output = step(&model, &mut state, &Input::default());
+        invariants.observe(output);
+        given += (before - output.energy.impact).max(0.0);
+        before = output.energy.impact;
+    }
+    let share = given / (ball.mass() * GRAVITY_M_S2 * HEIGHT);
+    let of = format!("fall of a ball, {USUAL} places");
+    let mut checks = vec![Check::new(format!("{of}: energy given back, of all [1]"), share, 0.0, GIVEN_BACK)];
+    checks.extend(invariants.checks(&of));
     Ok(checks)
 }
 

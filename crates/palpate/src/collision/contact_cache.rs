@@ -1,9 +1,9 @@
 //! Contact cache: candidates matched with the contacts of the last step, which keep their points and warm-start forces.
 //!
-//! Equations: docs/theory.md (C39).
+//! Equations: docs/theory.md (C39), (C61).
 
 use super::candidate::{CandidateList, CandidateSide, ContactCandidate};
-use super::contact::{Contact, ContactLaw, OtherSide};
+use super::contact::{Collider, Contact, ContactLaw, OtherSide};
 use crate::object::{Object, ObjectState};
 use crate::response::ContactLocation;
 use alloc::vec::Vec;
@@ -17,6 +17,19 @@ struct Bodies<'a> {
 }
 
 impl Bodies<'_> {
+    /// Move spring forces of an object between locations, and read the state of its contact points again.
+    fn move_spring_forces(
+        &mut self,
+        object: usize,
+        from: impl Iterator<Item = ContactLocation>,
+        to: impl Iterator<Item = ContactLocation> + Clone,
+    ) {
+        let own = &mut self.states[object];
+        let view = &mut self.objects[object].view(self.gravity, &own.rigid, &mut own.response);
+        own.ledger.dissipated += view.move_spring_forces(from, to);
+        own.points.read_state(view);
+    }
+
     /// Free a contact point.
     fn release(&mut self, object: usize, slot: usize) {
         let own = &mut self.states[object];
@@ -40,6 +53,48 @@ impl Bodies<'_> {
     }
 }
 
+/// Contact point that contacts release or need in a step.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    object: usize,
+    /// The other side.
+    against: Collider,
+    location: ContactLocation,
+}
+
+/// Contact points that a step releases and needs, for changes of the level of detail; the buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) struct LevelChanges {
+    released: Vec<Place>,
+    needed: Vec<Place>,
+}
+
+impl LevelChanges {
+    pub(crate) fn new(contacts: usize) -> Self {
+        let places = || Vec::with_capacity(2 * contacts);
+        Self { released: places(), needed: places() }
+    }
+
+    /// Move spring forces from points that are released to those of another level of detail, against the same side.
+    fn apply(&self, bodies: &mut Bodies) {
+        let same_sides = |a: &Place, b: &Place| (a.object, a.against) == (b.object, b.against);
+        let mut rest = &*self.released;
+        while let Some((first, others)) = rest.split_first() {
+            // Places with the same sides lie together.
+            let count = others.iter().take_while(|place| same_sides(place, first)).count();
+            let (group, next) = rest.split_at(count + 1);
+            rest = next;
+            let is_other_level = |place: &&Place| {
+                same_sides(place, first) && place.location.footprint != first.location.footprint
+            };
+            let needed = self.needed.iter().filter(is_other_level).map(|place| place.location);
+            if needed.clone().next().is_some() {
+                bodies.move_spring_forces(first.object, group.iter().map(|place| place.location), needed);
+            }
+        }
+    }
+}
+
 /// Replace the contacts by the candidates, in the order of their ids; known ones keep their points and forces. Gives the
 /// number of candidates for which there was no room.
 ///
@@ -51,11 +106,14 @@ pub(crate) fn match_contacts(
     contacts: &mut Vec<Contact>,
     spare: &mut Vec<Contact>,
     candidates: &mut CandidateList,
+    level_changes: &mut LevelChanges,
 ) -> u32 {
     let mut bodies = Bodies { objects, states, gravity };
     let mut dropped = candidates.dropped;
     let candidates = &mut candidates.list;
     candidates.sort_unstable_by_key(|candidate| candidate.id);
+    level_changes.released.clear();
+    level_changes.needed.clear();
     // Points that are no longer in contact go first, so that new ones do not couple to them.
     let mut next = 0;
     contacts.retain(|contact| {
@@ -64,13 +122,34 @@ pub(crate) fn match_contacts(
         }
         let persists = candidates.get(next).is_some_and(|candidate| candidate.id == contact.id);
         if !persists {
-            bodies.release(contact.object(), contact.slot);
+            let mut release = |object: usize, against: Collider, slot: usize| {
+                let location = bodies.states[object].points.of(slot).location;
+                level_changes.released.push(Place { object, against, location });
+                bodies.release(object, slot);
+            };
+            release(contact.object(), contact.id.collider, contact.slot);
             if let OtherSide::Object { number, slot } = contact.other {
-                bodies.release(number, slot);
+                release(number, Collider::Object(contact.object()), slot);
             }
         }
         persists
     });
+    if !level_changes.released.is_empty() {
+        let mut known = contacts.iter().peekable();
+        for candidate in candidates.iter() {
+            if known.next_if(|contact| contact.id == candidate.id).is_some() {
+                continue;
+            }
+            let (object, against) = (candidate.id.object, candidate.id.collider);
+            level_changes.needed.push(Place { object, against, location: candidate.location });
+            if let CandidateSide::Object { number, location } = candidate.other {
+                let against = Collider::Object(object);
+                level_changes.needed.push(Place { object: number, against, location });
+            }
+        }
+        level_changes.released.sort_unstable_by_key(|place| (place.object, place.against));
+        level_changes.apply(&mut bodies);
+    }
     spare.clear();
     let mut known = contacts.iter().peekable();
     for candidate in candidates.iter() {

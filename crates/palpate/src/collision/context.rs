@@ -2,6 +2,7 @@
 
 use super::candidate::CandidateList;
 use super::contact::Contact;
+use super::contact_cache::LevelChanges;
 use super::level_of_detail::LevelOfDetail;
 use super::node_cache::NodePositionCache;
 use super::proximity::ProximityQuery;
@@ -34,6 +35,7 @@ pub(crate) struct CollisionWorkspace {
     /// Modal coordinates at a time within the step.
     pub(crate) coordinates: Vec<f64>,
     pub(crate) candidates: CandidateList,
+    pub(crate) level_changes: LevelChanges,
 }
 
 impl CollisionWorkspace {
@@ -50,6 +52,7 @@ impl CollisionWorkspace {
             near_nodes: Vec::with_capacity(objects.iter().map(nodes).max().unwrap_or(0)),
             coordinates: vec![0.0; objects.iter().map(modes).max().unwrap_or(0)],
             candidates: CandidateList::new(contacts),
+            level_changes: LevelChanges::new(contacts),
         }
     }
 }

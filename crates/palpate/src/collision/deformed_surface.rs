@@ -143,7 +143,7 @@ impl<'a> DeformedSurface<'a> {
     }
 
     fn rest(&self, node: usize) -> DVec3 {
-        self.body.recording.surface.positions[node]
+        self.body.surface(self.footprint).positions[node]
     }
 
     /// Upper bound of the residual displacement of any node [m].

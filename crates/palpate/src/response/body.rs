@@ -3,7 +3,10 @@
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
 use super::dot_products::{dot3, dot3_single};
-use super::patch_field::{FactoredForce, ModalDistances, PatchField, SampleSurface, residual_size};
+use super::modal_distances::{ModalDistances, residual_size};
+use super::patch_field::{PatchCentres, PatchField};
+use super::residual_kernel::FactoredForce;
+use super::sample_surface::SampleSurface;
 use crate::recording::Recording;
 use crate::surface::{
     Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals, triangles_around,
@@ -12,8 +15,8 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// Ratio of patch radius to sample spacing, with which a landing cube bounces as high as with all nodes.
-const PATCH_OVERLAP: f64 = 1.5;
+/// Ratio of patch radius to sample spacing: a patch reaches the next samples, so that patches cover the surface.
+const PATCH_OVERLAP: f64 = 1.0;
 
 /// Contact footprint: average of displacement and distribution of force about a contact location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,21 +54,21 @@ pub(crate) struct SpringForce {
     pub(crate) force: DVec3,
     /// Rest position [m, body].
     pub(crate) rest: DVec3,
-    /// Factored forces of a patch; those between contact samples act at each corner.
-    factored: [FactoredForce; 3],
+    /// Factored force of a patch that is no contact sample.
+    factored: FactoredForce,
 }
 
 impl SpringForce {
     /// Multiply the force.
     pub(super) fn scale(&mut self, factor: f64) {
         self.force *= factor;
-        self.factored.iter_mut().for_each(|factored| factored.value *= factor);
+        self.factored.value *= factor;
     }
 
     /// Add another force at the same location.
     pub(super) fn add(&mut self, other: &Self) {
         self.force += other.force;
-        self.factored.iter_mut().zip(other.factored).for_each(|(own, other)| own.value += other.value);
+        self.factored.value += other.factored.value;
     }
 }
 
@@ -177,6 +180,11 @@ impl Body {
         patch.map_or(Footprint::Point, |index| Footprint::Patch(index as u32))
     }
 
+    /// Radius of a footprint's patch [m]; 0 for the point.
+    pub(crate) fn patch_radius(&self, footprint: Footprint) -> f64 {
+        self.patch(footprint).map_or(0.0, |patch| patch.radius)
+    }
+
     /// Footprint of a level of detail: all nodes at level 0, then ever fewer contact samples.
     pub(crate) fn footprint_at_level(&self, level: usize) -> Footprint {
         if level == 0 { Footprint::Point } else { Footprint::Patch((self.device_patches + level - 1) as u32) }
@@ -189,8 +197,7 @@ impl Body {
 
     /// Coarsest level up to which every level has a decimated surface, for contact with other objects.
     pub(crate) fn coarsest_surface_level(&self) -> usize {
-        let is_surface =
-            |patch: &&PatchField| patch.samples.as_ref().is_some_and(|samples| samples.is_surface);
+        let is_surface = |patch: &&PatchField| patch.samples().is_some_and(|samples| samples.is_surface);
         self.patches[self.device_patches..].iter().take_while(is_surface).count()
     }
 
@@ -242,7 +249,7 @@ impl Body {
     }
 
     fn samples(&self, footprint: Footprint) -> Option<&SampleSurface> {
-        self.patch(footprint).and_then(|patch| patch.samples.as_ref())
+        self.patch(footprint).and_then(PatchField::samples)
     }
 
     /// Displacement of a surface node by modal coordinates of the first modes [m, body], averaged over the footprint. Patches
@@ -279,8 +286,10 @@ impl Body {
     /// Largest relative change of residual displacement per distance [1/m]; infinite between nodes and between contact
     /// samples, whose residual displacements are unrelated.
     pub(crate) fn residual_slope(&self, footprint: Footprint) -> f64 {
-        let patch = self.patch(footprint).filter(|patch| patch.samples.is_none());
-        patch.map_or(f64::INFINITY, PatchField::residual_slope)
+        match self.patch(footprint).map(|patch| &patch.centres) {
+            Some(PatchCentres::Nodes(kernel)) => kernel.slope(),
+            _ => f64::INFINITY,
+        }
     }
 
     /// Displacement bounds of the surface, averaged over the footprint.
@@ -294,9 +303,10 @@ impl Body {
     /// # Real time
     pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
         let recording = &*self.recording;
-        match (a.footprint == b.footprint, self.patch(a.footprint)) {
+        match (a.footprint == b.footprint, self.patch(a.footprint).map(|patch| &patch.centres)) {
             (false, _) => DMat3::ZERO,
-            (true, Some(patch)) => patch.residual(recording, &a.point, &b.point),
+            (true, Some(PatchCentres::Nodes(kernel))) => kernel.between(recording, &a.point, &b.point),
+            (true, Some(PatchCentres::Samples(samples))) => samples.residual(&a.point, &b.point),
             (true, None) => {
                 let corners = |location: &ContactLocation| recording.surface.corners(&location.point);
                 let used = |corner: &(usize, f64)| corner.1 != 0.0;
@@ -316,9 +326,13 @@ impl Body {
     /// # Real time
     pub(crate) fn spring_force(&self, location: ContactLocation, force: DVec3) -> SpringForce {
         let rest = self.rest_position(&location);
-        let patch = self.patch(location.footprint);
-        let factored = patch.map(|patch| patch.factored(&self.recording, &location.point, rest, force));
-        SpringForce { location, force, rest, factored: factored.unwrap_or_default() }
+        let factored = match self.patch(location.footprint).map(|patch| &patch.centres) {
+            Some(PatchCentres::Nodes(kernel)) => {
+                kernel.factored(&self.recording, &location.point, rest, force)
+            }
+            _ => FactoredForce::default(),
+        };
+        SpringForce { location, force, rest, factored }
     }
 
     /// Residual displacement of a surface node under a force [m, body], averaged over the force's footprint. That of a patch
@@ -331,8 +345,13 @@ impl Body {
         applied: &SpringForce,
         flat_radius: f64,
     ) -> DVec3 {
-        match self.patch(applied.location.footprint) {
-            Some(patch) => patch.residual_displacement(&self.recording, node, &applied.factored, flat_radius),
+        match self.patch(applied.location.footprint).map(|patch| &patch.centres) {
+            Some(PatchCentres::Nodes(kernel)) => {
+                kernel.displacement(&self.recording, node, &applied.factored, flat_radius)
+            }
+            Some(PatchCentres::Samples(samples)) => {
+                samples.residual_at(node, &applied.location.point) * applied.force
+            }
             None => self.residual_of_node(node, &applied.location) * applied.force,
         }
     }

@@ -244,6 +244,16 @@ impl ContactPoints {
         }
     }
 
+    /// Read the state of every point's location again.
+    ///
+    /// # Real time
+    pub(crate) fn read_state(&mut self, view: &mut ResponseView) {
+        for point in &mut self.points {
+            point.state = view.assign(point.slot, &point.location);
+            point.free = view.free(point.slot, &point.state);
+        }
+    }
+
     /// Predict the displacement of points that are new since then.
     ///
     /// # Real time

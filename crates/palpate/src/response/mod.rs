@@ -7,11 +7,14 @@ mod dot_products;
 mod fir;
 mod force_history;
 mod modal;
+mod modal_distances;
 mod nodal_compliance;
 mod nodal_forces;
 mod oscillator;
 mod patch_field;
 mod residual_fields;
+mod residual_kernel;
+mod sample_surface;
 
 pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
@@ -154,6 +157,22 @@ impl ResponseView<'_> {
                 LocationState { displacement, ..LocationState::default() }
             }
             _ => LocationState::default(),
+        }
+    }
+
+    /// Move the spring forces of locations to others, where contacts take their place; a table has none. Gives the energy [J] that
+    /// is dissipated.
+    ///
+    /// # Real time
+    /// Costs the square of the number of spring forces.
+    pub(crate) fn move_spring_forces(
+        &mut self,
+        from: impl Iterator<Item = ContactLocation>,
+        to: impl Iterator<Item = ContactLocation> + Clone,
+    ) -> f64 {
+        match self.state {
+            ResponseState::Modal(state) => state.move_spring_forces(self.body, from, to),
+            ResponseState::Fir(_) => 0.0,
         }
     }
 

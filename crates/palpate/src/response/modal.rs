@@ -127,6 +127,83 @@ impl ModalState {
         springs.push(spring);
     }
 
+    /// Move the spring forces of locations to others, near ones above all, without a gain of energy (C61). Gives
+    /// the energy [J] that is lost.
+    pub(super) fn move_spring_forces(
+        &mut self,
+        body: &Body,
+        from: impl Iterator<Item = ContactLocation>,
+        to: impl Iterator<Item = ContactLocation> + Clone,
+    ) -> f64 {
+        let before = self.residual_energy;
+        self.nodal.clear_cache();
+        for location in from {
+            let Some(at) = self.spring_forces.iter().position(|spring| spring.location == location) else {
+                continue;
+            };
+            let SpringForce { force, rest, .. } = self.spring_forces.swap_remove(at);
+            self.add_at_nodes(body, &location, -force);
+            let radius = |location: &ContactLocation| body.patch_radius(location.footprint);
+            let share = |to: &ContactLocation| {
+                let s = (body.rest_position(to) - rest).length() / radius(to).max(radius(&location));
+                if s < 1.0 { (1.0 - s * s) * (1.0 - s * s) } else { 0.0 }
+            };
+            let sum: f64 = to.clone().map(|to| share(&to)).sum();
+            for to in to.clone().filter(|_| sum > 0.0) {
+                let part = force * (share(&to) / sum);
+                if part != DVec3::ZERO {
+                    self.add_spring_force(body.spring_force(to, part));
+                    self.add_at_nodes(body, &to, part);
+                }
+            }
+        }
+        // The others first, then those that have moved.
+        let springs = &mut self.spring_forces;
+        let mut count = 0;
+        for at in 0..springs.len() {
+            if !to.clone().any(|to| to == springs[at].location) {
+                springs.swap(at, count);
+                count += 1;
+            }
+        }
+        // Energy ½·gᵀ·S·g of the moved forces, of the others, and between them.
+        let (mut moved, mut between, mut others) = (0.0, 0.0, 0.0);
+        for (at, a) in springs.iter().enumerate() {
+            for (other, b) in springs[..=at].iter().enumerate() {
+                let product = a.force.dot(body.residual(&a.location, &b.location) * b.force);
+                let energy = if at == other { 0.5 * product } else { product };
+                match (at < count, other < count) {
+                    (true, _) => others += energy,
+                    (false, true) => between += energy,
+                    (false, false) => moved += energy,
+                }
+            }
+        }
+        // The largest scale s ≤ 1 with moved·s² + between·s + others ≤ energy before.
+        let excess = others - before;
+        let root = libm::sqrt((between * between - 4.0 * moved * excess).max(0.0));
+        let fits = moved + between + excess <= 0.0;
+        let scale = match moved > 0.0 {
+            _ if fits => 1.0,
+            true => ((root - between) / (2.0 * moved)).clamp(0.0, 1.0),
+            false => 0.0,
+        };
+        self.residual_energy = (moved * scale + between) * scale + others;
+        for at in count..self.spring_forces.len() {
+            let SpringForce { location, force, .. } = self.spring_forces[at];
+            self.spring_forces[at].scale(scale);
+            self.add_at_nodes(body, &location, force * (scale - 1.0));
+        }
+        before - self.residual_energy
+    }
+
+    /// Add a force to those at nodes, if it acts at a point.
+    fn add_at_nodes(&mut self, body: &Body, location: &ContactLocation, force: DVec3) {
+        if location.footprint == Footprint::Point {
+            self.nodal.add(body.recording.surface.corners(&location.point), force);
+        }
+    }
+
     /// Set the modal states.
     pub(super) fn resume_from(&mut self, modes: &[OscillatorState]) {
         self.modes.copy_from_slice(modes);
@@ -321,9 +398,7 @@ impl SampledModes {
             let force = point.force_in_body * share;
             if force != DVec3::ZERO {
                 state.add_spring_force(body.spring_force(point.location, force));
-                if point.location.footprint == Footprint::Point {
-                    state.nodal.add(body.recording.surface.corners(&point.location.point), force);
-                }
+                state.add_at_nodes(body, &point.location, force);
             }
         }
         // It is largest at the contacts: twice theirs bounds that of all nodes.

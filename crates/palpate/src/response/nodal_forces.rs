@@ -37,10 +37,16 @@ impl NodalForces {
         self.loaded.capacity()
     }
 
+    /// Forget the cached displacements.
+    pub(super) fn clear_cache(&mut self) {
+        let Self { displacements, cached, .. } = self;
+        cached.drain(..).for_each(|node| displacements[node as usize] = None);
+    }
+
     /// Let all forces decay by a factor, and forget those below a limit [N].
     pub(super) fn relax(&mut self, decay: f64, least: f64) {
-        let Self { loaded, at, displacements, cached } = self;
-        cached.drain(..).for_each(|node| displacements[node as usize] = None);
+        self.clear_cache();
+        let Self { loaded, at, .. } = self;
         loaded.iter().for_each(|(node, _)| at[*node as usize] = 0);
         loaded.retain(|(_, force)| decay > 0.0 && force.length() > least);
         for (index, (node, force)) in loaded.iter_mut().enumerate() {

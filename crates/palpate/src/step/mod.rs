@@ -160,8 +160,14 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         context.rebuild_ahead(number, object);
     }
     let bodies = (&*model.objects, model.parameters.gravity);
-    output.status.dropped_contacts +=
-        match_contacts(bodies, objects, contacts, spare, &mut collision.candidates);
+    output.status.dropped_contacts += match_contacts(
+        bodies,
+        objects,
+        contacts,
+        spare,
+        &mut collision.candidates,
+        &mut collision.level_changes,
+    );
 }
 
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.

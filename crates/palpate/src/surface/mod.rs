@@ -15,7 +15,7 @@ mod triangle;
 
 pub(crate) use decimation::decimate;
 pub(crate) use patch_weights::{PatchWeights, triangles_around};
-pub(crate) use poisson_disk::{node_normals, poisson_disk_sample};
+pub(crate) use poisson_disk::{EDGE_COSINE, node_normals, poisson_disk_sample};
 pub(crate) use sample_level::MAX_LEVELS;
 pub use sample_level::{MIN_CONTACT_SAMPLES, SampleLevel};
 pub(crate) use sphere_tree::{

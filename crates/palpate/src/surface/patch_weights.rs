@@ -101,6 +101,11 @@ impl PatchWeights {
         patches
     }
 
+    /// Number of patches.
+    pub(crate) fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
     /// Nodes and weights of a patch; the weights sum to 1.
     pub(crate) fn of(&self, patch: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         let range = self.offsets[patch] as usize..self.offsets[patch + 1] as usize;

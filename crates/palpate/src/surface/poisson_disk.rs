@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// Smallest cosine between a node's normal and those of its triangles below which it is a corner, or an edge.
 const CORNER_COSINE: f64 = 0.65;
-const EDGE_COSINE: f64 = 0.85;
+pub(crate) const EDGE_COSINE: f64 = 0.85;
 
 /// Outward unit normal of every node at rest, angle-weighted: the mean of its triangles' normals by their angles at the node,
 /// whatever the triangulation of a face (Thürmer & Wüthrich 1998, J. Graph. Tools 3, 43); zero where they cancel.
