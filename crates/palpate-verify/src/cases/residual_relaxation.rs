@@ -18,7 +18,7 @@ const CELLS: u32 = 6;
 const RISE: usize = 50;
 const STEPS: usize = 150;
 
-/// Where the cube is held, and where to each point is moved [m]: one point in and to the side, two that pinch, three.
+/// Held points of the cube and their displacements [m]: one point in and to the side, two that pinch, three.
 const HANDS: [(DVec3, DVec3); 3] = [
     (DVec3::new(-HALF, 0.0, 0.0), DVec3::new(0.005, 0.001, 0.0)),
     (DVec3::new(HALF, 0.0, 0.0), DVec3::new(-0.005, 0.0, 0.001)),

@@ -401,7 +401,7 @@ impl SampledModes {
                 state.add_at_nodes(body, &point.location, force);
             }
         }
-        // It is largest at the contacts: twice theirs bounds that of all nodes.
+        // Residual displacement is largest at the contacts: twice theirs bounds that of all nodes.
         state.max_residual = decay * state.max_residual + 2.0 * largest;
         let dissipated = dissipated + work - (energy - state.residual_energy);
         state.residual_energy = energy;

@@ -14,6 +14,7 @@ use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
 use crate::recording::Recording;
 use crate::surface::{Bounds, PatchWeights, SampleLevel, SphereTree, Surface};
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -36,7 +37,7 @@ pub(super) enum PatchCentres {
     /// All surface nodes: a patch may lie at any surface point.
     Nodes(ResidualKernel),
     /// Contact samples.
-    Samples(SampleSurface),
+    Samples(Box<SampleSurface>),
 }
 
 impl PatchField {
@@ -63,7 +64,7 @@ impl PatchField {
         let between = |i: usize, c: Option<usize>| distances.between(index(i), c.map(index));
         let size = |i: usize| libm::sqrt(samples.residual.trace(index(i), index(i)));
         let bounds = samples.tree.bounds(&samples.surface.triangles, between, size);
-        Self { radius, weights, rows, bounds, centres: PatchCentres::Samples(samples) }
+        Self { radius, weights, rows, bounds, centres: PatchCentres::Samples(Box::new(samples)) }
     }
 
     /// Contact samples; none where every surface node has a patch.
