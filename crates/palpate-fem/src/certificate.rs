@@ -292,8 +292,7 @@ impl Response {
 
     /// Factor by which the displacement of the residual compliance decays in a step.
     fn residual_decay(&self, damping: Damping) -> f64 {
-        let relaxation = self.residual_relaxation_s(damping);
-        if relaxation > 0.0 { (-EVENT.step_s / relaxation).exp() } else { 0.0 }
+        self.kept.last().map_or(0.0, |highest| damping.residual_decay(highest.square.sqrt(), EVENT.step_s))
     }
 
     /// Frequency [Hz] up to which the truncated modes respond quasi-statically. The kept modes are equal in both models.

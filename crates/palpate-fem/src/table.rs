@@ -312,9 +312,7 @@ impl ClosedForm {
         let is_interior = |node: &u32| surface_index[*node as usize].is_none();
         let observes_interior = parameters.observed_nodes.iter().any(is_interior);
         let highest = modes.squares.last().map_or(f64::INFINITY, |square| square.sqrt());
-        let relaxation = damping.residual_relaxation_s(highest);
-        let interval = evaluation_interval_s(parameters);
-        let decay = if relaxation > 0.0 { (-interval / relaxation).exp() } else { 0.0 };
+        let decay = damping.residual_decay(highest, evaluation_interval_s(parameters));
         let mut residual_shares = vec![0.0; parameters.samples];
         let mut share = 0.0;
         for evaluation in 0..parameters.samples * evaluations {

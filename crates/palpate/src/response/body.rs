@@ -15,9 +15,6 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// Ratio of patch radius to sample spacing: a patch reaches the next samples, so that patches cover the surface.
-const PATCH_OVERLAP: f64 = 1.0;
-
 /// Contact footprint: average of displacement and distribution of force about a contact location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Footprint {
@@ -105,8 +102,9 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
+        let normals = node_normals(&recording.surface);
         for level in &*recording.levels_down_to(max_contact_samples) {
-            patches.push(PatchField::at_samples(&recording, level, PATCH_OVERLAP * level.spacing));
+            patches.push(PatchField::at_samples(&recording, level, &normals));
         }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {
@@ -114,7 +112,7 @@ impl Body {
             first_around.push(around.len() as u32);
         }
         let (low, high) = recording.surface.extent();
-        let (device_patches, normals) = (radii.len(), node_normals(&recording.surface));
+        let device_patches = radii.len();
         Self {
             recording,
             patches,

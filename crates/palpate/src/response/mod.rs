@@ -15,6 +15,7 @@ mod patch_field;
 mod residual_fields;
 mod residual_kernel;
 mod sample_surface;
+mod spring_forces;
 
 pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};

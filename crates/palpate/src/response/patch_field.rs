@@ -17,6 +17,7 @@ use crate::surface::{Bounds, PatchWeights, SampleLevel, SphereTree, Surface};
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+use glam::DVec3;
 
 /// Contact patches of one radius on one body; immutable.
 #[derive(Debug, Clone)]
@@ -53,11 +54,13 @@ impl PatchField {
         Self { radius, weights, rows, bounds, centres: PatchCentres::Nodes(kernel) }
     }
 
-    /// Patches about the contact samples of a level.
-    pub(crate) fn at_samples(recording: &Recording, level: &SampleLevel, radius: f64) -> Self {
+    /// Patches about the contact samples of a level, with the outward normals of all surface nodes. A patch reaches to the next
+    /// samples, so that patches cover the surface.
+    pub(crate) fn at_samples(recording: &Recording, level: &SampleLevel, normals: &[DVec3]) -> Self {
+        let radius = level.spacing;
         let order = recording.metadata.mesh.order;
         let weights = PatchWeights::new(&recording.surface, order, radius, &level.nodes);
-        let samples = SampleSurface::new(recording, level, &weights);
+        let samples = SampleSurface::new(recording, level, &weights, normals);
         let rows = averaged_rows(recording, &weights);
         let distances = ModalDistances::new(recording, &rows);
         let index = |node: usize| samples.index(node);

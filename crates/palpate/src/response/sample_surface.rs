@@ -16,9 +16,7 @@
 //! Equations: docs/theory.md (C59), (C60).
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
-use crate::surface::{
-    EDGE_COSINE, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, node_normals,
-};
+use crate::surface::{EDGE_COSINE, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -45,8 +43,13 @@ pub(crate) struct SampleSurface {
 const NONE: u32 = u32::MAX;
 
 impl SampleSurface {
-    /// Contact samples of a level, whose patches have these weights.
-    pub(super) fn new(recording: &Recording, level: &SampleLevel, weights: &PatchWeights) -> Self {
+    /// Contact samples of a level, whose patches have these weights; with the outward normals of all surface nodes.
+    pub(super) fn new(
+        recording: &Recording,
+        level: &SampleLevel,
+        weights: &PatchWeights,
+        normals: &[DVec3],
+    ) -> Self {
         let (surface, nodes) = (&recording.surface, &level.nodes);
         let mut indices = vec![NONE; surface.positions.len()];
         nodes.iter().enumerate().for_each(|(index, &node)| indices[node as usize] = index as u32);
@@ -57,8 +60,11 @@ impl SampleSurface {
         for (t, corners) in triangles.iter().enumerate() {
             corners.iter().for_each(|node| triangle[indices[*node as usize] as usize] = t as u32);
         }
-        let surface =
-            Surface { triangles, positions: averaged_positions(surface, nodes, weights), ..surface.clone() };
+        let surface = Surface {
+            triangles,
+            positions: averaged_positions(surface, nodes, weights, normals),
+            ..surface.clone()
+        };
         let tree = SphereTree::new(&surface.positions, &surface.triangles);
         let residual = averaged(&recording.residual, weights, surface.positions.len());
         Self { indices, nodes: nodes.clone(), surface, is_surface, triangle, tree, residual }
@@ -105,8 +111,12 @@ impl SampleSurface {
 }
 
 /// Node positions [m] with those of the samples averaged along their normals.
-fn averaged_positions(surface: &Surface, samples: &[u32], weights: &PatchWeights) -> Vec<DVec3> {
-    let normals = node_normals(surface);
+fn averaged_positions(
+    surface: &Surface,
+    samples: &[u32],
+    weights: &PatchWeights,
+    normals: &[DVec3],
+) -> Vec<DVec3> {
     let mut positions = surface.positions.clone();
     for (c, node) in samples.iter().map(|&node| node as usize).enumerate() {
         let (centre, normal) = (surface.positions[node], normals[node]);
