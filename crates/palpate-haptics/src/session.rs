@@ -14,7 +14,7 @@ use crate::safety::{Safety, SafetyLimits};
 use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer};
 use crate::timing::{Cycle, CycleSender, DurationHistogram, Overrun, Timing};
-use palpate::{DeviceMode, Model, State};
+use palpate::{Collider, ContactOutput, DeviceMode, Model, State};
 use std::io::{Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -95,6 +95,10 @@ pub struct Report {
     pub steps: u64,
     /// Steps with an unsolved island or dropped contacts.
     pub unsolved_steps: u64,
+    /// Largest penetration of each object's contacts over all steps [m].
+    pub largest_penetration_m: Vec<f64>,
+    /// Number of steps in which each device's tip touched something.
+    pub touching_steps: Vec<u64>,
     /// Summary of the log; `None` if there is none or its writing failed.
     pub log: Option<LogSummary>,
     /// Wall-clock time of the steps [s].
@@ -135,6 +139,8 @@ struct ForceResult {
     granted: GrantedScheduling,
     timing: Timing,
     unsolved_steps: u64,
+    largest_penetration_m: Vec<f64>,
+    touching_steps: Vec<u64>,
     wall_s: f64,
     steal_time_s: Option<f64>,
     missed_records: u64,
@@ -245,6 +251,8 @@ impl Session {
                 steps: forces.process.steps(),
                 state: forces.process.into_state(),
                 unsolved_steps: forces.unsolved_steps,
+                largest_penetration_m: forces.largest_penetration_m,
+                touching_steps: forces.touching_steps,
                 log: steps.map(|steps| LogSummary { steps, missed: forces.missed_records }),
                 wall_s: forces.wall_s,
                 steal_time_s: forces.steal_time_s,
@@ -302,6 +310,9 @@ impl ForceLoop<'_> {
         std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();
         let mut unsolved_steps = 0;
+        let output = process.state().output();
+        let mut largest_penetration_m = vec![0.0_f64; output.objects.len()];
+        let mut touching_steps = vec![0; output.devices.len()];
         let period = clock.deadline(1) - clock.deadline(0);
         let mut tick = clock.next_after(0);
         let (mut frame_at, mut frame_step) = (tick, 0);
@@ -321,6 +332,13 @@ impl ForceLoop<'_> {
             let output = process.cycle(clock.now_s());
             unsolved_steps +=
                 u64::from(output.status.unsolved_islands > 0 || output.status.dropped_contacts > 0);
+            for (largest, object) in largest_penetration_m.iter_mut().zip(&output.objects) {
+                *largest = largest.max(object.penetration_m);
+            }
+            for (number, touching) in touching_steps.iter_mut().enumerate() {
+                let touches = |contact: &ContactOutput| contact.against == Collider::Device(number);
+                *touching += u64::from(output.contacts.iter().any(touches));
+            }
             let frame_due = ticks_per_frame > 0 && (tick >= frame_at || playback.is_paused());
             if frame_due {
                 (frame_at, frame_step) = (tick + ticks_per_frame, process.steps());
@@ -356,7 +374,17 @@ impl ForceLoop<'_> {
         let wall_s = Instant::now().saturating_duration_since(first_deadline).as_secs_f64();
         let steal_time_s = steal_time().zip(steal_time_before).map(|(after, before)| after - before);
         let missed_records = log_sender.map_or(0, |log| log.missed());
-        ForceResult { process, granted, timing, unsolved_steps, wall_s, steal_time_s, missed_records }
+        ForceResult {
+            process,
+            granted,
+            timing,
+            unsolved_steps,
+            largest_penetration_m,
+            touching_steps,
+            wall_s,
+            steal_time_s,
+            missed_records,
+        }
     }
 }
 

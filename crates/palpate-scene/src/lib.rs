@@ -14,6 +14,7 @@ mod attach;
 mod devices;
 mod error;
 mod file;
+mod initial_checks;
 mod library;
 mod mesh_source;
 mod progress;
@@ -22,6 +23,7 @@ mod recording_file;
 mod replay;
 mod scene;
 mod scene_log;
+mod warning;
 
 pub use attach::{attach_path, attach_real};
 pub use devices::{ANY_HAND, MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
@@ -38,6 +40,7 @@ pub use recording_file::{certificate_lines, certificate_table, read_recording};
 pub use replay::{Difference, LogReplay, ReplayError, Replayed};
 pub use scene::{Scene, SceneDevice, SceneObstacle};
 pub use scene_log::SceneLog;
+pub use warning::{Warning, WarningKind};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,6 +1,7 @@
 //! Scene: a model with the names of its parts, and the paths of its devices and obstacles.
 
 use crate::devices::RealDevice;
+use crate::warning::Warning;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, SceneLabels};
@@ -21,7 +22,7 @@ pub struct Scene {
     /// Planes and obstacles, in the model's order.
     pub obstacles: Vec<SceneObstacle>,
     /// Warnings for the author of the scene.
-    pub remarks: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Values that were chosen automatically, a line each.
     pub choices: Vec<String>,
     /// Files that the scene was read from, the scene file first.

@@ -97,6 +97,9 @@ pub struct ObjectOutput {
     pub twist: Twist,
     /// Energy ledger.
     pub energy: EnergyLedger,
+    /// Largest penetration of the object's contacts at the end of the step [m], not negative; 0 without contact. Between
+    /// contact locations an object may be deeper.
+    pub penetration_m: f64,
 }
 
 /// Status of a step. A step cannot fail; the status reports rejected inputs and unsolved contacts.

@@ -189,7 +189,7 @@ impl Shape {
     /// None for a mesh when bounds leave it open that an outside point is farther than `max_distance` [m].
     ///
     /// # Real time
-    pub(crate) fn signed_distance(&self, p: DVec3, max_distance: f64) -> Option<(f64, DVec3)> {
+    pub fn signed_distance(&self, p: DVec3, max_distance: f64) -> Option<(f64, DVec3)> {
         let from_core = |core: DVec3, radius: f64| {
             let away = p - core;
             let distance = away.length();

@@ -152,7 +152,7 @@ impl Model {
     }
 
     /// Recordings in the order of the objects.
-    pub fn recordings(&self) -> impl Iterator<Item = &Recording> {
+    pub fn recordings(&self) -> impl Iterator<Item = &Recording> + Clone {
         self.objects.iter().map(|object| &*object.body.recording)
     }
 

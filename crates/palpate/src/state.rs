@@ -73,6 +73,7 @@ impl State {
             pose: state.rigid.pose,
             twist: object.start.twist,
             energy: state.ledger,
+            penetration_m: 0.0,
         });
         let contacts = objects.iter().map(|own| own.points.capacity()).sum();
         let output = Output {
@@ -121,7 +122,7 @@ impl State {
             (own.free, own.end) = (still, still);
             own.update_ledger(object, gravity);
             own.stored_at_start = own.ledger.stored();
-            state.output.objects[at] = ObjectOutput { pose, twist, energy: own.ledger };
+            state.output.objects[at] = ObjectOutput { pose, twist, energy: own.ledger, penetration_m: 0.0 };
         }
         state.output.energy =
             state.objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));

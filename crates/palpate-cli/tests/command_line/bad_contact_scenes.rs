@@ -353,3 +353,97 @@ fn a_patch_that_shows_the_mesh_and_a_table_that_nothing_touches_get_a_warning() 
     let (alone, _) = table.split_once("[[plane]]").expect("a plane");
     assert_eq!(warnings(alone.to_string()), "");
 }
+
+/// Kinds and parts of the warnings of a run, as JSON has them.
+fn kinds(workplace: &Workplace, scene: &str) -> Vec<(String, String)> {
+    workplace.write("scene.toml", scene);
+    let summary = workplace.json(&["run", "scene.toml", "--duration", "0.02", "--json"]);
+    let text = |value: &serde_json::Value| value.as_str().expect("a text").to_string();
+    let warnings = summary["warnings"].as_array().expect("a list");
+    warnings.iter().map(|warning| (text(&warning["kind"]), text(&warning["part"]))).collect()
+}
+
+#[test]
+fn what_begins_inside_overlaps_or_is_in_millimetres_gets_a_warning_with_its_name() {
+    let workplace = workplace();
+    let moved = |old: &str, new: &str| {
+        assert!(SCENE.contains(old), "{old:?} is not in the scene");
+        SCENE.replacen(old, new, 1)
+    };
+    let other = |at: &str| {
+        let other = format!(
+            "[[object]]\nname = \"other\"\nrecording = \"cube.palp\"\nposition = [{at}]\n\n[[plane]]"
+        );
+        moved("[[plane]]", &other)
+    };
+    let ball = |radius: &str| {
+        let path = moved("path = { file = \"ball.csv\" }", "position = [0.0, 0.0, 0.0]");
+        path.replacen("radius = 0.02", &format!("radius = {radius}"), 1)
+    };
+    let path = |text: &str| {
+        workplace.write("other.csv", text);
+        moved("finger.csv", "other.csv")
+    };
+    // The finger does not reach the cube: see `finger.csv`.
+    let silent = ("no_contact", "finger");
+    for (scene, expected) in [
+        (SCENE.to_string(), vec![silent]),
+        (moved("-0.06, 0.0]", "-0.049, 0.0]"), vec![("begins_inside", "cube"), silent]),
+        (moved("-0.06, 0.0]", "0.2, 0.0]"), vec![("begins_inside", "cube"), silent]),
+        (ball("0.02"), vec![("begins_inside", "cube"), silent]),
+        (ball("0.2"), vec![("begins_inside", "cube"), silent]),
+        (other("0.11, 0.0, 0.0"), vec![silent]),
+        (other("0.1, 0.0, 0.0"), vec![silent]),
+        (other("0.09, 0.02, 0.01"), vec![("overlap", "cube"), silent]),
+        (other("0.0, 0.0, 0.0"), vec![("overlap", "cube"), silent]),
+    ] {
+        let expected: Vec<_> =
+            expected.iter().map(|(kind, part)| (kind.to_string(), part.to_string())).collect();
+        let found = kinds(&workplace, &scene);
+        // How a run with such a start goes on is not of interest here.
+        let of_run = ["penetration", "large_deformation", "unsolved", "dropped_contacts"];
+        let shown: Vec<_> = found.into_iter().filter(|(kind, _)| !of_run.contains(&kind.as_str())).collect();
+        assert_eq!(shown, expected, "{scene}");
+    }
+    for (text, kind) in [
+        ("0,0,0.02,0\n1,0,0.02,0\n", "begins_inside"),
+        ("0,0,0.053,0\n1,0,0.053,0\n", "begins_inside"),
+        ("0,0,70,0\n1,0,60,0\n", "units"),
+    ] {
+        let found = kinds(&workplace, &path(text));
+        assert_eq!(found[0], (kind.to_string(), "finger".to_string()), "{text}");
+    }
+}
+
+#[test]
+fn the_largest_penetration_is_that_of_all_nodes() {
+    let workplace = workplace();
+    // The floor's surface is 1 cm above the cube's lower face.
+    workplace.write("scene.toml", SCENE.replacen("-0.06, 0.0]", "-0.04, 0.0]", 1));
+    let summary = workplace.json(&["run", "scene.toml", "--duration", "0.02", "--json"]);
+    let depth = summary["objects"][0]["largest_penetration_m"].as_f64().expect("a number");
+    assert!((0.005..0.0101).contains(&depth), "{depth}");
+    let warnings = summary["warnings"].as_array().expect("a list");
+    assert!(warnings.iter().any(|warning| warning["kind"] == "penetration"), "{warnings:?}");
+    // One that nothing presses is inside nothing.
+    workplace.write("scene.toml", SCENE);
+    let summary = workplace.json(&["run", "scene.toml", "--duration", "0.02", "--json"]);
+    assert_eq!(summary["objects"][0]["largest_penetration_m"], 0.0);
+}
+
+#[test]
+fn strict_runs_end_with_the_first_warning() {
+    let workplace = workplace();
+    workplace.write("scene.toml", SCENE.replacen("-0.06, 0.0]", "-0.04, 0.0]", 1));
+    let error = workplace.fail(&["run", "scene.toml", "--strict"]);
+    assert!(error.contains("begins 10.00 mm inside \"floor\""), "{error}");
+    assert!(error.ends_with("(a warning; --strict makes it an error)"), "{error}");
+    // One that is known at the end only: the summary is printed before.
+    workplace.write("scene.toml", SCENE);
+    let ended = workplace.palpate(&["run", "scene.toml", "--strict"]);
+    let error = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(1), "{error}");
+    assert!(error.contains("finger touched nothing; its centre stayed about 0.0100 m"), "{error}");
+    assert!(String::from_utf8_lossy(&ended.stdout).contains("  warning      finger touched nothing"));
+    workplace.succeed(&["run", "scene.toml"]);
+}

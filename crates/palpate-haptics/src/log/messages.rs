@@ -114,6 +114,9 @@ pub(super) struct ObjectMessage {
     pub pose: PoseMessage,
     pub velocity: Xyz,
     pub angular_velocity: Xyz,
+    /// Largest penetration of its contacts [m]; older logs lack it.
+    #[serde(default)]
+    pub penetration_m: f64,
 }
 
 /// Initial state of an object.
@@ -132,6 +135,7 @@ impl From<&ObjectSnapshot> for StartMessage {
             pose: motion.pose.into(),
             velocity: motion.twist.linear.into(),
             angular_velocity: motion.twist.angular.into(),
+            penetration_m: 0.0,
         };
         let modes = motion.modes.iter().map(|mode| [mode.q, mode.v]).collect();
         Self { object, angular_momentum: motion.angular_momentum.into(), modes }
@@ -261,6 +265,7 @@ impl Serialize for StepMessageOf<'_> {
                 pose: output.pose.into(),
                 velocity: output.twist.linear.into(),
                 angular_velocity: output.twist.angular.into(),
+                penetration_m: output.penetration_m,
             }
         };
         let status = StatusMessage {

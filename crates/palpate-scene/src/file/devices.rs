@@ -6,6 +6,7 @@ use super::keys::{AttachEntry, DeviceEntry};
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
+use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
 use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
 use palpate_haptics::Columns;
@@ -14,7 +15,7 @@ use toml::Spanned;
 /// Allowed distance of a held point from the surface, as a share of the object's diagonal.
 const OFF_SURFACE: f64 = 0.05;
 
-/// Distance of a device's start from its held point that gets a remark, as a share of the diagonal.
+/// Distance of a device's start from its held point that gets a warning, as a share of the diagonal.
 const FAR_START: f64 = 0.01;
 
 /// Patch radii, in mean edges, below which quadratic and linear elements are too stiff by more than 2 to 3 % (measured,
@@ -60,7 +61,7 @@ pub(super) fn read_device(
     parameters: DeviceParameters,
     objects: &[ModelObject],
     object_names: &[String],
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<SceneDevice, SceneError> {
     let mode = match &device.attach {
         Some(attach) => {
@@ -98,8 +99,8 @@ pub(super) fn read_device(
     let pointer = pointer.is_some();
     let device =
         SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real, pointer };
-    remarks.extend(far_start(&device, objects));
-    remarks.extend(small_patches(&device, objects, object_names));
+    warnings.extend(far_start(&device, objects));
+    warnings.extend(small_patches(&device, objects, object_names));
     Ok(device)
 }
 
@@ -239,7 +240,7 @@ pub(super) fn check_grasps(
     Ok(())
 }
 
-fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<String> {
+fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<Warning> {
     let DeviceMode::Held(grasp) = device.mode else { return None };
     let ModelObject { recording, start, .. } = &objects[grasp.object];
     let held = start.pose.world_from_body(recording.surface.rest_position(&grasp.point));
@@ -249,11 +250,13 @@ fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<String> {
         Some(_) => "the coupling pulls it there from the first step on",
     };
     (distance > FAR_START * recording.surface.diagonal()).then(|| {
-        format!("device {:?} starts {distance:.4} m from the point that it holds: {pulled}", device.name)
+        let message =
+            format!("device {:?} starts {distance:.4} m from the point that it holds: {pulled}", device.name);
+        Warning::new(WarningKind::FarStart, &device.name, message)
     })
 }
 
-fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]) -> Vec<String> {
+fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]) -> Vec<Warning> {
     let radius = device.parameters.patch_radius;
     let touched =
         objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Modal));
@@ -263,12 +266,13 @@ fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]
                 if object.recording.metadata.mesh.order == 2 { SMOOTH_PATCH } else { SMOOTH_PATCH_LINEAR };
             let smooth = edges * object.recording.surface.mean_edge();
             (radius > 0.0 && radius < smooth).then(|| {
-                format!(
+                let message = format!(
                     "device {:?} touches with a patch of {radius:.2e} m, less than {edges} mean edges of {name:?}: its finite \
                      elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
                      {smooth:.2e} it does not",
                     device.name
-                )
+                );
+                Warning::new(WarningKind::SmallPatch, &device.name, message)
             })
         })
         .collect()

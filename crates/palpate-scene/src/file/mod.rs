@@ -9,7 +9,9 @@ mod obstacles;
 mod source;
 
 use crate::error::{SceneError, SceneErrorKind};
+use crate::initial_checks::check_start;
 use crate::scene::Scene;
+use crate::warning::Warning;
 use glam::DVec3;
 use keys::{RETIRED_KEYS, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, RigidCompliance, RigidIntegrator};
@@ -124,7 +126,7 @@ fn assemble(
     objects: Vec<ModelObject>,
     mode: RunMode,
 ) -> Result<Scene, SceneError> {
-    let (mut remarks, mut choices) = (Vec::new(), Vec::new());
+    let (mut warnings, mut choices) = (Vec::new(), Vec::new());
     let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
     let mut parameters = read_parameters(source, file, mode)?;
     for entry in &file.device {
@@ -145,25 +147,26 @@ fn assemble(
         obstacles.push(placed);
     }
     for (number, entry) in file.obstacle.iter().enumerate() {
-        let (obstacle, placed) = obstacles::read_obstacle(source, entry, number, &mut remarks)?;
+        let (obstacle, placed) = obstacles::read_obstacle(source, entry, number, &mut warnings)?;
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
     let model = build(source, file, parameters, objects.clone())?;
     let mut devices = Vec::new();
     for (entry, parameters) in file.device.iter().zip(&model.parameters().devices) {
-        let read = devices::read_device(source, entry, *parameters, &objects, &object_names, &mut remarks);
+        let read = devices::read_device(source, entry, *parameters, &objects, &object_names, &mut warnings);
         devices.push(read?);
     }
     devices::check_grasps(source, &file.device, &devices)?;
-    remarks.extend(objects::doubtful_recordings(&objects, &object_names));
-    let held_only: Vec<String> = objects::objects_with_tables(&objects, &object_names).collect();
+    warnings.extend(objects::doubtful_recordings(&objects, &object_names));
+    let held_only: Vec<Warning> = objects::objects_with_tables(&objects, &object_names).collect();
     let inputs = inputs(source, file);
     let mut scene =
-        Scene { model: Arc::new(model), object_names, devices, obstacles, remarks, choices, inputs };
+        Scene { model: Arc::new(model), object_names, devices, obstacles, warnings, choices, inputs };
     if scene.can_touch() {
-        scene.remarks.extend(held_only);
+        scene.warnings.extend(held_only);
     }
+    scene.warnings.extend(check_start(&scene, &objects));
     Ok(scene)
 }
 

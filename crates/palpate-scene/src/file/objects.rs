@@ -4,6 +4,7 @@ use super::keys::ObjectEntry;
 use super::source::Source;
 use crate::error::{SceneError, SceneErrorKind};
 use crate::recording_file::read_recording;
+use crate::warning::{Warning, WarningKind};
 use glam::{DQuat, DVec3};
 use palpate::{ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
 use palpate_fem::FORCE_ERROR_WARNING;
@@ -106,28 +107,31 @@ fn read_responses(
 pub(super) fn doubtful_recordings<'a>(
     objects: &'a [ModelObject],
     names: &'a [String],
-) -> impl Iterator<Item = String> + 'a {
+) -> impl Iterator<Item = Warning> + 'a {
     objects.iter().zip(names).filter_map(move |(object, name)| {
         let certificate = object.recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
         (error > FORCE_ERROR_WARNING).then(|| {
-            format!(
+            let message = format!(
                 "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
                  recording): record it with more modes",
                 100.0 * error
-            )
+            );
+            Warning::new(WarningKind::ForceError, name, message)
         })
     })
 }
 
-/// Remarks on objects with recorded tables, which have no contacts, for scenes that could have some.
+/// Warnings about objects with recorded tables, which have no contacts, for scenes that could have some.
 pub(super) fn objects_with_tables<'a>(
     objects: &'a [ModelObject],
     names: &'a [String],
-) -> impl Iterator<Item = String> + 'a {
+) -> impl Iterator<Item = Warning> + 'a {
     let tables =
         objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Fir(_)));
     tables.map(|(_, name)| {
-        format!("the object {name:?} uses a recorded table: it can be held, but nothing else touches it")
+        let message =
+            format!("the object {name:?} uses a recorded table: it can be held, but nothing else touches it");
+        Warning::new(WarningKind::NoContactsOnTable, name, message)
     })
 }

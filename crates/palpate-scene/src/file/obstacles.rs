@@ -5,6 +5,7 @@ use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::mesh_source;
 use crate::scene::SceneObstacle;
+use crate::warning::{Warning, WarningKind};
 use glam::{DQuat, DVec3};
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
 use palpate_haptics::{Columns, unit_quaternion};
@@ -36,11 +37,11 @@ pub(super) fn read_obstacle(
     source: &Source,
     entry: &Spanned<ObstacleEntry>,
     number: usize,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<(Obstacle, SceneObstacle), SceneError> {
     let obstacle = entry.get_ref();
     let name = name_or(obstacle.name.as_ref(), "obstacle", number);
-    let shape = read_shape(source, entry, &name, remarks)?;
+    let shape = read_shape(source, entry, &name, warnings)?;
     let friction = source.friction(obstacle.friction.as_ref())?;
     if let (Some(position), Some(_)) = (&obstacle.position, &obstacle.path) {
         let message = "the position is in the path: leave one of the two out";
@@ -81,7 +82,7 @@ fn read_shape(
     source: &Source,
     entry: &Spanned<ObstacleEntry>,
     name: &str,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Shape, SceneError> {
     let obstacle = entry.get_ref();
     let length = |key, number| source.positive(number, Quantity::length(key));
@@ -104,7 +105,7 @@ fn read_shape(
             Ok(Shape::Capsule { radius, half_length: length("half_length", &capsule.half_length)? })
         }
         (None, None, None, Some(mesh)) => {
-            read_mesh(source, mesh, name, remarks).map(|mesh| Shape::Mesh(Arc::new(mesh)))
+            read_mesh(source, mesh, name, warnings).map(|mesh| Shape::Mesh(Arc::new(mesh)))
         }
         _ => source.fail(
             entry.span(),
@@ -119,7 +120,7 @@ fn read_mesh(
     source: &Source,
     entry: &MeshEntry,
     name: &str,
-    remarks: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<ObstacleMesh, SceneError> {
     let span = entry.file.span();
     let path = source.stored_path(entry.file.get_ref());
@@ -129,10 +130,11 @@ fn read_mesh(
         .or_else(|error| source.fail(span.clone(), SceneErrorKind::Mesh, "mesh", error))?;
     mesh.positions.iter_mut().for_each(|position| *position *= scale);
     if mesh.volume() < 0.0 {
-        remarks.push(format!(
+        let message = format!(
             "the triangles of obstacle {name:?} face inwards ({}): they are turned over",
             path.display()
-        ));
+        );
+        warnings.push(Warning::new(WarningKind::TurnedMesh, name, message));
         mesh.flip_orientation();
     }
     ObstacleMesh::new(mesh.positions, mesh.triangles).or_else(|error| {

@@ -10,6 +10,7 @@ use crate::file::{RunMode, read_edited_scene, read_text};
 use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::{Scene, SceneDevice};
+use crate::warning::Warning;
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
 use palpate::{Coupling, Damping, Material};
 use palpate_fem::ElementOrder;
@@ -44,7 +45,7 @@ pub struct OpenedScene {
     /// Whether an object can be recorded again with another material, by object.
     pub recordable: Vec<bool>,
     /// Warnings for the author of the scene; none about added pointers.
-    pub remarks: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// New values of settings; none leaves a setting as it is.
@@ -150,10 +151,9 @@ impl SceneLibrary {
         })?;
         // Nobody has chosen the size of added pointers.
         let added = |device: &&SceneDevice| device.pointer && text != given;
-        let of_added: Vec<String> =
-            scene.devices.iter().filter(added).map(|device| format!("device {:?} ", device.name)).collect();
-        let is_of_added = |remark: &&String| of_added.iter().any(|start| remark.starts_with(start));
-        let remarks = scene.remarks.iter().filter(|remark| !is_of_added(remark)).cloned().collect();
+        let is_of_added =
+            |warning: &Warning| scene.devices.iter().filter(added).any(|device| device.name == warning.part);
+        let warnings = scene.warnings.iter().filter(|warning| !is_of_added(warning)).cloned().collect();
         let recordable = current.add_recipes(&scene);
         let opened = OpenedScene {
             id: current.id.clone(),
@@ -162,7 +162,7 @@ impl SceneLibrary {
             scene,
             text,
             recordable,
-            remarks,
+            warnings,
         };
         *self.lock() = current;
         Ok(opened)

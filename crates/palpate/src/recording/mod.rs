@@ -102,16 +102,22 @@ fn is_inertia(tensor: &DMat3) -> bool {
         && moment.determinant() > 0.0
 }
 
+/// Sum of barycentric weights of movable nodes [1] below which a point counts as fixed. Compliance falls with its square: 10⁻⁶ of a
+/// free point's, at a thousandth of an edge.
+const MIN_MOVABLE_WEIGHT: f64 = 1e-3;
+
 impl Recording {
-    /// Whether a surface point can move: not all its corners are fixed nodes.
+    /// Whether a surface point can move: its corners are not all fixed nodes, but for a thousandth of their weight.
     pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
-        self.surface.corners(point).iter().any(|&(node, weight)| {
-            let moves = |axis: usize| {
+        let moves = |node: usize| {
+            (0..3).any(|axis| {
                 self.modes.row(node, axis).iter().any(|phi| *phi != 0.0)
                     || self.residual.block(node, node).col(axis)[axis] != 0.0
-            };
-            weight != 0.0 && (0..3).any(moves)
-        })
+            })
+        };
+        let corners = self.surface.corners(point).into_iter();
+        let movable: f64 = corners.filter(|&(node, _)| moves(node)).map(|(_, weight)| weight).sum();
+        movable > MIN_MOVABLE_WEIGHT
     }
 
     /// Relaxation time of the residual compliance [s], see [`Damping::residual_relaxation_s`].

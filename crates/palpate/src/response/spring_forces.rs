@@ -74,7 +74,7 @@ impl ModalState {
             let radius = |location: &ContactLocation| body.patch_radius(location.footprint);
             let share = |to: &ContactLocation| {
                 let s = (body.rest_position(to) - rest).length() / radius(to).max(radius(&location));
-                patch_kernel(s * s)
+                patch_kernel(1.0, s * s)
             };
             let sum: f64 = to.clone().map(|to| share(&to)).sum();
             for to in to.clone().filter(|_| sum > 0.0) {

@@ -17,6 +17,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
             out.twist = inertia.twist(&own.rigid);
         }
         out.energy = own.ledger;
+        out.penetration_m = 0.0;
     }
     output.energy = objects.iter().fold(*couplings, |sum, own| sum.plus(&own.ledger));
     for (number, out) in output.devices.iter_mut().enumerate() {
@@ -33,6 +34,17 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         let own = &objects[contact.object()];
         let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
         let carries_force = contact.force != DVec3::ZERO;
+        if !contact.is_held() {
+            let other = match contact.other {
+                OtherSide::Object { number, .. } => Some(number),
+                OtherSide::Device(_) | OtherSide::Obstacle { .. } => None,
+            };
+            let penetration = -contact.gap(constraint.end);
+            for object in [Some(contact.object()), other].into_iter().flatten() {
+                let out = &mut output.objects[object];
+                out.penetration_m = out.penetration_m.max(penetration);
+            }
+        }
         if let (true, true, OtherSide::Device(device)) = (carries_force, contact.is_held(), contact.other) {
             // A rigidly held point is the proxy, to the last digit that the solver gives.
             if model.parameters.devices[device].coupling.is_none() {

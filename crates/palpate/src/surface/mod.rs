@@ -66,7 +66,7 @@ impl Surface {
     }
 
     /// Lowest and highest corner of the bounding box at rest [m, body frame].
-    pub(crate) fn extent(&self) -> (DVec3, DVec3) {
+    pub fn extent(&self) -> (DVec3, DVec3) {
         let low = self.positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
         let high = self.positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
         (low, high)

@@ -127,9 +127,9 @@ pub(super) fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
     area_normal(surface.triangles[triangle].map(|node| surface.positions[node as usize]))
 }
 
-/// Kernel k of patches at the square of the ratio s of distance and radius [1].
-pub(crate) fn patch_kernel(s_squared: f64) -> f64 {
-    if s_squared < 1.0 { (1.0 - s_squared) * (1.0 - s_squared) } else { 0.0 }
+/// Kernel of patches times a scale: scale·(1 − s²)², for the ratio s of distance and radius [1].
+pub(crate) fn patch_kernel(scale: f64, s_squared: f64) -> f64 {
+    if s_squared < 1.0 { scale * (1.0 - s_squared) * (1.0 - s_squared) } else { 0.0 }
 }
 
 /// Quadrature over a triangle: `add` takes the barycentric weights of a point, and its fraction of the area times the kernel.
@@ -144,9 +144,9 @@ fn integrate(corners: [DVec3; 3], centre: DVec3, radius: f64, mut add: impl FnMu
     let share = 1.0 / (f64::from(n) * f64::from(n));
     let mut point = |w: [f64; 3], share: f64| {
         let s = (at_weights(corners, w) - centre).length_squared() / (radius * radius);
-        let k = patch_kernel(s);
+        let k = patch_kernel(share, s);
         if k > 0.0 {
-            add(w, share * k);
+            add(w, k);
         }
     };
     let step = 1.0 / f64::from(n);

@@ -70,6 +70,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     write_atomically(&scene_path, format!("{RULES}{TWO_HANDS}").as_bytes())?;
     let scene = read_scene(&scene_path, RunMode::Offline)?;
     let options = run::Arguments {
+        strict: false,
         scene: scene_path.clone(),
         duration: Some(DURATION_S),
         outputs: run::OutputArguments {

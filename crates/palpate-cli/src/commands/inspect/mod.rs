@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::progress::Bars;
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
+use glam::DVec3;
 use palpate::{Damping, Material, Recording, ResidualCompliance, Support};
 use palpate_fem::Progress;
 use palpate_scene::{certificate_table, read_recording};
@@ -183,6 +184,13 @@ fn frequencies_hz(recording: &Recording) -> Vec<f64> {
     recording.modes.angular_frequencies.iter().map(|omega| omega / std::f64::consts::TAU).collect()
 }
 
+/// Lower and upper corner of the bounding box [m], in the mesh's coordinates.
+fn bounding_box_m(recording: &Recording) -> [[f64; 3]; 2] {
+    let (low, high) = recording.surface.extent();
+    let centre = DVec3::from_array(recording.metadata.mass.center_of_mass_m);
+    [(low + centre).to_array(), (high + centre).to_array()]
+}
+
 /// Prints a recording as JSON.
 pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
     let metadata = &recording.metadata;
@@ -202,6 +210,7 @@ pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
         "fixed_nodes": metadata.mesh.fixed_nodes,
         "surface_nodes": recording.surface.positions.len(),
         "surface_triangles": recording.surface.triangles.len(),
+        "bounding_box_m": bounding_box_m(recording),
         "support": metadata.support,
         "mass_kg": metadata.mass.mass_kg,
         "center_of_mass_m": metadata.mass.center_of_mass_m,
@@ -233,6 +242,9 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
     writeln!(out, "  mesh         {} nodes, {} {kind} tetrahedra", mesh.nodes, mesh.elements)?;
     let surface = &recording.surface;
     writeln!(out, "  surface      {} nodes, {} triangles", surface.positions.len(), surface.triangles.len())?;
+    let [low, high] = bounding_box_m(recording);
+    let range = |axis: usize| format!("{:.4} … {:.4}", low[axis] + 0.0, high[axis] + 0.0);
+    writeln!(out, "  extent       x {}, y {}, z {} m in the mesh file", range(0), range(1), range(2))?;
     match metadata.support {
         Support::Free => writeln!(out, "  support      free in space")?,
         Support::Fixed => writeln!(out, "  support      {} nodes fixed", mesh.fixed_nodes)?,

@@ -4,6 +4,7 @@ mod outputs;
 mod realtime;
 mod realtime_report;
 mod summary;
+mod warnings;
 
 use crate::failure::Failure;
 use crate::terminal::{notify, print, print_json};
@@ -52,6 +53,9 @@ pub struct Arguments {
     /// Duration [s]; by default to the end of the longest path, in real time with real or linked devices until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
+    /// Treat warnings as errors: end with status 1, before the first step if the scene has one
+    #[arg(long)]
+    pub strict: bool,
     /// Outputs
     #[command(flatten)]
     pub outputs: OutputArguments,
@@ -73,14 +77,20 @@ const MAX_STEPS: f64 = 1e8;
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mode = if arguments.realtime.realtime { RunMode::RealTime } else { RunMode::Offline };
     let scene = read_scene(&arguments.scene, mode)?;
-    scene.remarks.iter().for_each(|remark| notify(&format!("warning: {remark}")));
+    scene.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
     scene.choices.iter().for_each(|choice| notify(choice));
+    warnings::refuse(arguments.strict, &scene.warnings)?;
     if arguments.realtime.realtime {
         return realtime::run(&scene, arguments);
     }
     arguments.realtime.refuse()?;
     let summary = simulate(&scene, arguments)?;
-    if arguments.outputs.json { print_json(&summary.json(&scene)) } else { print(&summary.text(&scene)) }
+    if arguments.outputs.json {
+        print_json(&summary.json(&scene))?;
+    } else {
+        print(&summary.text(&scene))?;
+    }
+    warnings::refuse(arguments.strict, &summary.warnings(&scene))
 }
 
 /// Runs a scene offline to its end.

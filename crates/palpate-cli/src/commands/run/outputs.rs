@@ -29,7 +29,7 @@ pub struct OutputArguments {
     pub json: bool,
 }
 
-/// Number of samples of the deformation in a run: few enough to cost nothing beside the steps.
+/// Number of samples of all surfaces in a run: few enough to cost nothing beside the steps.
 const SAMPLES: usize = 100;
 
 /// Writer of the files and the summary of a run.
@@ -84,7 +84,7 @@ impl Outputs {
         self.steps += 1;
         self.summary.take(state.output(), took);
         if self.steps.is_multiple_of(self.sample_every) {
-            self.summary.sample_deformation(scene, state);
+            self.summary.sample_surfaces(scene, input, state);
         }
         Ok(self.files.write(&scene.model, input, state)?)
     }

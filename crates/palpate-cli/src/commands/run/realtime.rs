@@ -1,7 +1,8 @@
 //! A scene in real time: the processes of `palpate-haptics`, with devices that follow paths or are held by simulated or real
 //! hands.
 
-use super::realtime_report::{json, text};
+use super::realtime_report::{json, text, warnings};
+use super::warnings::refuse;
 use super::{Arguments, count_steps};
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
@@ -141,10 +142,11 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         file.finish()?;
     }
     if arguments.outputs.json {
-        print_json(&json(scene, &report, links))
+        print_json(&json(scene, &report, links))?;
     } else {
-        print(&text(scene, &report, links, options.log.as_deref()))
+        print(&text(scene, &report, links, options.log.as_deref()))?;
     }
+    refuse(arguments.strict, &warnings(scene, &report))
 }
 
 /// Begins a log in an atomic file.

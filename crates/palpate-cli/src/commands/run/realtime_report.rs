@@ -1,8 +1,9 @@
 //! Report of a run in real time, as text and as JSON.
 
+use super::warnings::{no_contact, penetration, should_touch};
 use palpate_haptics::link::LinkCounts;
 use palpate_haptics::{DeviceReport, Percentiles, Report, Timing};
-use palpate_scene::Scene;
+use palpate_scene::{Scene, Warning, WarningKind};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -50,8 +51,13 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         })
     });
     let objects = scene.object_names.iter().zip(&report.state.output().objects);
-    let objects =
-        objects.map(|(name, object)| json!({ "name": name, "position_m": object.pose.position.to_array() }));
+    let objects = objects.zip(&report.largest_penetration_m).map(|((name, object), penetration)| {
+        json!({
+            "name": name,
+            "position_m": object.pose.position.to_array(),
+            "largest_penetration_m": penetration,
+        })
+    });
     json!({
         "steps": report.steps,
         "step_s": scene.model.parameters().step_s,
@@ -71,6 +77,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "old": links.old,
             "garbage": links.garbage,
         })),
+        "warnings": super::warnings::json(scene, &warnings(scene, report)),
         "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed })),
     })
 }
@@ -128,12 +135,7 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
             parameters.max_contact_samples
         );
     }
-    if report.unsolved_steps > 0 {
-        out += &format!(
-            "  warning      in {} steps contacts could not be solved, or were left out\n",
-            report.unsolved_steps
-        );
-    }
+    out += &super::warnings::text(&warnings(scene, report));
     if let (Some(summary), Some(path)) = (report.log, log) {
         out += &format!("  log          {} steps in {}", summary.steps, path.display());
         if summary.missed > 0 {
@@ -145,6 +147,22 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
         out += "\n";
     }
     out
+}
+
+/// Warnings of the run.
+pub(super) fn warnings(scene: &Scene, report: &Report) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if report.unsolved_steps > 0 {
+        let message =
+            format!("in {} steps contacts could not be solved, or were left out", report.unsolved_steps);
+        warnings.push(Warning::new(WarningKind::Unsolved, "", message));
+    }
+    let objects = scene.object_names.iter().zip(scene.model.recordings()).zip(&report.largest_penetration_m);
+    warnings.extend(objects.filter_map(|((name, recording), depth)| penetration(name, recording, *depth)));
+    let devices = scene.devices.iter().zip(&report.touching_steps);
+    let silent = devices.filter(|(device, touching)| should_touch(device) && **touching == 0);
+    warnings.extend(silent.map(|(device, _)| no_contact(device, None)));
+    warnings
 }
 
 /// Forces, passivity and safety of a device, in a line.

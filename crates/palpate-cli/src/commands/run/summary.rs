@@ -1,9 +1,10 @@
 //! Summary of a run, as text and as JSON.
 
+use super::warnings;
 use glam::DVec3;
-use palpate::{Output, State, StepStatus};
+use palpate::{Collider, Input, Output, State, StepStatus};
 use palpate_haptics::percentile_us;
-use palpate_scene::Scene;
+use palpate_scene::{Scene, Warning, WarningKind};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -31,6 +32,10 @@ pub struct Summary {
     index: Option<PathBuf>,
     /// Largest sampled displacement of the surface, by object [m].
     deformation: Vec<f64>,
+    /// Largest penetration by object [m]: of its contacts in every step, of all its nodes in obstacles in sampled steps.
+    penetration: Vec<f64>,
+    /// Whether each device has touched something, and its least sampled distance from the surfaces until then [m].
+    touched: Vec<(bool, f64)>,
 }
 
 impl Summary {
@@ -49,6 +54,8 @@ impl Summary {
             times_ns: Vec::with_capacity(steps),
             index: None,
             deformation: vec![0.0; scene.object_names.len()],
+            penetration: vec![0.0; scene.object_names.len()],
+            touched: vec![(false, f64::INFINITY); scene.devices.len()],
         }
     }
 
@@ -57,6 +64,14 @@ impl Summary {
         self.times_ns.push(took.as_nanos().min(u128::from(u32::MAX)) as u32);
         for (forces, device) in self.forces.iter_mut().zip(&output.devices) {
             forces.push(device.force_on_hand);
+        }
+        for (largest, object) in self.penetration.iter_mut().zip(&output.objects) {
+            *largest = largest.max(object.penetration_m);
+        }
+        for contact in &output.contacts {
+            if let Collider::Device(number) = contact.against {
+                self.touched[number].0 = true;
+            }
         }
         let (all, now) = (&mut self.status, &output.status);
         all.solver_residual_m = all.solver_residual_m.max(now.solver_residual_m);
@@ -77,13 +92,37 @@ impl Summary {
         self.index = index;
     }
 
-    /// Samples the deformation.
-    pub(super) fn sample_deformation(&mut self, scene: &Scene, state: &State) {
-        for (object, (recording, largest)) in scene.model.recordings().zip(&mut self.deformation).enumerate()
-        {
+    /// Samples the deformation, and with all nodes the penetration in obstacles and the distance of tips.
+    pub(super) fn sample_surfaces(&mut self, scene: &Scene, input: &Input, state: &State) {
+        let obstacles = scene.model.parameters().obstacles.iter().zip(&input.obstacles);
+        let output = state.output();
+        for (object, recording) in scene.model.recordings().enumerate() {
             let mut displacement = vec![DVec3::ZERO; recording.surface.positions.len()];
             state.surface_displacement(&scene.model, object, &mut displacement);
+            let largest = &mut self.deformation[object];
             *largest = displacement.iter().map(|u| u.length()).fold(*largest, f64::max);
+            let pose = output.objects[object].pose;
+            let mut surface = recording.surface.clone();
+            surface.positions.iter_mut().zip(&displacement).for_each(|(x, u)| *x += *u);
+            let reach = surface.radius();
+            for (obstacle, at) in obstacles.clone() {
+                let distance = |x: DVec3, max_distance: f64| {
+                    let x = at.body_from_world(pose.world_from_body(x));
+                    obstacle
+                        .shape
+                        .signed_distance(x, max_distance)
+                        .map_or(f64::INFINITY, |(distance, _)| distance)
+                };
+                if distance(DVec3::ZERO, reach) <= reach {
+                    let depths = surface.positions.iter().map(|x| -distance(*x, 0.0));
+                    self.penetration[object] = depths.fold(self.penetration[object], f64::max);
+                }
+            }
+            let tips = self.touched.iter_mut().zip(&input.devices);
+            for ((_, nearest), device) in tips.filter(|((touched, _), _)| !touched) {
+                let found = surface.nearest(pose.body_from_world(device.position));
+                *nearest = found.map_or(*nearest, |(_, distance)| nearest.min(distance));
+            }
         }
     }
 
@@ -112,8 +151,8 @@ impl Summary {
             .object_names
             .iter()
             .zip(&self.last.objects)
-            .zip(&self.deformation)
-            .map(|((name, object), deformation)| {
+            .zip(self.deformation.iter().zip(&self.penetration))
+            .map(|((name, object), (deformation, penetration))| {
                 let q = object.pose.orientation;
                 json!({
                     "name": name,
@@ -122,6 +161,7 @@ impl Summary {
                     "velocity_m_s": object.twist.linear.to_array(),
                     "angular_velocity_rad_s": object.twist.angular.to_array(),
                     "displacement_max_m": deformation,
+                    "largest_penetration_m": penetration,
                 })
             })
             .collect();
@@ -158,6 +198,7 @@ impl Summary {
                 "dropped_contacts": self.status.dropped_contacts,
                 "unsolved_steps": self.unsolved_steps,
             },
+            "warnings": warnings::json(scene, &self.warnings(scene)),
         })
     }
 
@@ -191,9 +232,12 @@ impl Summary {
             );
         }
         if self.max_contacts > 0 {
+            let deepest = self.penetration.iter().copied().fold(0.0, f64::max);
             out += &format!(
-                "  contacts     {} at once at most, {:.5} N in one at most\n",
-                self.max_contacts, self.max_contact_force
+                "  contacts     {} at once at most, {:.5} N in one at most, {:.3} mm of penetration at most\n",
+                self.max_contacts,
+                self.max_contact_force,
+                1000.0 * deepest
             );
         }
         out += &self.energy_line(scene);
@@ -204,40 +248,59 @@ impl Summary {
             self.time_us(0.999),
             self.time_us(1.0)
         );
-        let recordings = scene.model.recordings().zip(&scene.object_names).zip(&self.deformation);
-        for ((recording, name), deformation) in recordings {
-            let share = deformation / recording.surface.diagonal();
-            if share > LARGE_DEFORMATION {
-                out += &format!(
-                    "  warning      {name} deforms by {:.0} % of its size; linear elasticity is meant for small strain\n",
-                    100.0 * share
-                );
-            }
-        }
-        if self.unsolved_steps > 0 {
-            out += &format!(
-                "  warning      in {} steps contacts could not be solved, and gave a part of their force or none: use a shorter step\n",
-                self.unsolved_steps
-            );
-        }
-        if self.dropping_steps > 0 {
-            out += &format!(
-                "  warning      in {} steps contacts were left out, up to {} at once: raise max_contact_points above {}\n",
-                self.dropping_steps,
-                self.status.dropped_contacts,
-                scene.model.parameters().max_contact_points
-            );
-        }
-        if self.status.dependent_rows > 0 {
-            out += &format!(
-                "  warning      {} held directions repeat others and were given no force\n",
-                self.status.dependent_rows
-            );
-        }
+        out += &warnings::text(&self.warnings(scene));
         if let Some(index) = &self.index {
             out += &format!("  surfaces     {} (open it in ParaView)\n", index.display());
         }
         out
+    }
+
+    /// Warnings of the run.
+    pub(super) fn warnings(&self, scene: &Scene) -> Vec<Warning> {
+        let mut all = Vec::new();
+        let objects = scene.model.recordings().zip(&scene.object_names);
+        for ((recording, name), deformation) in objects.clone().zip(&self.deformation) {
+            let share = deformation / recording.surface.diagonal();
+            if share > LARGE_DEFORMATION {
+                let message = format!(
+                    "{name} deforms by {:.0} % of its size; linear elasticity is meant for small strain",
+                    100.0 * share
+                );
+                all.push(Warning::new(WarningKind::LargeDeformation, name, message));
+            }
+        }
+        let depths = objects.zip(&self.penetration);
+        all.extend(
+            depths.filter_map(|((recording, name), depth)| warnings::penetration(name, recording, *depth)),
+        );
+        let silent = scene.devices.iter().zip(&self.touched);
+        let silent = silent.filter(|(device, (touched, _))| warnings::should_touch(device) && !touched);
+        all.extend(silent.map(|(device, (_, nearest))| warnings::no_contact(device, Some(*nearest))));
+        let of_scene = |kind: WarningKind, message: String| Warning::new(kind, "", message);
+        if self.unsolved_steps > 0 {
+            let message = format!(
+                "in {} steps contacts could not be solved, and gave a part of their force or none: use a shorter step",
+                self.unsolved_steps
+            );
+            all.push(of_scene(WarningKind::Unsolved, message));
+        }
+        if self.dropping_steps > 0 {
+            let message = format!(
+                "in {} steps contacts were left out, up to {} at once: raise max_contact_points above {}",
+                self.dropping_steps,
+                self.status.dropped_contacts,
+                scene.model.parameters().max_contact_points
+            );
+            all.push(of_scene(WarningKind::DroppedContacts, message));
+        }
+        if self.status.dependent_rows > 0 {
+            let message = format!(
+                "{} held directions repeat others and were given no force",
+                self.status.dependent_rows
+            );
+            all.push(of_scene(WarningKind::DependentRows, message));
+        }
+        all
     }
 
     /// Energy balance as a line.

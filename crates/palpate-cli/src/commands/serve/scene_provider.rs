@@ -31,11 +31,11 @@ impl LibraryProvider {
         Ok(Self { library: SceneLibrary::new(cache)?, logs })
     }
 
-    /// Opens a scene file, and prints its remarks.
+    /// Opens a scene file, and prints its warnings.
     pub fn open_file(&self, path: &Path) -> Result<ViewerScene, Failure> {
         let opened = self.library.open_file(path)?;
-        let remarks = opened.remarks.iter().map(|remark| format!("warning: {remark}"));
-        let messages: Vec<String> = remarks.chain(opened.scene.choices.iter().cloned()).collect();
+        let warnings = opened.warnings.iter().map(|warning| format!("warning: {warning}"));
+        let messages: Vec<String> = warnings.chain(opened.scene.choices.iter().cloned()).collect();
         let scene = self.viewer_scene(opened)?;
         messages.iter().for_each(|line| notify(line));
         Ok(scene)
