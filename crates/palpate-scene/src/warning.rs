@@ -10,7 +10,7 @@ pub struct Warning {
     pub kind: WarningKind,
     /// Name of the object, device or obstacle; empty for the whole scene.
     pub part: String,
-    /// What was seen, with numbers, and what to do.
+    /// Message: what was seen, with numbers, and what to do.
     pub message: String,
 }
 
