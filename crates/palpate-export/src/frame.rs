@@ -3,7 +3,7 @@
 use crate::error::TimeWindowError;
 use crate::labels::{SceneLabels, obstacle_pose};
 use glam::DVec3;
-use palpate::{DeviceMode, Input, Model, Output, Pose};
+use palpate::{Input, Model, Output, Pose};
 
 /// Time interval, and the frame rate in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,7 +96,7 @@ impl Frame<'_> {
 
     /// Whether a device is shown: a transient one only while it is active.
     pub fn shows(&self, device: usize) -> bool {
-        let inactive = self.input.devices[device].mode == DeviceMode::Inactive;
+        let inactive = !self.input.devices[device].mode.is_active();
         !(self.labels.devices[device].transient && inactive)
     }
 

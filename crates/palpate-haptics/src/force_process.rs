@@ -44,7 +44,7 @@ pub struct ForceProcess {
 
 impl ForceProcess {
     /// Force process at the model's initial state, with a port and a mode for each device of the model and a trajectory for each
-    /// obstacle. A device that is silent for longer than `device_timeout_s` [s] is inactive until it sends again.
+    /// obstacle. A device that is silent for longer than `device_timeout_s` [s] is suspended until it sends again.
     pub fn new(
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
@@ -129,22 +129,25 @@ impl ForceProcess {
         self.steps += 1;
         let time_s = self.steps as f64 * self.model.parameters().step_s;
 
-        // Motions become the input of the step. Silent devices, and positions that are not finite, are inactive.
+        // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent or
+        // where their position is not finite.
         for (slot, input) in self.slots.iter_mut().zip(&mut self.input.devices) {
             let mut motion = slot.port.newest();
             if let Some(path) = &slot.path {
                 let position = path.at(time_s).position;
                 motion = Motion { sequence: self.steps, time_s: now_s, position, ..Motion::default() };
             }
-            let silent = motion.sequence == 0 || now_s - motion.time_s > self.device_timeout_s;
             if motion.position.is_finite() {
                 slot.motion = motion;
             }
-            *input = if silent || !motion.position.is_finite() {
-                DeviceInput::inactive()
-            } else {
-                DeviceInput { position: motion.position, mode: motion.mode.unwrap_or(slot.mode) }
+            let silent = now_s - motion.time_s > self.device_timeout_s || !motion.position.is_finite();
+            let mode = match motion.mode.unwrap_or(slot.mode) {
+                _ if motion.sequence == 0 => DeviceMode::Inactive,
+                DeviceMode::Inactive => DeviceMode::Inactive,
+                _ if silent => DeviceMode::Suspended,
+                mode => mode,
             };
+            *input = DeviceInput { position: slot.motion.position, mode };
         }
         for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
             *pose = trajectory(time_s);
@@ -155,7 +158,7 @@ impl ForceProcess {
         // Absorbed energy: work of the proxy, −Σ F·Δproxy, and the energy of the coupling's spring, ½·k·|stretch|².
         for ((slot, input), device) in self.slots.iter_mut().zip(&self.input.devices).zip(&output.devices) {
             let force = device.force_on_hand;
-            if input.mode == DeviceMode::Inactive {
+            if !input.mode.is_active() {
                 slot.proxy = slot.motion.position;
             } else {
                 slot.proxy_work_j -= force.dot(device.proxy - slot.proxy);

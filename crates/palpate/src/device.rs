@@ -11,6 +11,7 @@
 //! Equations: docs/theory.md (C50), (C51), (C52), (C53).
 
 use crate::error::ModelError;
+use crate::surface::SurfacePoint;
 use alloc::format;
 use glam::DVec3;
 
@@ -66,6 +67,11 @@ impl DeviceParameters {
             _ => Ok(()),
         }
     }
+
+    /// Energy [J] that the coupling stores at a stretch [m].
+    pub(crate) fn stored(&self, stretch: DVec3) -> f64 {
+        0.5 * self.coupling.map_or(0.0, |coupling| coupling.stiffness) * stretch.length_squared()
+    }
 }
 
 /// State of a device between steps.
@@ -84,6 +90,17 @@ pub(crate) struct DeviceState {
     pub(crate) compliance: f64,
     /// Force on the objects [N, world].
     pub(crate) force: DVec3,
+    /// Where its tip touched last, until it leaves the surface or the scene.
+    pub(crate) last_touch: Option<LastTouch>,
+}
+
+/// Contact of a tip that carried force, the strongest of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LastTouch {
+    pub(crate) object: usize,
+    pub(crate) point: SurfacePoint,
+    /// Contact force [N].
+    pub(crate) force: f64,
 }
 
 impl DeviceState {
@@ -97,6 +114,7 @@ impl DeviceState {
             relaxed_stretch: zero,
             compliance: 0.0,
             force: zero,
+            last_touch: None,
         }
     }
 

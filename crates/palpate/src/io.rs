@@ -16,6 +16,16 @@ pub enum DeviceMode {
     Held(Grasp),
     /// Its tip touches surfaces (unilateral contact).
     Touch,
+    /// It is silent for now: no force, as [`Self::Inactive`]. A tip with a coupling that comes back inside the object which it touched
+    /// is outside again, where it was on the surface.
+    Suspended,
+}
+
+impl DeviceMode {
+    /// Whether the device holds or touches.
+    pub fn is_active(&self) -> bool {
+        matches!(self, Self::Held(_) | Self::Touch)
+    }
 }
 
 /// One device's part of a step's input.

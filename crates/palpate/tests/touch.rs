@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    Collider, Coupling, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, Obstacle,
-    Output, Pose, Shape, SurfacePoint, step,
+    Collider, Coupling, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
+    Obstacle, Output, Pose, Shape, SurfacePoint, step,
 };
 use palpate_testkit::{
     GRAVITY_M_S2, Random, energy_imbalance, finger, fixed_block, floor, free_block, half_extent, holding,
@@ -194,6 +194,48 @@ fn tip_that_starts_inside_has_no_contact_until_it_has_left() {
 }
 
 #[test]
+fn a_tip_that_falls_silent_comes_back_to_where_it_touched() {
+    // Damped, so that it is at rest again after the stall.
+    let body = with_stiffness_damping(&fixed_block(), 50.0 * H);
+    let radius = 0.004;
+    let coupling = Some(Coupling { stiffness: 300.0, damping: 0.5 });
+    let top = half_extent(&body, 1);
+    for (mode, is_back) in [(DeviceMode::Suspended, true), (DeviceMode::Inactive, false)] {
+        let devices = vec![DeviceParameters { coupling, ..finger(radius, 0.03, 0.0) }];
+        let parameters = ModelParameters { devices, ..ModelParameters::default() };
+        let (model, mut state) =
+            model_and_state(parameters, vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
+        let start = state.output().energy.stored();
+        let mut felt = [DVec3::ZERO; 2];
+        for number in 0..8000 {
+            // The hand goes 5 mm into the surface, and its centre with it.
+            let depth = (f64::from(number) * 2e-5).min(radius + 0.005);
+            let mut input = touching(&[DVec3::Y * (top + radius - depth) + DVec3::X * 0.02]);
+            if (4000..4100).contains(&number) {
+                input.devices[0].mode = mode;
+            }
+            let output = step(&model, &mut state, &input);
+            let force = output.devices[0].force_on_hand;
+            match number {
+                3999 => felt[0] = force,
+                4000..4100 => assert_eq!(force, DVec3::ZERO),
+                7999 => felt[1] = force,
+                _ => {}
+            }
+            // A tip that comes back is not thrown out.
+            assert!(force.length() < 1.5 * felt[0].length().max(1.0), "step {number}: {force}");
+            assert!(open(output, start).abs() < LEDGER_ROUND_OFF_J, "step {number}");
+        }
+        assert!(felt[0].y > 0.1, "{felt:?}");
+        if is_back {
+            assert!((felt[1] - felt[0]).length() < 0.02 * felt[0].length(), "{felt:?}");
+        } else {
+            assert_eq!(felt[1], DVec3::ZERO, "its centre begins inside");
+        }
+    }
+}
+
+#[test]
 fn random_tips_extract_no_energy_and_the_state_stays_finite() {
     let soft = Some(Coupling { stiffness: 100.0, damping: 0.2 });
     // The last two have a residual compliance that relaxes in ten steps.
@@ -227,7 +269,12 @@ fn random_tips_extract_no_energy_and_the_state_stays_finite() {
                     _ => centre + goals[device] * 2.0,
                 };
             }
-            let output = step(&model, &mut state, &touching(&hands));
+            let mut input = touching(&hands);
+            // The first device stalls now and then.
+            if number % 400 > 350 {
+                input.devices[0].mode = DeviceMode::Suspended;
+            }
+            let output = step(&model, &mut state, &input);
             for hand in hands.iter_mut().filter(|hand| !hand.is_finite()) {
                 *hand = centre + DVec3::X;
             }

@@ -80,6 +80,9 @@ impl From<PoseMessage> for Pose {
 pub(super) struct DeviceMessage {
     /// Whether the device is active.
     pub present: bool,
+    /// Whether it is silent for now.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub suspended: bool,
     pub position: Xyz,
     pub force: Xyz,
     pub proxy: Xyz,
@@ -249,13 +252,14 @@ impl Serialize for StepMessageOf<'_> {
         let device = |at: usize| {
             let (input, output) = (&record.input.devices[at], &record.devices[at]);
             DeviceMessage {
-                present: input.mode != DeviceMode::Inactive,
+                present: input.mode.is_active(),
+                suspended: input.mode == DeviceMode::Suspended,
                 position: input.position.into(),
                 force: output.force_on_hand.into(),
                 proxy: output.proxy.into(),
                 holds: match input.mode {
                     DeviceMode::Held(grasp) => Some(grasp.into()),
-                    DeviceMode::Inactive | DeviceMode::Touch => None,
+                    DeviceMode::Inactive | DeviceMode::Suspended | DeviceMode::Touch => None,
                 },
             }
         };

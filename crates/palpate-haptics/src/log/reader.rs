@@ -152,6 +152,7 @@ impl LoggedStep {
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
             let mode = match device.holds {
+                _ if device.suspended => DeviceMode::Suspended,
                 _ if !device.present => DeviceMode::Inactive,
                 Some(hold) => DeviceMode::Held(hold.into()),
                 None => *mode,

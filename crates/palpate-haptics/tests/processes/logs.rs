@@ -72,7 +72,7 @@ fn a_log_replays_bit_for_bit_and_reports_the_first_difference() {
             let logged = logged.expect("a step");
             assert_eq!(logged.step, at as u64 + 1);
             let mut input = logged.input(&names(), &[DeviceMode::Touch]).expect("an input");
-            away += u32::from(input.devices[0].mode == DeviceMode::Inactive);
+            away += u32::from(input.devices[0].mode == DeviceMode::Suspended);
             if other == Some(logged.step) {
                 input.devices[0] = DeviceInput::touching(DVec3::X * 0.02);
             }

@@ -6,7 +6,7 @@ use palpate::DeviceMode;
 use palpate_haptics::{Effort, Motion};
 
 #[test]
-fn a_silent_device_is_inactive_and_comes_back_while_the_object_moves_on() {
+fn a_silent_device_is_suspended_and_comes_back_while_the_object_moves_on() {
     let model = model(1, 300.0);
     let edge = half_width(&model) + 0.004;
     let (mut force, mut ports) = process(&model);
@@ -31,7 +31,7 @@ fn a_silent_device_is_inactive_and_comes_back_while_the_object_moves_on() {
         last = port.newest();
         assert_eq!((last.sequence, last.time_s), (tick, now_s));
         if tick == 360 {
-            assert_eq!(force.input().devices[0].mode, DeviceMode::Inactive, "60 ms later it is away");
+            assert_eq!(force.input().devices[0].mode, DeviceMode::Suspended, "60 ms later it is away");
             silent_force = last.force.length();
             speed_then = force.state().output().objects[0].twist.linear.x;
         }
@@ -46,4 +46,30 @@ fn a_silent_device_is_inactive_and_comes_back_while_the_object_moves_on() {
     assert_eq!(silent_force, 0.0);
     assert!(back > 0.05, "it is felt again: {back} N");
     assert!(last.absorbed_j.is_finite() && last.absorbed_j > 0.0);
+}
+
+#[test]
+fn a_press_is_felt_again_after_a_stall() {
+    let model = model(1, 300.0);
+    let (mut force, mut ports) = process(&model);
+    let mut forces = [0.0; 2];
+    for tick in 1..=1200_u64 {
+        let now_s = tick as f64 * STEP_S;
+        // The hand stays 2 mm inside the body, which moves on under the press; its thread stalls for 0.2 s.
+        let x = force.state().output().objects[0].pose.position.x;
+        if !(600..800).contains(&tick) {
+            let depth = (0.004 - 2e-5 * tick as f64).max(-0.002);
+            let position = DVec3::X * (x + half_width(&model) + 0.004 + depth);
+            ports[0].send(Motion { sequence: tick, time_s: now_s, position, ..Motion::default() });
+        }
+        force.cycle(now_s);
+        let felt = ports[0].newest().force.length();
+        match tick {
+            600 => forces[0] = felt,
+            700 => assert_eq!(felt, 0.0, "nothing while it is silent"),
+            1200 => forces[1] = felt,
+            _ => {}
+        }
+    }
+    assert!(forces[0] > 0.03 && forces[1] > 0.5 * forces[0], "{forces:?} N");
 }

@@ -99,7 +99,7 @@ impl FrameEncoder {
         });
         for (input, output) in devices.iter().zip(&snapshot.devices) {
             out.u32(match input.mode {
-                DeviceMode::Inactive => 0,
+                DeviceMode::Inactive | DeviceMode::Suspended => 0,
                 DeviceMode::Touch => 1,
                 DeviceMode::Held(_) => 2,
             });

@@ -7,7 +7,6 @@ use crate::contact::Constraint;
 use crate::device::{DeviceParameters, DeviceState};
 use crate::energy::EnergyLedger;
 use crate::object::ObjectState;
-use glam::DVec3;
 
 /// Add a contact's work over the step to the ledgers of its objects: the input by the other side, and the losses between.
 pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut [ObjectState]) {
@@ -33,20 +32,19 @@ pub(super) fn coupling(
     device: &mut DeviceState,
     couplings: &mut EnergyLedger,
 ) {
-    let stored =
-        |stretch: DVec3| 0.5 * parameters.coupling.map_or(0.0, |c| c.stiffness) * stretch.length_squared();
     let before = device.start - device.proxy;
     if !device.active {
         // An inactive device loses what its coupling stored.
-        couplings.coupling -= stored(before);
-        couplings.dissipated += stored(before);
+        couplings.coupling -= parameters.stored(before);
+        couplings.dissipated += parameters.stored(before);
         device.proxy = device.start;
         return;
     }
     // Without force the stretch relaxes as the damper lets it: a proxy that was pulled off a surface does not fall into it.
     let after = device.target - device.proxy_under_force();
     if parameters.coupling.is_some() {
-        let (work, change) = (device.force.dot(after - before), stored(after) - stored(before));
+        let (work, change) =
+            (device.force.dot(after - before), parameters.stored(after) - parameters.stored(before));
         couplings.input += work;
         couplings.coupling += change;
         couplings.dissipated += work - change;

@@ -25,11 +25,13 @@ mod accounting;
 mod output;
 
 use crate::collision::{
-    CandidateSide, Collider, CollisionContext, ContactCandidate, ContactId, ContactLaw, FeatureId, OtherSide,
-    TipPair, match_contacts,
+    CandidateSide, Collider, CollisionContext, Contact, ContactCandidate, ContactId, ContactLaw, FeatureId,
+    OtherSide, TipPair, match_contacts,
 };
 use crate::contact::{Constraint, ContactProblem, SOLVER, SolverReport, StepRules, UNSOLVED};
+use crate::device::{DeviceState, LastTouch};
 use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
+use crate::object::ObjectState;
 use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
 use crate::spatial::Pose;
@@ -101,7 +103,7 @@ fn move_obstacles(state: &mut State, input: &Input) {
 fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i DeviceInput> {
     let device_input = input.devices.get(device)?;
     let is_allowed = match &device_input.mode {
-        DeviceMode::Inactive => false,
+        DeviceMode::Inactive | DeviceMode::Suspended => false,
         DeviceMode::Held(grasp) => model.accepts(grasp),
         DeviceMode::Touch => true,
     };
@@ -110,7 +112,8 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, obstacles, contacts, inside, levels, workspace, output, .. } = state;
+    let State { steps, objects, devices, obstacles, contacts, inside, levels, couplings, workspace, output } =
+        state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
     let step = *steps;
@@ -119,18 +122,28 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         CollisionContext { scene, states: objects, contacts, levels, workspace: collision, step };
     let touchable = || (0..model.objects.len()).filter(|&at| model.objects[at].is_touchable());
     for (number, device) in devices.iter_mut().enumerate() {
-        let is_asked = input.devices.get(number).is_some_and(|d| d.mode != DeviceMode::Inactive);
+        let is_asked = input.devices.get(number).is_some_and(|d| d.mode.is_active());
         let Some(device_input) = usable(model, input, number) else {
             output.status.rejected_inputs += u32::from(is_asked);
             device.active = false;
+            let is_suspended = input.devices.get(number).is_some_and(|d| d.mode == DeviceMode::Suspended);
+            device.last_touch = device.last_touch.filter(|_| is_suspended);
             continue;
         };
         // A device that was inactive, or held a point, starts where it is.
         let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
         let touches = device_input.mode == DeviceMode::Touch;
-        let is_new = touches && (!device.active || held);
+        let mut is_new = touches && (!device.active || held);
         device.active &= touches != held;
         let (target, parameters) = (device_input.position, &model.parameters.devices[number]);
+        let last_touch = device.last_touch.filter(|_| is_new && parameters.coupling.is_some());
+        if let Some(proxy) = last_touch.and_then(|touch| context.returning_proxy(number, &touch, target)) {
+            (device.active, device.start, device.proxy) = (true, target, proxy);
+            is_new = false;
+            // The hand went there while nobody looked.
+            couplings.coupling += parameters.stored(target - proxy);
+            couplings.input += parameters.stored(target - proxy);
+        }
         device.begin(parameters, model.parameters.step_s, target, target);
         if let DeviceMode::Held(grasp) = device_input.mode {
             let collider = Collider::Device(number);
@@ -259,6 +272,7 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
     }
+    remember_touches(objects, devices, contacts);
     let gravity = model.parameters.gravity;
     for (object, own) in model.objects.iter().zip(objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
@@ -277,4 +291,18 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::coupling(parameters, device, couplings);
     }
     obstacles.copy_from_slice(&workspace.next_obstacles);
+}
+
+/// Remember where each tip touches.
+fn remember_touches(objects: &[ObjectState], devices: &mut [DeviceState], contacts: &[Contact]) {
+    devices.iter_mut().filter(|device| device.active).for_each(|device| device.last_touch = None);
+    for contact in contacts.iter().filter(|contact| !contact.is_held()) {
+        let OtherSide::Device(number) = contact.other else { continue };
+        let (object, force) = (contact.object(), contact.force.length());
+        let last_touch = &mut devices[number].last_touch;
+        if force > last_touch.map_or(0.0, |touch| touch.force) {
+            let point = objects[object].points.of(contact.slot).location.point;
+            *last_touch = Some(LastTouch { object, point, force });
+        }
+    }
 }

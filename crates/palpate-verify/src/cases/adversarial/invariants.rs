@@ -4,7 +4,7 @@ use super::random_device::RandomDevice;
 use crate::check::Check;
 use crate::run_invariants::ROUND_OFF;
 use glam::DVec3;
-use palpate::{Collider, DeviceInput, DeviceMode, Input, Model, Output};
+use palpate::{Collider, DeviceInput, Input, Model, Output};
 
 /// The solver's loosest tolerance, as a share of the object's size (docs/contact.md); what is worse is reported in the status.
 const LOOSE: f64 = 1e-5;
@@ -204,7 +204,7 @@ impl<'a> InvariantChecker<'a> {
     ) {
         let out = &output.devices[device];
         let force = out.force_on_hand.length();
-        let present = given.mode != DeviceMode::Inactive && given.position.is_finite();
+        let present = given.mode.is_active() && given.position.is_finite();
         if !present {
             self.violations.stuck.count_if(force != 0.0, at);
             self.before[device] = None;

@@ -15,9 +15,9 @@ use crate::collision::deformed_surface::{
 };
 use crate::collision::parameters::{COLLISION, MAX_ITERATIONS, ROUND_OFF};
 use crate::collision::proximity::ProximityQuery;
-use crate::device::{DeviceParameters, DeviceState};
+use crate::device::{DeviceParameters, DeviceState, LastTouch};
 use crate::response::{Body, ContactLocation, Footprint};
-use crate::surface::SurfacePoint;
+use crate::surface::{SurfacePoint, area_normal, at_weights};
 use glam::DVec3;
 
 /// Upper limit of samples along a slide.
@@ -75,13 +75,7 @@ impl CollisionContext<'_> {
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
         if is_new || *inside {
-            let Some(nearest) = ProximityQuery::nearest(&mut surface, start, f64::INFINITY) else { return };
-            query.triangles_within(
-                &mut surface,
-                start,
-                nearest.distance * (1.0 + ROUND_OFF) + ROUND_OFF * body.edge,
-            );
-            *inside = query.is_inside(body, start);
+            *inside = is_inside(query, &mut surface, start);
             if *inside {
                 return;
             }
@@ -112,6 +106,33 @@ impl CollisionContext<'_> {
             self.sweep_tip(&mut contacts, &path);
         }
         self.push_tip_candidates(&contacts, number, &path);
+    }
+
+    /// Proxy [m, world] of a device that comes back at a target inside the object which it touched: outside, beside the
+    /// material point of that touch. None if it comes back outside.
+    ///
+    /// # Real time
+    pub(crate) fn returning_proxy(
+        &mut self,
+        number: usize,
+        touch: &LastTouch,
+        target: DVec3,
+    ) -> Option<DVec3> {
+        let (own, body) = (&self.states[touch.object], &self.scene.objects[touch.object].body);
+        let parameters = &self.scene.devices[number];
+        let footprint = body.footprint(parameters.patch_radius);
+        let positions = &mut self.workspace.positions[touch.object];
+        let moment = SurfaceTime::StepStart(self.step);
+        let mut surface =
+            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+        let pose = own.rigid.pose;
+        if !is_inside(&mut self.workspace.query, &mut surface, pose.body_from_world(target)) {
+            return None;
+        }
+        let corners = surface.corners(touch.point.triangle);
+        let normal = area_normal(corners).normalize_or_zero();
+        let beside = at_weights(corners, touch.point.weights) + normal * parameters.tip_radius;
+        Some(pose.world_from_body(beside))
     }
 
     /// Continue the incremental rebuild of a device's triangle cache on an object.
@@ -268,6 +289,14 @@ impl CollisionContext<'_> {
             });
         }
     }
+}
+
+/// Whether a point [m, body] is inside a surface, by the triangles nearest to it.
+fn is_inside(query: &mut ProximityQuery, surface: &mut DeformedSurface, point: DVec3) -> bool {
+    let Some(nearest) = ProximityQuery::nearest(surface, point, f64::INFINITY) else { return false };
+    let reach = nearest.distance * (1.0 + ROUND_OFF) + ROUND_OFF * surface.body.edge;
+    query.triangles_within(surface, point, reach);
+    query.is_inside(surface.body, point)
 }
 
 /// Number of a tip contact; none for a held point.
