@@ -5,6 +5,7 @@ mod bad_input;
 mod contacts;
 mod couplings;
 mod devices;
+mod experiments;
 mod exports;
 mod glb;
 mod old_logs;

@@ -57,8 +57,9 @@ pub(super) struct ObjectEntry {
 #[serde(deny_unknown_fields)]
 pub(super) struct PlaneEntry {
     pub name: Option<Spanned<String>>,
-    pub point: Numbers<3>,
+    pub point: Option<Spanned<Numbers<3>>>,
     pub normal: Spanned<Numbers<3>>,
+    pub path: Option<PathEntry>,
     pub friction: Option<Spanned<f64>>,
 }
 

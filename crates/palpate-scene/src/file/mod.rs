@@ -142,7 +142,7 @@ fn assemble(
     }
     let mut obstacles = Vec::new();
     for (number, entry) in file.plane.iter().enumerate() {
-        let (obstacle, placed) = obstacles::read_plane(source, entry.get_ref(), number)?;
+        let (obstacle, placed) = obstacles::read_plane(source, entry, number)?;
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
@@ -287,7 +287,8 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let obstacles = file.obstacle.iter().map(Spanned::get_ref);
     let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
-    let files = recordings.chain(paths).chain(meshes).chain(moves);
+    let planes = file.plane.iter().filter_map(|plane| Some(&plane.get_ref().path.as_ref()?.file));
+    let files = recordings.chain(paths).chain(planes).chain(meshes).chain(moves);
     let mut inputs = vec![source.path.to_path_buf()];
     inputs.extend(files.map(|file| source.named_path(file.get_ref())));
     inputs

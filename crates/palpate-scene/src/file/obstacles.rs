@@ -6,7 +6,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::mesh_source;
 use crate::scene::SceneObstacle;
 use crate::warning::{Warning, WarningKind};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use palpate::{Obstacle, ObstacleMesh, Pose, Shape};
 use palpate_haptics::{Columns, unit_quaternion};
 use std::sync::Arc;
@@ -15,21 +15,35 @@ use toml::Spanned;
 /// Plane; without a name it is called by its number.
 pub(super) fn read_plane(
     source: &Source,
-    plane: &PlaneEntry,
+    entry: &Spanned<PlaneEntry>,
     number: usize,
 ) -> Result<(Obstacle, SceneObstacle), SceneError> {
+    let plane = entry.get_ref();
     let given = plane.normal.get_ref().0;
     let Some(normal) = DVec3::from_array(given).try_normalize() else {
         let message = format!("normal is {given:?}, expected a vector that is not zero");
         return source.fail(plane.normal.span(), SceneErrorKind::OutOfRange, "normal", message);
     };
-    let pose = Pose { position: DVec3::from_array(plane.point.0), orientation: DQuat::IDENTITY };
     let friction = source.friction(plane.friction.as_ref())?;
     let name = name_or(plane.name.as_ref(), "plane", number);
-    Ok((
-        Obstacle { shape: Shape::Plane { normal }, pose, friction },
-        SceneObstacle { name, path: None, start: pose },
-    ))
+    let (start, path) = match (&plane.point, &plane.path) {
+        (Some(point), None) => {
+            (Pose { position: DVec3::from_array(point.get_ref().0), ..Pose::IDENTITY }, None)
+        }
+        (None, Some(path)) => (Pose::IDENTITY, Some(source.motion_path(path, Columns::Pose)?)),
+        (Some(point), Some(_)) => {
+            let message = "the point is in the path: leave one of the two out";
+            return source.fail(point.span(), SceneErrorKind::Conflict, "point", message);
+        }
+        (None, None) => {
+            let message = format!(
+                "the plane {name:?} needs a point on it, point = [x, y, z], or path = {{ file = \"…\" }} if it moves"
+            );
+            return source.fail(entry.span(), SceneErrorKind::Missing, "point", message);
+        }
+    };
+    let placed = SceneObstacle { name, path, start };
+    Ok((Obstacle { shape: Shape::Plane { normal }, pose: placed.pose_at(0.0), friction }, placed))
 }
 
 /// Obstacle; without a name it is called by its number.

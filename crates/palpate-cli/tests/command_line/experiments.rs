@@ -1,0 +1,154 @@
+//! Scenes of experiments: planes that move, against statics and the laws of motion.
+
+use crate::workplace::{Table, Workplace};
+use std::fmt::Write;
+
+/// Arguments that record a stiff cube of 0.1 m and 1 kg, so damped that it settles within a tenth of a second.
+const STIFF_CUBE: [&str; 15] = [
+    "record",
+    "box:0.1x0.1x0.1/2x2x2",
+    "--order",
+    "1",
+    "--young",
+    "2e6",
+    "--poisson",
+    "0.3",
+    "--density",
+    "1000",
+    "--rayleigh",
+    "0,3e-4",
+    "--modes",
+    "30",
+    "-o",
+];
+
+const MASS: f64 = 1.0;
+const GRAVITY: f64 = 9.81;
+const STEP: f64 = 1e-3;
+
+/// Round-off of an energy ledger of thousands of steps, relative to its largest term [1].
+const LEDGER_ROUND_OFF: f64 = 1e-11;
+
+fn workplace() -> Workplace {
+    let workplace = Workplace::new();
+    workplace.succeed(&[&STIFF_CUBE[..], &["cube.palp"]].concat());
+    workplace
+}
+
+/// Rows of a path over so many steps from a function of time.
+fn rows(steps: usize, of: impl Fn(f64) -> Vec<f64>) -> String {
+    let mut text = String::new();
+    for number in 0..=steps {
+        let t = number as f64 * STEP;
+        let cells: Vec<String> = of(t).iter().map(|cell| format!("{cell:?}")).collect();
+        writeln!(text, "{t:?},{}", cells.join(",")).expect("a string");
+    }
+    text
+}
+
+/// The defect of every row is round-off.
+fn check_energy(table: &Table) {
+    let names = ["kinetic", "elastic", "potential", "input", "friction"];
+    let columns = names.map(|name| table.column(&format!("energy.{name}")));
+    let scale = columns.iter().flatten().fold(0.0_f64, |most, energy| most.max(energy.abs()));
+    for (row, defect) in table.column("energy.defect").into_iter().enumerate() {
+        assert!(defect.abs() < LEDGER_ROUND_OFF * scale, "row {row}: {defect} J of {scale} J");
+    }
+}
+
+#[test]
+fn a_cube_slides_down_a_plane_that_tilts_when_the_slope_reaches_the_coefficient_of_friction() {
+    /// Coefficient of friction [1], and slip that is seen [m].
+    const FRICTION: f64 = 0.3;
+    const SLIP: f64 = 2e-5;
+    let workplace = workplace();
+    // From 10 % below the slope of sliding to 10 % above it in 4 s, after 0.5 s to settle.
+    let angle = |t: f64| (FRICTION * (0.9 + 0.2 * ((t - 0.5) / 4.0).max(0.0))).atan();
+    let (sin, cos) = (0.5 * angle(0.0)).sin_cos();
+    let up = [angle(0.0).sin(), angle(0.0).cos()].map(|axis| 0.05 * axis);
+    workplace.write(
+        "tilt.csv",
+        rows(4500, |t| {
+            let (sin, cos) = (0.5 * angle(t)).sin_cos();
+            vec![0.0, 0.0, 0.0, cos, 0.0, 0.0, -sin]
+        }),
+    );
+    workplace.write(
+        "scene.toml",
+        format!(
+            "gravity = [0.0, -{GRAVITY}, 0.0]\n[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [{}, {}, \
+             0.0]\norientation = [{cos}, 0.0, 0.0, {}]\n[[plane]]\nname = \"ramp\"\nnormal = [0.0, 2.0, 0.0]\npath = {{ \
+             file = \"tilt.csv\" }}\nfriction = {FRICTION}\n",
+            up[0], up[1], -sin
+        ),
+    );
+    let text = workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv"]);
+    assert!(text.starts_with("4500 steps"), "to the end of the plane's path: {text}");
+    assert!(text.contains("from hands and obstacles"), "{text}");
+    let table = Table::parse(&workplace.text("steps.csv"));
+    let places = table.vectors("cube", ["px", "py", "pz"]);
+    let along: Vec<f64> = table
+        .column("t")
+        .iter()
+        .zip(&places)
+        .map(|(t, place)| angle(*t).cos() * place.x - angle(*t).sin() * place.y)
+        .collect();
+    let slides = along[500..].iter().position(|x| x - along[499] > SLIP).expect("it slides") + 500;
+    let slope = angle(slides as f64 * STEP).tan();
+    // It slips by SLIP some 0.1 s after the slope of sliding: 0.5 % more.
+    assert!((slope / FRICTION - 1.0).abs() < 0.01, "slope {slope} for a coefficient of {FRICTION}");
+    check_energy(&table);
+}
+
+#[test]
+fn a_plane_that_accelerates_upwards_carries_weight_and_inertia() {
+    /// Acceleration of the plane [m/s²].
+    const ACCELERATION: f64 = 2.0;
+    let workplace = workplace();
+    workplace.write("lift.csv", rows(1000, |t| vec![0.0, 0.5 * ACCELERATION * t * t, 0.0]));
+    workplace.write(
+        "scene.toml",
+        format!(
+            "gravity = [0.0, -{GRAVITY}, 0.0]\n[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [0.0, \
+             0.05, 0.0]\n[[plane]]\nnormal = [0.0, 1.0, 0.0]\npath = {{ file = \"lift.csv\" }}\n"
+        ),
+    );
+    workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv", "--contacts", "contacts.csv"]);
+    let table = Table::parse(&workplace.text("steps.csv"));
+    let forces = workplace.text("contacts.csv");
+    let late = forces.lines().skip(1).map(|line| line.split(',').collect::<Vec<_>>());
+    let impulse: f64 = late
+        .filter(|cells| cells[0].parse::<f64>().expect("a time") > 0.5 + 0.5 * STEP)
+        .map(|cells| cells[10].parse::<f64>().expect("a force") * STEP)
+        .sum();
+    // Over the second half: the impulse is that of weight and inertia, and the cube moves as the plane does.
+    let expected = MASS * (GRAVITY + ACCELERATION) * 0.5;
+    assert!((impulse / expected - 1.0).abs() < 1e-3, "{impulse} N·s, expected {expected}");
+    let speed = table.column("cube.vy").last().copied().expect("a row");
+    assert!((speed - ACCELERATION).abs() < 2e-3, "{speed} m/s");
+    check_energy(&table);
+}
+
+#[test]
+fn a_plane_has_a_point_or_a_path() {
+    let workplace = workplace();
+    workplace.write("lift.csv", "0,0,0,0\n");
+    let fail = |plane: &str| {
+        let object = "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\n";
+        workplace.write("scene.toml", format!("{object}[[plane]]\nnormal = [0, 1, 0]\n{plane}"));
+        workplace.fail(&["run", "scene.toml"])
+    };
+    assert_eq!(
+        fail("point = [0, 0, 0]\npath = { file = \"lift.csv\" }\n"),
+        "scene.toml: line 6: the point is in the path: leave one of the two out"
+    );
+    assert_eq!(
+        fail(""),
+        "scene.toml: line 4: the plane \"plane\" needs a point on it, point = [x, y, z], or path = { file = \"…\" } if it moves"
+    );
+    workplace.write("lift.csv", "0,0,0\n");
+    assert_eq!(
+        fail("path = { file = \"lift.csv\" }\n"),
+        "scene.toml: line 6: path lift.csv: line 1: 3 numbers, expected the four t,x,y,z or the eight t,x,y,z,qw,qx,qy,qz"
+    );
+}
