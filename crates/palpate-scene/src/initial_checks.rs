@@ -138,8 +138,8 @@ fn in_obstacle(object: &Placed, name: &str, shape: &Shape, pose: Pose) -> Option
     if depth > object.allowed() {
         let wholly = if whole { ", wholly" } else { "" };
         let message = format!(
-            "the object {:?} begins {} inside {name:?}{wholly}: contact does not push out what begins inside; move it by as \
-             much along {}",
+            "the object {:?} begins {} inside {name:?}{wholly}: contact lets it out, without velocity, within a tenth of a \
+             second; move it by as much along {}",
             object.name,
             millimetres(depth),
             direction(out)
@@ -154,8 +154,8 @@ fn in_obstacle(object: &Placed, name: &str, shape: &Shape, pose: Pose) -> Option
     };
     (distance < -object.allowed()).then(|| {
         let message = format!(
-            "the obstacle {name:?} begins inside the object {:?}, its centre {} deep: contact does not push out what begins \
-             inside; move one of them",
+            "the obstacle {name:?} begins inside the object {:?}, its centre {} deep: contact finds only its \
+             corners; move one of them",
             object.name,
             millimetres(-distance)
         );
@@ -181,8 +181,8 @@ fn overlap(a: &Placed, b: &Placed) -> Option<Warning> {
     let depth = [depth_in(a, b), depth_in(b, a)].into_iter().flatten().fold(0.0, f64::max);
     (depth > a.allowed().min(b.allowed())).then(|| {
         let message = format!(
-            "the objects {:?} and {:?} overlap by {} at the start: contact does not push out what begins inside; move one of \
-             them",
+            "the objects {:?} and {:?} overlap by {} at the start: contact lets out what is less than half a mesh edge \
+             deep; move one of them",
             a.name,
             b.name,
             millimetres(depth)

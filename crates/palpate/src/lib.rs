@@ -48,6 +48,7 @@ extern crate alloc;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod bounded_vec;
 mod collision;
 mod contact;
 mod device;

@@ -1,5 +1,6 @@
 //! State of a scene: what changes from step to step, and the buffers of a step.
 
+use crate::bounded_vec::BoundedVec;
 use crate::collision::{CollisionScene, CollisionWorkspace, Contact, LevelOfDetail};
 use crate::contact::{Constraint, Solver};
 use crate::device::DeviceState;
@@ -27,7 +28,7 @@ pub struct ObjectSnapshot {
     pub modes: Vec<OscillatorState>,
 }
 
-/// State of a scene.
+/// State of a scene. A clone goes on as its original does; its output and some buffers grow in its first steps.
 #[derive(Debug, Clone)]
 pub struct State {
     /// Steps since the start.
@@ -37,7 +38,7 @@ pub struct State {
     /// Obstacle poses.
     pub(crate) obstacles: Vec<Pose>,
     /// Contact cache, in the order of the ids.
-    pub(crate) contacts: Vec<Contact>,
+    pub(crate) contacts: BoundedVec<Contact>,
     /// Whether a proxy is inside an object without having crossed its surface: devices × objects.
     pub(crate) inside: Vec<bool>,
     /// Levels of detail: objects × (obstacles + objects).
@@ -54,9 +55,9 @@ pub(crate) struct Workspace {
     pub(crate) collision: CollisionWorkspace,
     pub(crate) solver: Solver,
     /// Contacts of the next step, while they are matched.
-    pub(crate) spare: Vec<Contact>,
+    pub(crate) spare: BoundedVec<Contact>,
     /// Constraints of the contacts.
-    pub(crate) constraints: Vec<Constraint>,
+    pub(crate) constraints: BoundedVec<Constraint>,
     pub(crate) next_obstacles: Vec<Pose>,
 }
 
@@ -88,15 +89,15 @@ impl State {
         Self {
             steps: 0,
             devices: vec![DeviceState::new(); devices],
-            contacts: Vec::with_capacity(contacts),
+            contacts: BoundedVec::new(contacts),
             inside: vec![false; devices * count],
             levels: vec![LevelOfDetail::default(); count * (obstacles.len() + count)],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
                 collision: CollisionWorkspace::new(model.collision_scene(), contacts),
                 solver: Solver::new(count, devices, contacts, parameters.uses_samples(count)),
-                spare: Vec::with_capacity(contacts),
-                constraints: Vec::with_capacity(contacts),
+                spare: BoundedVec::new(contacts),
+                constraints: BoundedVec::new(contacts),
                 next_obstacles: obstacles.clone(),
             },
             obstacles,

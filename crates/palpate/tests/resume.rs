@@ -6,7 +6,7 @@ use palpate::{
     ResidualFieldCache, State, Twist, step,
 };
 use palpate_testkit::{
-    GRAVITY_M_S2, finger, free_block, grasp, half_extent, holding, model_and_state, start_at, touching,
+    GRAVITY_M_S2, finger, floor, free_block, grasp, half_extent, holding, model_and_state, start_at, touching,
 };
 
 /// Round-off of an energy ledger [1], relative above 1 J: four hundred sums.
@@ -149,4 +149,33 @@ fn cached_residual_fields_give_equal_displacements() {
         deepest = deepest.max(size);
     }
     assert!(deepest > LEAST_DEPTH_M, "they press: {deepest} m");
+}
+
+#[test]
+fn a_clone_goes_on_as_its_original() {
+    // Cloned before anything touches, when its buffers are empty, and in a press between a floor and a finger.
+    let body = free_block();
+    let parameters = ModelParameters {
+        gravity: DVec3::Y * -9.81,
+        obstacles: vec![floor(0.4)],
+        devices: vec![finger(0.01, 0.03, 0.5)],
+        max_contact_samples: 12,
+        ..ModelParameters::default()
+    };
+    let start = start_at(DVec3::Y * 0.0505);
+    let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start)]);
+    let input = |number: u32| touching(&[DVec3::Y * (0.112 - 1e-5 * f64::from(number.min(600)))]);
+    let mut clones = vec![state.clone()];
+    let mut forces = 0;
+    for number in 0..800 {
+        if number == 400 {
+            clones.push(state.clone());
+        }
+        let output = step(&model, &mut state, &input(number)).clone();
+        forces += output.contacts.len();
+        for clone in &mut clones {
+            assert_eq!(&output, step(&model, clone, &input(number)), "step {number}");
+        }
+    }
+    assert!(forces > 5000, "{forces} contacts");
 }

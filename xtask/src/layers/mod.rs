@@ -19,6 +19,7 @@ use tree::{Edge, Tree};
 /// Floors of the runtime, lowest first: a module imports only from floors before its own.
 pub const FLOORS: &[&str] = &[
     "error",
+    "bounded_vec",
     "spatial",
     "energy",
     "surface",

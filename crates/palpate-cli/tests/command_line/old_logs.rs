@@ -1,12 +1,12 @@
-//! Logs of every form that was ever written (`data/logs`) still open and replay to their end: with the same numbers but for last
-//! digits since the residual compliance relaxes, with other ones before.
+//! Logs of every form that was ever written (`data/logs`) still open and replay to their end: with nearly the same numbers since the
+//! residual compliance relaxes, with other ones before.
 
 use crate::workplace::Workplace;
 use std::path::{Path, PathBuf};
 
-/// Largest relative difference of the first number that differs. The solver stops at residuals of 1e-8 of an object's size, so that
-/// forces of another version differ by some 1e-6 of theirs.
-const LAST_DIGITS: f64 = 1e-5;
+/// Largest relative difference of the first number that differs. Up to 0.2.0 a penetration of the solver's residual, 1e-8 of an
+/// object's size, was pushed out within steps; depenetration leaves it, which changes a first touch of 1e-4 N by some 1e-4 of it.
+const NEARLY: f64 = 2e-4;
 
 /// Logs of `data/logs/FORM`, sorted.
 fn logs(form: &str) -> Vec<PathBuf> {
@@ -38,7 +38,7 @@ fn logs_of_every_form_replay_to_their_end() {
                 let number = |key: &str| first[key].as_f64().expect("a number");
                 let (logged, computed) = (number("logged"), number("computed"));
                 let is_near = if relaxes {
-                    (computed - logged).abs() <= LAST_DIGITS * logged.abs()
+                    (computed - logged).abs() <= NEARLY * logged.abs()
                 } else {
                     (1.0 / INSTANT..INSTANT).contains(&(computed / logged))
                 };

@@ -1,8 +1,8 @@
 //! Contact candidates: what the narrow phase has found in a step.
 
 use super::contact::{ContactId, ContactLaw};
+use crate::bounded_vec::BoundedVec;
 use crate::response::ContactLocation;
-use alloc::vec::Vec;
 use glam::DVec3;
 
 /// A contact that a step should have.
@@ -33,7 +33,7 @@ pub(crate) enum CandidateSide {
 /// The candidates of a step; the buffer is made once.
 #[derive(Debug, Clone)]
 pub(crate) struct CandidateList {
-    pub(crate) list: Vec<ContactCandidate>,
+    pub(crate) list: BoundedVec<ContactCandidate>,
     /// Number of candidates without room in the buffer.
     pub(crate) dropped: u32,
 }
@@ -47,7 +47,7 @@ pub(crate) struct Mark {
 
 impl CandidateList {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self { list: Vec::with_capacity(capacity), dropped: 0 }
+        Self { list: BoundedVec::new(capacity), dropped: 0 }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -56,10 +56,10 @@ impl CandidateList {
     }
 
     pub(crate) fn push(&mut self, candidate: ContactCandidate) {
-        if self.list.len() < self.list.capacity() {
-            self.list.push(candidate);
-        } else {
+        if self.list.is_full() {
             self.dropped += 1;
+        } else {
+            self.list.push(candidate);
         }
     }
 

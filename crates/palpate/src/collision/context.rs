@@ -7,6 +7,7 @@ use super::level_of_detail::LevelOfDetail;
 use super::node_cache::NodePositionCache;
 use super::proximity::ProximityQuery;
 use super::triangle_cache::TriangleCache;
+use crate::bounded_vec::BoundedVec;
 use crate::device::DeviceParameters;
 use crate::object::{Object, ObjectState};
 use crate::obstacle::Obstacle;
@@ -31,7 +32,7 @@ pub(crate) struct CollisionWorkspace {
     /// Triangles near each device: devices × objects.
     pub(crate) triangles: Vec<TriangleCache>,
     /// Surface nodes that the broad phase leaves.
-    pub(crate) near_nodes: Vec<u32>,
+    pub(crate) near_nodes: BoundedVec<u32>,
     /// Modal coordinates at a time within the step.
     pub(crate) coordinates: Vec<f64>,
     pub(crate) candidates: CandidateList,
@@ -49,7 +50,7 @@ impl CollisionWorkspace {
             query: ProximityQuery::new(),
             positions: objects.iter().map(|o| NodePositionCache::new(&o.body)).collect(),
             triangles: per_device.collect(),
-            near_nodes: Vec::with_capacity(objects.iter().map(nodes).max().unwrap_or(0)),
+            near_nodes: BoundedVec::new(objects.iter().map(nodes).max().unwrap_or(0)),
             coordinates: vec![0.0; objects.iter().map(modes).max().unwrap_or(0)],
             candidates: CandidateList::new(contacts),
             level_changes: LevelChanges::new(contacts),

@@ -12,7 +12,7 @@ pub(crate) struct SolverParameters {
     pub(super) few_contacts: usize,
     /// Residual that is enough after a number of contact visits: `visits`, or `visits_with_samples` where contact samples stand
     /// for nodes, since they are no more exact.
-    pub(super) loose_tolerance: f64,
+    pub(crate) loose_tolerance: f64,
     pub(super) visits: u32,
     pub(super) visits_with_samples: u32,
     /// Residual that is used, and reported as unsolved, at the limit of sweeps.
@@ -37,7 +37,7 @@ pub(crate) struct SolverParameters {
     /// Denominator of a slipping contact's normal force, as a share of its normal compliance, below which it jams; the
     /// remainder shows as residual.
     pub(super) jam: f64,
-    /// Share of a penetration that is pushed out per step, as far as earlier losses pay for the work.
+    /// Share of a tip's penetration that is pushed out per step, as far as earlier losses pay for the work.
     pub(crate) recovery: f64,
 }
 

@@ -21,6 +21,8 @@ pub(crate) struct ObjectState {
     pub(crate) surface_motion: f64,
     /// Largest displacement of a contact point by contact forces in the last step [m].
     pub(crate) contact_displacement: f64,
+    /// Whether a device held a point of it in the last step.
+    pub(crate) is_held: bool,
     pub(crate) ledger: EnergyLedger,
     pub(crate) stored_at_start: f64,
 }
@@ -45,6 +47,7 @@ impl ObjectState {
             increment: RigidIncrement::default(),
             surface_motion: 0.0,
             contact_displacement: 0.0,
+            is_held: false,
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };

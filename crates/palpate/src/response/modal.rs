@@ -18,6 +18,7 @@ use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
 use super::spring_forces::{FORGOTTEN, RELAXING};
 use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
+use crate::bounded_vec::BoundedVec;
 use crate::recording::Recording;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -54,7 +55,7 @@ pub(crate) struct ModalState {
     /// Three rows J·Φ·B.
     weighted: Vec<f64>,
     /// Spring forces g of the residual compliance with their locations.
-    pub(super) spring_forces: Vec<SpringForce>,
+    pub(super) spring_forces: BoundedVec<SpringForce>,
     /// Spring forces at points, distributed to nodes.
     pub(super) nodal: NodalForces,
     /// Elastic energy of the residual compliance [J], ½·gᵀ·S·g.
@@ -74,7 +75,7 @@ impl ModalState {
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
-            spring_forces: Vec::with_capacity(capacity + if relaxes { RELAXING } else { 0 }),
+            spring_forces: BoundedVec::new(capacity + if relaxes { RELAXING } else { 0 }),
             nodal: NodalForces::new(nodes, if relaxes { nodes } else { capacity }),
             residual_energy: 0.0,
             max_residual: 0.0,

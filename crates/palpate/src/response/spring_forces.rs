@@ -46,7 +46,7 @@ impl ModalState {
             same.add(&spring);
             return;
         }
-        if springs.len() == springs.capacity() {
+        if springs.is_full() {
             let size = |at: &usize| springs[*at].force.length();
             if let Some(least) = (0..springs.len()).min_by(|a, b| size(a).total_cmp(&size(b))) {
                 springs.swap_remove(least);

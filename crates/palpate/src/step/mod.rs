@@ -22,6 +22,7 @@
 //! Equations: docs/theory.md (C38), (C44), (C45), (C46), (C49).
 
 mod accounting;
+mod depenetration;
 mod output;
 
 use crate::collision::{
@@ -195,7 +196,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
             point.start_arm = orientation * (point.rest + point.state.displacement);
         }
     }
-    // Losses pay for pushing out penetrations, shared among the contacts.
+    // Losses pay for pushing tips out, shared among their contacts; all else is moved apart at the end of the step.
     let mut budget = 0.5 * output.energy.lost().max(0.0);
     workspace.constraints.clear();
     for contact in contacts.iter() {
@@ -220,7 +221,8 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         }
         let mut constraint = Constraint::new(other - at(contact.object(), contact.slot));
         let gap = contact.gap(constraint.start);
-        if gap < 0.0 {
+        constraint.min_gap = gap.min(0.0);
+        if gap < 0.0 && matches!(contact.other, OtherSide::Device(_)) {
             let push = SOLVER.recovery * -gap;
             let cost = 2.0 * contact.force.length() * push;
             let paid = if cost > budget { 0.0 } else { push };
@@ -231,8 +233,8 @@ fn set_up_constraints(model: &Model, state: &mut State) {
     }
 }
 
-/// Solve for the contact forces. Losses of earlier steps must pay for pushing out penetrations: if they do not, penetrations
-/// stay as they are, and in the last resort their contacts carry no force.
+/// Solve for the contact forces. Losses of earlier steps must pay for pushing out tips: if they do not, penetrations stay as
+/// they are, and in the last resort contacts carry no force.
 fn solve(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, workspace, output, .. } = state;
     let paid = output.energy.lost().max(0.0);
@@ -268,13 +270,13 @@ fn solve(model: &Model, state: &mut State) {
 /// Integrate deformation and rigid motion with the forces held, and account for the energy.
 fn integrate(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
-    for (contact, constraint) in contacts.iter_mut().zip(&workspace.constraints) {
+    for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
     }
     remember_touches(objects, devices, contacts);
     let gravity = model.parameters.gravity;
-    for (object, own) in model.objects.iter().zip(objects) {
+    for (object, own) in model.objects.iter().zip(&mut *objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
         let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
@@ -283,6 +285,9 @@ fn integrate(model: &Model, state: &mut State) {
         let mut view = object.view(gravity, &own.rigid, &mut own.response);
         own.ledger.dissipated += view.advance(&mut own.points.points);
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
+    }
+    depenetration::depenetrate(model, objects, contacts, &workspace.constraints);
+    for (object, own) in model.objects.iter().zip(objects) {
         own.update_ledger(object, gravity);
         own.ledger.defect =
             own.ledger.stored() - own.stored_at_start - (own.ledger.input - own.ledger.lost());

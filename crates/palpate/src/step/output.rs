@@ -30,7 +30,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         }
     }
     output.contacts.clear();
-    for (contact, constraint) in contacts.iter().zip(&workspace.constraints) {
+    for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let own = &objects[contact.object()];
         let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
         let carries_force = contact.force != DVec3::ZERO;
@@ -51,7 +51,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
                 output.devices[device].proxy = point;
             }
         }
-        if carries_force && !contact.is_held() && output.contacts.len() < output.contacts.capacity() {
+        if carries_force && !contact.is_held() {
             output.contacts.push(ContactOutput {
                 object: contact.object(),
                 against: contact.id.collider,

@@ -2,6 +2,7 @@
 //! samples stand for them on both sides, against the decimated surface between samples.
 
 use super::point_surface::{MovingPoint, point_against_surface};
+use crate::bounded_vec::BoundedVec;
 use crate::collision::broad_phase::HalfSpace;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, OtherSide};
@@ -11,7 +12,6 @@ use crate::collision::parameters::COLLISION;
 use crate::collision::proximity::ProximityQuery;
 use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
-use alloc::vec::Vec;
 use glam::DVec3;
 
 impl CollisionContext<'_> {
@@ -160,7 +160,7 @@ impl Side<'_> {
         base: &Side,
         half_space: &HalfSpace,
         travel: f64,
-        near_nodes: &mut Vec<u32>,
+        near_nodes: &mut BoundedVec<u32>,
     ) {
         let Self { own, object, surface, .. } = self;
         let (pose, base_pose) = (own.rigid.pose, base.own.rigid.pose);
@@ -182,7 +182,7 @@ impl Side<'_> {
                 for node in surface.surface().triangles[triangle as usize] {
                     if surface.mark_node(node as usize)
                         && is_near(surface.modal_position(node as usize), residual)
-                        && near_nodes.len() < near_nodes.capacity()
+                        && !near_nodes.is_full()
                     {
                         near_nodes.push(node);
                     }
