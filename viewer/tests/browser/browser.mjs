@@ -110,16 +110,34 @@ export function pixelOf(page, right = 0, up = 0) {
   );
 }
 
-/** Waits until the object is at rest, or until the time is over. */
-export async function waitForRest(page, timeout = 15_000) {
+/** Waits until the object is at rest: it moves less than 0.2 mm between two frames at least 0.3 s of simulated time apart. */
+export async function waitForRest(page, timeout = 30_000) {
   const end = Date.now() + timeout;
-  let before = (await latestFrame(page)).pose;
+  let before = await latestFrame(page);
+  let moved = Infinity;
   while (Date.now() < end) {
-    await page.waitForTimeout(300);
-    const { pose } = await latestFrame(page);
-    if (Math.hypot(...pose.map((x, k) => x - before[k])) < 2e-4) return;
-    before = pose;
+    await page.waitForTimeout(100);
+    const now = await latestFrame(page);
+    if (now.time < before.time + 0.3) continue;
+    moved = Math.hypot(...now.pose.map((x, k) => x - before.pose[k]));
+    if (moved < 2e-4) return;
+    before = now;
   }
+  throw new Error(`the object is not at rest after ${timeout / 1000} s: it moved by ${moved} between the last two poses`);
+}
+
+/** Waits until paused pages show the same step. */
+export async function waitForSameStep(...pages) {
+  const steps = () => Promise.all(pages.map(async (page) => (await latestFrame(page)).step));
+  const end = Date.now() + 20_000;
+  let before = await steps();
+  while (Date.now() < end) {
+    await pages[0].waitForTimeout(500);
+    const now = await steps();
+    if (now.every((step) => step === now[0]) && now[0] === before[0]) return;
+    before = now;
+  }
+  throw new Error(`the paused pages show steps ${before.join(", ")}`);
 }
 
 /** Elements that overlap or leave the window. */

@@ -1,6 +1,6 @@
 // GPU reconstruction against the vertex stream.
 
-import { assert, waitForRest, waitForScene, assertNoConsoleErrors, pixelOf } from "./browser.mjs";
+import { assert, waitForRest, waitForSameStep, waitForScene, assertNoConsoleErrors, pixelOf } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 export const reconstructionCases = [
@@ -15,7 +15,6 @@ export const reconstructionCases = [
       const plain = await browser.page(url.href);
       await waitForScene(plain);
       // Paused while a pointer presses, so that residual displacements are included.
-      await modal.waitForTimeout(700);
       await waitForRest(modal);
       await modal.keyboard.press("g");
       const { x, y } = await pixelOf(modal);
@@ -26,7 +25,7 @@ export const reconstructionCases = [
       await modal.waitForTimeout(500);
       await modal.keyboard.press("Space");
       await modal.waitForSelector('[aria-label="Resume (Space)"]');
-      await modal.waitForTimeout(2500);
+      await waitForSameStep(modal, plain);
       const read = (page) =>
         page.evaluate(() => {
           const { sceneView } = window.palpate;

@@ -9,6 +9,7 @@ const INERTIA = (MASS * SIZE * SIZE) / 6;
 const FIRST_HZ = 17;
 const RESIDUAL_STIFFNESS = 900;
 const RESIDUAL_RADIUS = 0.014;
+const FLOOR_DRAG = 0.6;
 export const TIP = 0.006;
 
 const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
@@ -91,7 +92,11 @@ export class Box {
     this.velocity = add(this.velocity, scale(this.gravity, h));
     this.contacts = [];
     this.devices.forEach((device, i) => this.deviceContact(device, i, h));
-    if (this.floor) for (const point of this.floorPoints) this.floorContact(point, h);
+    if (this.floor) {
+      const first = this.contacts.length;
+      for (const point of this.floorPoints) this.floorContact(point, h);
+      for (const contact of this.contacts.slice(first)) this.floorFriction(contact, h);
+    }
     for (let k = 0; k < this.waves.length; k++) {
       const omega = 2 * Math.PI * FIRST_HZ * Math.sqrt(this.waves[k].square);
       this.speed[k] = (this.speed[k] - h * omega * omega * this.q[k]) / (1 + h * (6 + 0.12 * omega));
@@ -110,14 +115,21 @@ export class Box {
     const arm = add(point.rest, this.modalDisplacement(point.shape));
     const at = add(this.position, rotate(this.orientation, arm));
     if (at[1] >= 0) return;
-    const v = this.velocityAt(arm, point.shape);
-    const up = Math.max(0, -60 * at[1] - 0.25 * v[1]);
-    const side = Math.hypot(v[0], v[2]);
-    const grip = side > 0 ? Math.min(this.friction * up, 3 * side) / side : 0;
-    const force = [-grip * v[0], up, -grip * v[2]];
-    this.dissipated += Math.max(0, -dot(force, v)) * h * 0.5;
+    const force = [0, Math.max(0, -60 * at[1] - 0.25 * this.velocityAt(arm, point.shape)[1]), 0];
     this.applyForce(force, arm, point.shape, h);
-    this.contacts.push({ object: 0, kind: 1, number: 0, point: at, force, slip: side });
+    this.contacts.push({ object: 0, kind: 1, number: 0, point: at, force, slip: 0, arm, shape: point.shape });
+  }
+
+  /** Friction at a floor contact, after all normal forces: in between, they make the box spin, and it would creep. */
+  floorFriction(contact, h) {
+    const { arm, shape } = contact;
+    const v = add(this.velocity, cross(this.spin, rotate(this.orientation, arm)));
+    const slip = Math.hypot(v[0], v[2]);
+    const drag = slip > 0 ? Math.min(this.friction * contact.force[1], FLOOR_DRAG * slip) / slip : 0;
+    const force = [-drag * v[0], 0, -drag * v[2]];
+    this.dissipated += drag * slip * slip * h;
+    this.applyForce(force, arm, shape, h);
+    Object.assign(contact, { force: add(contact.force, force), slip });
   }
 
   deviceContact(device, number, h) {
