@@ -13,6 +13,7 @@ use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::{Mat, Side};
 use glam::DVec3;
+use std::ops::Range;
 
 /// Relative norm after orthogonalisation below which a column is linearly dependent.
 const DEPENDENT: f64 = 1e-10;
@@ -24,6 +25,32 @@ pub struct LoadedMode {
     pub square: f64,
     /// Modal participation of unit loads along x, y, z [1/√kg].
     pub gain: DVec3,
+}
+
+/// A mode with its participation at several places.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ModeAtPlaces {
+    /// Squared angular frequency ω² [rad²/s²].
+    pub square: f64,
+    /// Modal participation of unit loads along x, y, z at every place [1/√kg].
+    pub gains: Vec<DVec3>,
+}
+
+/// Equations of motion of the truncated modes, q̈ + K·q = B·f, in an M-orthonormal basis.
+pub(crate) struct ProjectedSystem {
+    /// K [1/s²].
+    stiffness: Mat<f64>,
+    /// B [1/√kg].
+    loads: Mat<f64>,
+    /// Number of basis columns after each block.
+    columns_of_blocks: Vec<usize>,
+}
+
+impl ModeAtPlaces {
+    /// The mode at one place.
+    pub fn at(&self, place: usize) -> LoadedMode {
+        LoadedMode { square: self.square, gain: self.gains[place] }
+    }
 }
 
 /// Rational Krylov spaces of loads, three columns per place.
@@ -79,48 +106,71 @@ impl KrylovSpaces {
         Ok(Self { loads, blocks })
     }
 
-    /// Substitutes of the truncated modes at one place, from the first `blocks` blocks.
+    /// Equations of motion of the truncated modes for loads on some of the places, projected on the spaces of these loads.
+    pub fn projected(&self, system: &System, places: Range<usize>) -> ProjectedSystem {
+        let (first, width) = (3 * places.start, 3 * places.len());
+        // M-orthonormal columns by block Gram-Schmidt, twice.
+        let mut basis = Mat::<f64>::zeros(self.loads.nrows(), width * self.blocks.len());
+        let mut columns = 0;
+        let mut columns_of_blocks = Vec::with_capacity(self.blocks.len());
+        for block in &self.blocks {
+            let mut block = block.subcols(first, width).to_owned();
+            let weighted = system.mass_times(block.as_ref());
+            let sizes: Vec<f64> =
+                (0..width).map(|j| (block.col(j).transpose() * weighted.col(j)).max(0.0).sqrt()).collect();
+            let before = columns;
+            for _ in 0..2 {
+                let coefficients = basis.subcols(0, before).transpose() * system.mass_times(block.as_ref());
+                block -= basis.subcols(0, before) * coefficients;
+            }
+            for (j, size) in sizes.into_iter().enumerate() {
+                let mut column = block.subcols(j, 1).to_owned();
+                for _ in 0..2 {
+                    let own = basis.subcols(before, columns - before);
+                    let coefficients = own.transpose() * system.mass_times(column.as_ref());
+                    column -= own * coefficients;
+                }
+                let remainder = norm(system, &column);
+                if remainder > DEPENDENT * size {
+                    (0..column.nrows()).for_each(|i| basis[(i, columns)] = column[(i, 0)] / remainder);
+                    columns += 1;
+                }
+            }
+            columns_of_blocks.push(columns);
+        }
+        let basis = basis.subcols(0, columns);
+        ProjectedSystem {
+            stiffness: basis.transpose() * system.assembly.multiply(SystemMatrix::Stiffness, basis),
+            loads: basis.transpose() * self.loads.subcols(first, width),
+            columns_of_blocks,
+        }
+    }
+}
+
+impl ProjectedSystem {
+    /// Substitutes of the truncated modes, from the first `blocks` blocks.
     ///
     /// # Errors
     /// [`SolveError::DenseEigenproblem`].
-    pub fn truncated_modes(
-        &self,
-        system: &System,
-        place: usize,
-        blocks: usize,
-    ) -> Result<Vec<LoadedMode>, SolveError> {
-        // M-orthonormal columns by Gram-Schmidt, twice.
-        let n = self.loads.nrows();
-        let mut basis = Mat::<f64>::zeros(n, 0);
-        for (block, axis) in self.blocks[..blocks].iter().flat_map(|b| (0..3).map(move |axis| (b, axis))) {
-            let mut column = block.subcols(3 * place + axis, 1).to_owned();
-            let size = norm(system, &column);
-            for _ in 0..2 {
-                let coefficients = basis.transpose() * system.mass_times(column.as_ref());
-                column -= &basis * coefficients;
-            }
-            let remainder = norm(system, &column);
-            if remainder > DEPENDENT * size {
-                let width = basis.ncols();
-                basis.resize_with(n, width + 1, |i, _| column[(i, 0)] / remainder);
-            }
-        }
-        let stiffness = basis.transpose() * system.assembly.multiply(SystemMatrix::Stiffness, basis.as_ref());
+    pub fn truncated_modes(&self, blocks: usize) -> Result<Vec<ModeAtPlaces>, SolveError> {
+        let columns = blocks.checked_sub(1).map_or(0, |last| self.columns_of_blocks[last]);
+        let stiffness = self.stiffness.submatrix(0, 0, columns, columns);
         let scale = stiffness.norm_max();
-        if basis.ncols() == 0 || scale == 0.0 {
+        if columns == 0 || scale == 0.0 {
             return Ok(Vec::new());
         }
         let symmetric = |i: usize, j: usize| 0.5 * (stiffness[(i, j)] + stiffness[(j, i)]) / scale;
-        let scaled = Mat::from_fn(basis.ncols(), basis.ncols(), symmetric);
-        let eigen = scaled
+        let eigen = Mat::from_fn(columns, columns, symmetric)
             .self_adjoint_eigen(Side::Lower)
             .map_err(|e| SolveError::DenseEigenproblem(format!("{e:?}")))?;
-        let gains = eigen.U().transpose() * (basis.transpose() * self.loads.subcols(3 * place, 3));
-        let mode = |i: usize| LoadedMode {
+        let gains = eigen.U().transpose() * self.loads.subrows(0, columns);
+        let mode = |i: usize| ModeAtPlaces {
             square: eigen.S()[i] * scale,
-            gain: DVec3::new(gains[(i, 0)], gains[(i, 1)], gains[(i, 2)]),
+            gains: (0..gains.ncols() / 3)
+                .map(|place| DVec3::from_array(std::array::from_fn(|axis| gains[(i, 3 * place + axis)])))
+                .collect(),
         };
-        Ok((0..basis.ncols()).map(mode).filter(|mode| mode.square > 0.0).collect())
+        Ok((0..columns).map(mode).filter(|mode| mode.square > 0.0).collect())
     }
 }
 

@@ -107,6 +107,11 @@ impl System {
         if self.rigid.is_some() { 6 } else { 0 }
     }
 
+    /// Participation of the rigid motions in loads [N], Φrᵀ·B: six rows, or none for a body with fixed nodes.
+    pub fn rigid_participation(&self, loads: &Mat<f64>) -> Mat<f64> {
+        self.rigid.as_ref().map_or(Mat::zeros(0, loads.ncols()), |rigid| rigid.shapes.transpose() * loads)
+    }
+
     /// Number of elastic modes of the body.
     pub fn elastic_modes(&self) -> usize {
         self.discretisation.dofs() - 3 * self.fixed_nodes.len() - self.rigid_motions()

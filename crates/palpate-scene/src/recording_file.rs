@@ -1,7 +1,7 @@
 //! Recording files, and their certificates in words.
 
 use crate::error::{SceneError, SceneErrorKind};
-use palpate::{Certificate, Recording};
+use palpate::{Certificate, PeakForceError, Recording};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -52,6 +52,16 @@ fn write_certificate(out: &mut String, certificate: &Certificate) -> std::fmt::R
         ms(event.rise_s),
         ms(event.duration_s)
     )?;
+    if let Some(PeakForceError { held, touched }) = &certificate.peak_force_error_max {
+        for (name, errors) in [("held", held), ("touched", touched)] {
+            let [one, two, three] = errors.map(percent);
+            let name = format!("peak error, {name}");
+            writeln!(
+                out,
+                "    {name:<21}{one} at one place, {two} at two, {three} at three that move, the body free"
+            )?;
+        }
+    }
     writeln!(out, "    static compliance    {} at most", percent(certificate.static_compliance_error_max))?;
     writeln!(
         out,

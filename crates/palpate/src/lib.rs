@@ -78,7 +78,7 @@ pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory, Damping, FORMAT_VERSION,
     GravityResponse, ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata,
-    ModalBasis, NearField, Provenance, Recording, ResidualCompliance, Sampling, Support,
+    ModalBasis, NearField, PeakForceError, Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
 pub use response::{OscillatorState, ResponseForm, SampledOscillator};
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};

@@ -3,12 +3,13 @@
 use glam::DVec3;
 use palpate::{
     Collider, Coupling, DeviceMode, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters,
-    Obstacle, Output, Pose, Shape, SurfacePoint, step,
+    Obstacle, Output, Pose, Recording, ResidualCompliance, Shape, SurfacePoint, step,
 };
 use palpate_testkit::{
     GRAVITY_M_S2, Random, energy_imbalance, finger, fixed_block, floor, free_block, half_extent, holding,
     model_and_state, start_at, touching, with_stiffness_damping,
 };
+use std::sync::Arc;
 
 const H: f64 = 1e-3;
 const GRAVITY: DVec3 = DVec3::new(0.0, -GRAVITY_M_S2, 0.0);
@@ -432,4 +433,26 @@ fn tip_larger_than_the_body_touches_its_front_only() {
     let pressed = step(&model, &mut state, &touching(&[centre]));
     assert!(!pressed.contacts.is_empty());
     assert!(pressed.contacts.iter().all(|contact| contact.normal.y > 0.5), "{:?}", pressed.contacts);
+}
+
+#[test]
+fn a_patch_touches_a_body_whose_residual_compliance_is_round_off() {
+    // As in a recording that keeps all modes: entries of both signs, some of them on the diagonal.
+    let pressed = |residual: ResidualCompliance| {
+        let recording = Recording { residual, ..(*free_block()).clone() };
+        let top = half_extent(&recording, 1);
+        let parameters =
+            ModelParameters { devices: vec![finger(0.0, 0.03, 0.5)], ..ModelParameters::default() };
+        let object = ModelObject::new(Arc::new(recording), start_at(DVec3::ZERO));
+        let (model, mut state) = model_and_state(parameters, vec![object]);
+        let press = touching(&[DVec3::new(0.01, top - 1e-4, 0.02)]);
+        let outside = touching(&[DVec3::new(0.01, top + 0.02, 0.02)]);
+        step(&model, &mut state, &outside);
+        (0..20).map(|_| step(&model, &mut state, &press).devices[0].force_on_hand.y).fold(0.0, f64::max)
+    };
+    let entries = 3 * free_block().surface.positions.len();
+    let round_off = (0..entries * (entries + 1) / 2).map(|at| if at % 3 == 0 { 1e-20 } else { -1e-20 });
+    let without = pressed(ResidualCompliance::None);
+    let force = pressed(ResidualCompliance::Whole(round_off.collect()));
+    assert!(without > 0.0 && (force / without - 1.0).abs() < SOLVED, "{force} N, without S {without} N");
 }

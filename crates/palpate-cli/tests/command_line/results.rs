@@ -58,7 +58,12 @@ fn a_recorded_box_has_the_counts_mass_and_frequencies_of_a_box() {
         assert!(number(&certificate[key]) > 0.0, "{key}: {certificate}");
     }
     assert!(number(&certificate["force_error_max"]) < 0.1, "{certificate}");
-    assert_eq!(certificate["samples"], 12);
+    for errors in ["held", "touched"].map(|hands| &certificate["peak_force_error_max"][hands]) {
+        let errors = errors.as_array().expect("errors at one, two and three places");
+        let in_range = |error| (1e-4..1.0).contains(&number(error));
+        assert!(errors.len() == 3 && errors.iter().all(in_range), "{certificate}");
+    }
+    assert_eq!(certificate["samples"], 16);
     assert_eq!(certificate["modes_of"], serde_json::json!([20, 64 * 3 - 6]));
     // Levels of contact samples: ever fewer, wider apart, and none off by more than the cube's half diagonal.
     let levels = certificate["sample_levels"].as_array().expect("levels");

@@ -95,7 +95,8 @@ impl TruncatedResponse<'_> {
     /// # Errors
     /// [`SolveError::DenseEigenproblem`].
     pub fn modes(&self, index: usize, blocks: usize) -> Result<Vec<LoadedMode>, SolveError> {
-        self.spaces.truncated_modes(&self.body.system, index, blocks)
+        let modes = self.spaces.projected(&self.body.system, index..index + 1).truncated_modes(blocks)?;
+        Ok(modes.iter().map(|mode| mode.at(0)).collect())
     }
 }
 

@@ -216,14 +216,23 @@ fn certified_errors_fall_with_modes_and_show_what_a_missing_residual_costs() {
         recording.metadata.certificate.expect("a certificate")
     };
     let mut before = f64::INFINITY;
+    let mut peaks_before = [f64::INFINITY; 6];
     for modes in [5, 20, 60] {
         let certificate = certificate(modes, ResidualChoice::Automatic);
         let error = certificate.force_error_max;
         assert!(error > 0.0 && error < before, "{modes} modes: {error} after {before}");
         assert!(certificate.force_error_median <= error);
+        let peak = certificate.peak_force_error_max.expect("a peak force error");
+        let peaks = [peak.held, peak.touched].concat();
+        let fall = peaks.iter().zip(peaks_before).all(|(peak, before)| *peak > error && *peak < before);
+        assert!(
+            fall,
+            "{modes} modes: {peaks:?} after {peaks_before:?}, one place over the whole event {error}"
+        );
+        peaks_before.copy_from_slice(&peaks);
         assert!(certificate.static_compliance_error_max < AT_REST, "{certificate:?}");
-        // 125 nodes, less six rigid motions; 8 points and 4 patches.
-        assert_eq!((certificate.modes_of, certificate.samples), ([modes as u64, 369], 12));
+        // 125 nodes, less six rigid motions; 12 points and 4 patches.
+        assert_eq!((certificate.modes_of, certificate.samples), ([modes as u64, 369], 16));
         before = error;
     }
     let without = certificate(60, ResidualChoice::None);

@@ -12,6 +12,7 @@ mod frequencies;
 mod friction;
 mod hertz_indentation;
 mod impulse_response;
+mod peak_force;
 mod pinch;
 mod pinch_lift;
 mod press;
@@ -74,6 +75,11 @@ pub const CASES: &[Case] = &[
         name: "relaxation",
         about: "held points of a damped cube moved quickly, 200 modes and S against all modes",
         compute: residual_relaxation::residual_relaxation,
+    },
+    Case {
+        name: "peak-force",
+        about: "certified peak force errors against bodies with all their modes: 54 cases, one to three held places",
+        compute: peak_force::peak_force,
     },
     Case {
         name: "impulse",

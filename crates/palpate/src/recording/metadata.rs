@@ -77,6 +77,7 @@ impl Certificate {
             self.reference_error,
         ]
         .into_iter()
+        .chain(self.peak_force_error_max.iter().flat_map(|peak| [peak.held, peak.touched]).flatten())
         .chain(self.sample_levels.iter().flat_map(|level| [level.spacing_m, level.distance_or_zero()]))
         .all(f64::is_finite)
     }
@@ -175,8 +176,8 @@ pub struct MassProperties {
 /// Force-error certificate: the recording against the unreduced finite element model, measured
 /// when it was made. All errors are relative, 0.01 is 1 %.
 ///
-/// A measurement on samples, one location at a time, without rigid motion: not a bound. A body that rings on several
-/// held points, or a hand with kinks in its path, has larger errors; both shrink with more modes.
+/// A measurement on samples, not a bound: hands that are faster than [`CertificateEvent`], jump, or strike have larger errors; they shrink
+/// with more modes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// Largest error of the force when a sample is pressed in by a smooth ramp and held:
@@ -184,6 +185,9 @@ pub struct Certificate {
     pub force_error_max: f64,
     /// Median over the samples of that error.
     pub force_error_median: f64,
+    /// Peak error of the force during motion; none in recordings of palpate before 0.3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_force_error_max: Option<PeakForceError>,
     /// Largest error of the static compliance of a sample.
     pub static_compliance_error_max: f64,
     /// Largest error of R[0] of a sample, at [`CertificateEvent::step_s`].
@@ -205,6 +209,17 @@ pub struct Certificate {
     /// Geometric error of each level of contact samples, finest first; empty for a recording that does not hold its levels.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sample_levels: Vec<CertificateLevel>,
+}
+
+/// Peak error of the force of hands that move one, two and three places of the body, which moves as a whole as well:
+/// max|f − f_fem| / max|f_fem| over [`CertificateEvent::duration_s`], the largest over sets of places and directions. A hand moves by a
+/// cubic ramp of [`CertificateEvent::rise_s`]; f_fem is the mean over each step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PeakForceError {
+    /// Points that hands hold.
+    pub held: [f64; 3],
+    /// Patches as wide as a fingertip that hands touch from the start on. A hand that strikes has larger errors.
+    pub touched: [f64; 3],
 }
 
 /// Geometric error of a level of contact samples.

@@ -10,7 +10,7 @@ pub use file::FORMAT_VERSION;
 pub use impulse_response::{Column, ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
 pub use metadata::{
     Certificate, CertificateEvent, CertificateLevel, Damping, MassProperties, Material, MeshCounts, Metadata,
-    Provenance, Support,
+    PeakForceError, Provenance, Support,
 };
 pub use residual::{NearField, ResidualCompliance};
 

@@ -148,7 +148,8 @@ fn trace(matrix: &DMat3) -> f64 {
 fn semidefinite_cholesky(matrix: &DMat3) -> DMat3 {
     let mut lower = [[0.0; 3]; 3];
     let entry = |i: usize, j: usize| matrix.col(j)[i];
-    let small = 1e-12 * trace(matrix);
+    // Where all modes are kept, S is round-off, and its trace may be negative.
+    let small = 1e-12 * trace(matrix).max(0.0);
     for i in 0..3 {
         for j in 0..=i {
             let dot: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
