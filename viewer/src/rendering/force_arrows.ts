@@ -12,6 +12,7 @@ export interface Label {
   colour: string;
 }
 
+/** Resultant of all contacts of a pair: the force [N] on `object`. */
 export interface Resultant {
   object: number;
   collider: ColliderKind;
@@ -21,20 +22,26 @@ export interface Resultant {
   count: number;
 }
 
-/** Resultants per object and collider, at the force-weighted mean of the contact points. */
+/**
+ * Resultants per pair, at the force-weighted mean of the contact points. Two objects have contacts in both directions, nodes of either on faces of
+ * the other: their resultant is the force on the object with the higher number.
+ */
 export function resultants(frame: Frame): Resultant[] {
   const found = new Map<string, Resultant & { weight: number }>();
   for (const contact of frame.contacts) {
-    const key = `${contact.object} ${contact.collider} ${contact.colliderIndex}`;
+    const { collider } = contact;
+    const opposite = collider === "object" && contact.colliderIndex > contact.object;
+    const object = opposite ? contact.colliderIndex : contact.object;
+    const index = opposite ? contact.object : contact.colliderIndex;
+    const key = `${object} ${collider} ${index}`;
     let sum = found.get(key);
     if (sum === undefined) {
-      const { object, collider, colliderIndex: index } = contact;
       sum = { object, collider, index, point: new Vector3(), force: new Vector3(), count: 0, weight: 0 };
       found.set(key, sum);
     }
     const weight = Math.hypot(...contact.force);
     sum.point.addScaledVector(new Vector3(...contact.point), weight);
-    sum.force.add(new Vector3(...contact.force));
+    sum.force.addScaledVector(new Vector3(...contact.force), opposite ? -1 : 1);
     sum.weight += weight;
     sum.count++;
   }
@@ -59,6 +66,9 @@ export interface ForceDrawing {
 /** Forces below this fraction of the range are not drawn. */
 const MIN_FRACTION = 0.004;
 
+/** Number of contacts with an arrow of their own, strongest first. */
+const MAX_CONTACT_ARROWS = 64;
+
 /** Arrows, dots and labels of a frame; an arrow of `range` [N] has the length `longest` [m]. */
 export function drawForces(frame: Frame, shown: readonly boolean[], range: number, longest: number, palette: Palette): ForceDrawing {
   const drawn: ForceDrawing = { arrows: [], dots: [], labels: [] };
@@ -78,10 +88,12 @@ export function drawForces(frame: Frame, shown: readonly boolean[], range: numbe
     if (sum.collider !== "device") drawn.labels.push({ at: to, text: formatForce(sum.force.length()), colour: palette.onObject });
   }
   if (frame.contacts.length > all.length) {
-    for (const contact of frame.contacts) {
-      const from = new Vector3(...contact.point);
-      const force = new Vector3(...contact.force);
-      if (force.length() < 4 * MIN_FRACTION * range) continue;
+    const strongest = frame.contacts
+      .map(({ point, force }) => ({ from: new Vector3(...point), force: new Vector3(...force) }))
+      .filter(({ force }) => force.length() >= 4 * MIN_FRACTION * range)
+      .sort((a, b) => b.force.lengthSq() - a.force.lengthSq())
+      .slice(0, MAX_CONTACT_ARROWS);
+    for (const { from, force } of strongest) {
       drawn.arrows.push({ from, to: tip(from, force), colour: onObject, radius: 0.4 * shaftRadius });
     }
   }

@@ -238,4 +238,26 @@ export const liveCases = [
       assertNoConsoleErrors(page);
     },
   },
+  {
+    name: "two objects on each other have one number: the weight of the upper one",
+    realOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start({ scene: "stack" }));
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      // A label has two decimals.
+      await page.waitForFunction(
+        () => {
+          const { labels, info } = window.palpate.sceneView.graphs[0];
+          const weight = info.objects[1].mass * 9.81;
+          const shown = labels.map(({ text }) => parseFloat(text));
+          return shown.length === 2 && shown.some((force) => Math.abs(force - weight) < 0.005 + 0.005 * weight);
+        },
+        null,
+        { timeout: 60_000 },
+      );
+      await screenshot(page, "stack");
+      assertNoConsoleErrors(page);
+    },
+  },
 ];

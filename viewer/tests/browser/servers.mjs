@@ -16,9 +16,9 @@ async function freePort() {
   });
 }
 
-async function servePalpate(port, log) {
+async function servePalpate(port, { log, scene = "bounce" }) {
   const logged = log === undefined ? [] : ["--log", log];
-  const child = spawn(process.env.PALPATE, ["serve", "--scene", "bounce", "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
+  const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
     stdio: ["ignore", "pipe", "pipe"],
   });
   let output = "";
@@ -37,15 +37,15 @@ async function servePalpate(port, log) {
   }
 }
 
-/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server. */
+/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene. */
 export async function start(options = {}) {
   const port = options.port ?? (await freePort());
   if (!process.env.PALPATE) return serve({ ...options, port });
-  const behind = await servePalpate(port, options.log);
+  const behind = await servePalpate(port, options);
   if (await hasPage(behind.url)) return { url: behind.url, port, close: behind.end };
   await behind.end();
   const inner = await freePort();
-  const { url, end } = await servePalpate(inner, options.log);
+  const { url, end } = await servePalpate(inner, options);
   const front = await startProxy(url, port);
   return { url: front.url, port, close: async () => (await front.close(), await end()) };
 }

@@ -11,8 +11,9 @@ use std::sync::Arc;
 /// Magic number, `PLPF`.
 const MAGIC: u32 = u32::from_le_bytes(*b"PLPF");
 
-/// Maximum number of contacts in a frame; the strongest are kept.
-const MAX_CONTACTS: usize = 64;
+/// Maximum number of contacts in a frame, 16 kB; the strongest are kept. The page sums them per pair, so that few of them would show less
+/// than the weight of an object that lies on many nodes.
+const MAX_CONTACTS: usize = 512;
 
 /// Residual displacements below this are not sent [m].
 const MIN_RESIDUAL: f64 = 1e-9;
