@@ -22,6 +22,12 @@ use glam::DVec3;
 /// Time constant T of depenetration [s]: that of MuJoCo's contacts by default.
 const TIME_CONSTANT_S: f64 = 0.02;
 
+/// Penetration [m] up to which contacts themselves let an object out, if losses pay for it: what the solver leaves. Depenetration alone would
+/// lift objects at rest off their contacts, or let them creep.
+pub(super) fn slop(model: &Model, object: usize) -> f64 {
+    SOLVER.loose_tolerance * model.objects[object].radius
+}
+
 /// Move objects out of obstacles and out of each other, at the end of a step. An object that a device holds stays in its hand.
 ///
 /// # Real time
@@ -46,7 +52,7 @@ pub(super) fn depenetrate(
             (object, OtherSide::Obstacle { .. }) => (object, None),
             (object, OtherSide::Object { number, .. }) => (object, Some(number)),
         };
-        let slop = SOLVER.loose_tolerance * model.objects[object].radius;
+        let slop = slop(model, object);
         let apart = mean_penetration(group, constraints, slop) * share;
         let inverse_mass = |at: usize| match &model.objects[at].inertia {
             Some(inertia) if !objects[at].is_held => 1.0 / inertia.mass,

@@ -196,7 +196,8 @@ fn set_up_constraints(model: &Model, state: &mut State) {
             point.start_arm = orientation * (point.rest + point.state.displacement);
         }
     }
-    // Losses pay for pushing tips out, shared among their contacts; all else is moved apart at the end of the step.
+    // Losses pay for pushing out tips, and objects within the slop, shared among their contacts; deeper objects are moved apart at the end of
+    // the step.
     let mut budget = 0.5 * output.energy.lost().max(0.0);
     workspace.constraints.clear();
     for contact in contacts.iter() {
@@ -222,7 +223,8 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         let mut constraint = Constraint::new(other - at(contact.object(), contact.slot));
         let gap = contact.gap(constraint.start);
         constraint.min_gap = gap.min(0.0);
-        if gap < 0.0 && matches!(contact.other, OtherSide::Device(_)) {
+        let is_tip = matches!(contact.other, OtherSide::Device(_));
+        if gap < 0.0 && (is_tip || gap > -depenetration::slop(model, contact.object())) {
             let push = SOLVER.recovery * -gap;
             let cost = 2.0 * contact.force.length() * push;
             let paid = if cost > budget { 0.0 } else { push };

@@ -4,7 +4,7 @@ use super::random_device::RandomDevice;
 use crate::check::Check;
 use crate::run_invariants::ROUND_OFF;
 use glam::DVec3;
-use palpate::{Collider, DeviceInput, Input, Model, Output};
+use palpate::{Collider, DeviceInput, Input, Model, ObjectOutput, Output};
 
 /// The solver's loosest tolerance, as a share of the object's size (docs/contact.md); what is worse is reported in the status.
 const LOOSE: f64 = 1e-5;
@@ -127,8 +127,10 @@ pub struct InvariantChecker<'a> {
     last_input: f64,
     /// Energy exchanged until now [J].
     exchanged: f64,
-    /// Work of the devices until now [J].
+    /// Work of the devices, and on the weight of objects that are moved out of others without velocity, until now [J].
     work: f64,
+    /// Pose and velocity of each object after the last step.
+    objects: Vec<ObjectOutput>,
     /// Interface point and stretch of each device after the last step [m]; `None` when it was inactive.
     before: Vec<Option<[DVec3; 2]>>,
     pub violations: Violations,
@@ -147,6 +149,7 @@ impl<'a> InvariantChecker<'a> {
             last_input: 0.0,
             exchanged: NEGLIGIBLE_J + energy.kinetic + energy.potential.abs(),
             work: 0.0,
+            objects: start.objects.clone(),
             before: vec![None; start.devices.len()],
             violations: Violations::default(),
         }
@@ -165,9 +168,22 @@ impl<'a> InvariantChecker<'a> {
         for (device, (given, random)) in input.devices.iter().zip(randoms).enumerate() {
             self.device(device, given, random, output, at);
         }
+        self.depenetration(output);
         self.energy(output, at);
         self.status(output, at);
         true
+    }
+
+    /// Work on the weight of objects that move farther than by their velocity, whose mean holds over a step.
+    fn depenetration(&mut self, output: &Output) {
+        let parameters = self.model.parameters();
+        let bodies = self.model.recordings().zip(self.objects.iter().zip(&output.objects));
+        for (recording, (before, after)) in bodies {
+            let by_velocity = 0.5 * parameters.step_s * (before.twist.linear + after.twist.linear);
+            let shift = after.pose.position - before.pose.position - by_velocity;
+            self.work -= recording.mass() * parameters.gravity.dot(shift);
+        }
+        self.objects.clone_from(&output.objects);
     }
 
     fn energy(&mut self, output: &Output, at: [usize; 2]) {
