@@ -37,6 +37,8 @@ pub struct ForceProcess {
     input: Input,
     slots: Vec<DeviceSlot>,
     obstacle_trajectories: Vec<ObstacleTrajectory>,
+    /// Gravity over simulated time [m/s²], if it changes.
+    gravity: Option<MotionPath>,
     steps: u64,
     /// Silence of a device [s] after which it is inactive.
     device_timeout_s: f64,
@@ -76,8 +78,8 @@ impl ForceProcess {
         });
         let slots: Vec<DeviceSlot> = slots.collect();
         let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
-        let input = Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles };
-        Self { model, state, input, slots, obstacle_trajectories, steps: 0, device_timeout_s }
+        let input = Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles, gravity: None };
+        Self { model, state, input, slots, obstacle_trajectories, gravity: None, steps: 0, device_timeout_s }
     }
 
     /// Lets a device follow a path in simulated time, also where that runs slower than the clock.
@@ -86,6 +88,11 @@ impl ForceProcess {
     /// If the model has no such device.
     pub fn follow(&mut self, device: usize, path: MotionPath) {
         self.slots[device].path = Some(path);
+    }
+
+    /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
+    pub fn change_gravity(&mut self, over_time: MotionPath) {
+        self.gravity = Some(over_time);
     }
 
     /// State of the scene.
@@ -127,7 +134,8 @@ impl ForceProcess {
     /// No allocation, lock or system call. Cost: one [`palpate::step`].
     pub fn cycle(&mut self, now_s: f64) -> &Output {
         self.steps += 1;
-        let time_s = self.steps as f64 * self.model.parameters().step_s;
+        let step_s = self.model.parameters().step_s;
+        let time_s = self.steps as f64 * step_s;
 
         // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent or
         // where their position is not finite.
@@ -152,6 +160,7 @@ impl ForceProcess {
         for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
             *pose = trajectory(time_s);
         }
+        self.input.gravity = self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
 
         let output = step(&self.model, &mut self.state, &self.input);
 

@@ -98,6 +98,12 @@ impl MotionPath {
         Self { repeats: true, ..self }
     }
 
+    /// Vector of the rows at the middle of the step of `step_s` [s] that ends at a time [s]: its mean over the step, where it is linear
+    /// there. For what is held over a step.
+    pub fn mid_step(&self, end_s: f64, step_s: f64) -> DVec3 {
+        self.at(end_s - 0.5 * step_s).position
+    }
+
     /// Pose [m, world] at a time [s]; the orientation is the identity if the rows have none.
     pub fn at(&self, t: f64) -> Pose {
         let (first, end) = (self.rows.first().map_or(0.0, |(time, _)| *time), self.end());

@@ -64,6 +64,8 @@ pub struct Session {
     pub devices: Vec<SessionDevice>,
     /// Trajectories, one for each obstacle of the model.
     pub obstacle_trajectories: Vec<ObstacleTrajectory>,
+    /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
+    pub gravity: Option<MotionPath>,
     /// Number of steps; `None` runs until it is stopped.
     pub steps: Option<u64>,
     /// Rate of the deformation process [Hz]; 0 for none.
@@ -173,6 +175,7 @@ impl Session {
         for (device, path) in paths.into_iter().enumerate() {
             path.into_iter().for_each(|path| process.follow(device, path));
         }
+        self.gravity.into_iter().for_each(|gravity| process.change_gravity(gravity));
         let (snapshot_writer, mut snapshots) =
             snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));
         let (log_sender, writer) = log.unzip();

@@ -76,6 +76,7 @@ impl Snapshot {
         self.objects.iter_mut().for_each(|object| object.copy_from(state));
         self.input.devices.copy_from_slice(&input.devices);
         self.input.obstacles.copy_from_slice(&input.obstacles);
+        self.input.gravity = input.gravity;
         self.devices.copy_from_slice(devices);
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);

@@ -21,6 +21,8 @@ pub struct Scene {
     pub devices: Vec<SceneDevice>,
     /// Planes and obstacles, in the model's order.
     pub obstacles: Vec<SceneObstacle>,
+    /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
+    pub gravity: Option<MotionPath>,
     /// Warnings for the author of the scene.
     pub warnings: Vec<Warning>,
     /// Values that were chosen automatically, a line each.
@@ -106,7 +108,13 @@ impl Scene {
         Input {
             devices: self.devices.iter().map(device).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
+            gravity: self.gravity_at(time_s),
         }
+    }
+
+    /// Gravity over the step that ends at a time [s]; none if it does not change [m/s², world].
+    pub fn gravity_at(&self, time_s: f64) -> Option<DVec3> {
+        self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, self.model.parameters().step_s))
     }
 
     /// Whether anything but held points can act on the objects.

@@ -40,6 +40,8 @@ pub struct ViewerScene {
     pub devices: Vec<ViewerDevice>,
     /// Trajectory per obstacle of the model.
     pub obstacle_trajectories: Vec<SharedTrajectory>,
+    /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
+    pub gravity: Option<MotionPath>,
     /// Log opener, if the scene is logged.
     pub log: Option<LogOpener>,
 }

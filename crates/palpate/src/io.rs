@@ -67,6 +67,8 @@ pub struct Input {
     pub devices: Vec<DeviceInput>,
     /// Obstacle poses at the end of the step, in the model's order. Missing entries stay.
     pub obstacles: Vec<Pose>,
+    /// Gravity, held over the step [m/s², world]. None stays as it was, at the start the model's.
+    pub gravity: Option<DVec3>,
 }
 
 /// One device's part of a step's output.
@@ -120,7 +122,7 @@ pub struct StepStatus {
     /// Largest number of solver iterations of an island.
     pub iterations: u32,
     /// Devices and obstacles with a position that is not finite, or a grasp that does not exist: the device is inactive, the
-    /// obstacle stays.
+    /// obstacle stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
     pub rejected_inputs: u32,
     /// Held directions that depend linearly on others and got no force.
     pub dependent_rows: u32,

@@ -30,7 +30,7 @@ pub enum RigidCompliance {
 pub struct ModelParameters {
     /// Step h [s], above 0 and at most 1.
     pub step_s: f64,
-    /// Gravity [m/s², world].
+    /// Gravity [m/s², world], until an input changes it.
     pub gravity: DVec3,
     /// Time integrator of the rigid motion.
     pub motion: RigidIntegrator,

@@ -26,6 +26,8 @@ use glam::DVec3;
 pub struct DeformationSnapshot {
     pub(crate) object: usize,
     pub(crate) pose: Pose,
+    /// Gravity [m/s², world].
+    pub(crate) gravity: DVec3,
     pub(crate) data: DeformationData,
 }
 
@@ -51,7 +53,7 @@ impl DeformationSnapshot {
     /// No allocation. Costs modes and contacts; with a table the forces of the last T steps.
     pub fn copy_from(&mut self, state: &State) {
         let own = &state.objects[self.object];
-        self.pose = own.rigid.pose;
+        (self.pose, self.gravity) = (own.rigid.pose, state.gravity);
         self.data.copy_from(&own.response);
     }
 
@@ -98,7 +100,7 @@ impl DeformationSnapshot {
     fn object_and_gravity<'m>(&self, model: &'m Model, out: &[DVec3]) -> (&'m Object, DVec3) {
         let object: &Object = &model.objects[self.object];
         assert_eq!(out.len(), object.body.recording.surface.positions.len(), "one entry per surface node");
-        (object, object.gravity_in_body(model.parameters.gravity, &self.pose))
+        (object, object.gravity_in_body(self.gravity, &self.pose))
     }
 }
 
@@ -115,6 +117,11 @@ impl State {
     /// Snapshot of an object's deformation at the end of the last step.
     pub fn deformation(&self, object: usize) -> DeformationSnapshot {
         let own = &self.objects[object];
-        DeformationSnapshot { object, pose: own.rigid.pose, data: own.response.deformation() }
+        DeformationSnapshot {
+            object,
+            pose: own.rigid.pose,
+            gravity: self.gravity,
+            data: own.response.deformation(),
+        }
     }
 }

@@ -37,6 +37,8 @@ pub struct State {
     pub(crate) devices: Vec<DeviceState>,
     /// Obstacle poses.
     pub(crate) obstacles: Vec<Pose>,
+    /// Gravity in the last step [m/s², world].
+    pub(crate) gravity: DVec3,
     /// Contact cache, in the order of the ids.
     pub(crate) contacts: BoundedVec<Contact>,
     /// Whether a proxy is inside an object without having crossed its surface: devices × objects.
@@ -88,6 +90,7 @@ impl State {
         let obstacles: Vec<Pose> = parameters.obstacles.iter().map(|obstacle| obstacle.pose).collect();
         Self {
             steps: 0,
+            gravity: parameters.gravity,
             devices: vec![DeviceState::new(); devices],
             contacts: BoundedVec::new(contacts),
             inside: vec![false; devices * count],

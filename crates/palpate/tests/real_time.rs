@@ -114,8 +114,11 @@ fn step_makes_no_allocation() {
 /// Two fingers press the second of two objects that lie on one another while a ball comes.
 fn touch(model: &Model, what: &str) {
     let mut state = State::new(model);
-    let mut input =
-        Input { devices: vec![DeviceInput::touching(DVec3::ZERO); 2], obstacles: vec![Pose::IDENTITY; 2] };
+    let mut input = Input {
+        devices: vec![DeviceInput::touching(DVec3::ZERO); 2],
+        obstacles: vec![Pose::IDENTITY; 2],
+        gravity: None,
+    };
     let (before, mut most) = (allocations(), 0);
     for number in 0..600_u32 {
         let t = f64::from(number) * 1e-3;

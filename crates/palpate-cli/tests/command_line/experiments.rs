@@ -130,6 +130,74 @@ fn a_plane_that_accelerates_upwards_carries_weight_and_inertia() {
 }
 
 #[test]
+fn gravity_less_acceleration_stands_for_a_plane_that_accelerates() {
+    /// Largest acceleration of the table along its plane and up [m/s²], and its angular frequency [rad/s].
+    const ACCELERATION: [f64; 2] = [6.0, 4.0];
+    const OMEGA: f64 = 20.0;
+    /// Difference of the cube's position on the table between both frames [m]: quadrature of the paths over a step.
+    const SAME_M: f64 = 2e-5;
+    let workplace = workplace();
+    // From rest: x = a·(t − sin(ω·t)/ω)/ω has the acceleration a·sin(ω·t).
+    let place = |a: f64, t: f64| a * (t - (OMEGA * t).sin() / OMEGA) / OMEGA;
+    let [along, up] = ACCELERATION;
+    workplace.write("table.csv", rows(1000, |t| vec![place(along, t), place(up, t), 0.0]));
+    workplace.write(
+        "gravity.csv",
+        rows(1000, |t| vec![-along * (OMEGA * t).sin(), -GRAVITY - up * (OMEGA * t).sin(), 0.0]),
+    );
+    let object = "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [0.0, 0.05, 0.0]\n";
+    let plane = "[[plane]]\nnormal = [0.0, 1.0, 0.0]\nfriction = 0.4\n";
+    let scenes = [
+        format!("gravity = [0.0, -{GRAVITY}, 0.0]\n{object}{plane}path = {{ file = \"table.csv\" }}\n"),
+        format!("gravity = {{ file = \"gravity.csv\" }}\n{object}{plane}point = [0.0, 0.0, 0.0]\n"),
+    ];
+    let [moving, still] = scenes.map(|scene| {
+        workplace.write("scene.toml", scene);
+        workplace.succeed(&["run", "scene.toml", "--duration", "1", "--csv", "steps.csv"]);
+        let table = Table::parse(&workplace.text("steps.csv"));
+        check_energy(&table);
+        table
+    });
+    let slid = still.column("cube.px").iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(slid > 0.01, "the cube slides by {slid} m");
+    for (axis, a) in [("cube.px", along), ("cube.py", up)] {
+        for (row, (moving, still)) in moving.column(axis).into_iter().zip(still.column(axis)).enumerate() {
+            let on_table = moving - place(a, (row + 1) as f64 * STEP);
+            assert!((on_table - still).abs() < SAME_M, "{axis}, row {row}: {on_table} {still}");
+        }
+    }
+}
+
+#[test]
+fn gravity_is_a_vector_or_a_file() {
+    let workplace = workplace();
+    let object = "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\n";
+    let fail = |gravity: &str| {
+        workplace.write("scene.toml", format!("gravity = {gravity}\n{object}"));
+        workplace.fail(&["run", "scene.toml"])
+    };
+    let expected = "expected [x, y, z] in m/s², or { file = \"…\" } with the columns t, x, y, z";
+    for wrong in ["\"down\"", "9.81"] {
+        let text = fail(wrong);
+        assert!(text.contains("scene.toml: line 1") || text.starts_with("scene.toml"), "{text}");
+        assert!(text.contains(expected), "{text}");
+    }
+    assert!(fail("[0, -9.81]").contains("2 numbers, expected 3"), "{}", fail("[0, -9.81]"));
+    assert!(fail("{ file = \"none.csv\" }").contains("cannot read the path none.csv"));
+    workplace.write("gravity.csv", "0,0,nan,0\n");
+    let text = fail("{ file = \"gravity.csv\" }");
+    assert!(text.starts_with("scene.toml: line 1: path gravity.csv: line 1"), "{text}");
+    // The run lasts as long as gravity changes.
+    workplace.write("gravity.csv", "0,0,-9.81,0\n0.25,0,0,0\n");
+    workplace.write("scene.toml", format!("gravity = {{ file = \"gravity.csv\" }}\n{object}"));
+    workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv"]);
+    let table = Table::parse(&workplace.text("steps.csv"));
+    assert_eq!(table.len(), 250);
+    let speed = table.column("cube.vy").last().copied().expect("a row");
+    assert!((speed + 0.5 * GRAVITY * 0.25).abs() < 1e-12, "{speed}");
+}
+
+#[test]
 fn a_plane_has_a_point_or_a_path() {
     let workplace = workplace();
     workplace.write("lift.csv", "0,0,0,0\n");

@@ -385,14 +385,15 @@ fn a_log_of_this_version_that_differs_is_refused_and_one_of_another_version_is_c
 fn write_differing_log(workplace: &Workplace, version: &str) {
     let model = model(workplace);
     let mut state = State::new(&model);
-    let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles: vec![Pose::IDENTITY] };
+    let mut input =
+        Input { devices: vec![DeviceInput::inactive(); 2], obstacles: vec![Pose::IDENTITY], gravity: None };
     input.devices[0].position = DVec3::new(-0.058, 0.0, 0.05);
     let names = SceneNames {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
     };
-    let scene = workplace.text("fingers.toml").replace("-9.81", "-9.8");
+    let scene = workplace.text("fingers.toml").replace("{ file = \"gravity.csv\" }", "[0.0, 0.0, -9.8]");
     workplace.write("fingers.toml", scene);
     let carried = ["fingers.toml", "cube.palp", "left_finger.csv", "right_finger.csv"];
     let files = carried.map(|name| (name.to_string(), workplace.read(name)));

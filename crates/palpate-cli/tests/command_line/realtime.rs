@@ -12,12 +12,13 @@ pub fn workplace() -> Workplace {
         )
     };
     let scene = [
-        "step = 0.002\ngravity = [0.0, 0.0, -9.81]\nmost_places = 8\n".to_string(),
+        "step = 0.002\ngravity = { file = \"gravity.csv\" }\nmost_places = 8\n".to_string(),
         "[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\nposition = [0.0, 0.0, 0.0501]\n".to_string(),
         "[[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 0.0, 1.0]\n".to_string(),
         finger("left", ""),
         finger("right", "simulated = { device = \"touch\", grip = \"light\" }\n"),
     ];
+    workplace.write("gravity.csv", "0,0,0,-9.81\n0.5,2,0,-9\n");
     workplace.write("fingers.toml", scene.concat());
     for (name, side) in [("left", -1.0), ("right", 1.0)] {
         let path = format!("0,{},0,0.05\n0.2,{},0,0.05\n", side * 0.058, side * 0.053);

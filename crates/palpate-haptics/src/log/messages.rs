@@ -226,6 +226,9 @@ pub(super) struct StepMessage {
     pub step: u64,
     pub devices: HashMap<String, DeviceMessage>,
     pub obstacles: HashMap<String, PoseMessage>,
+    /// Gravity [m/s², world], where it changes in time.
+    #[serde(default)]
+    pub gravity: Option<Xyz>,
     pub objects: HashMap<String, ObjectMessage>,
     pub energy: EnergyMessage,
 }
@@ -284,11 +287,14 @@ impl Serialize for StepMessageOf<'_> {
             late_us: microseconds(record.lateness),
             compute_us: microseconds(record.compute),
         };
-        let mut map = serializer.serialize_map(Some(7))?;
+        let mut map = serializer.serialize_map(Some(7 + usize::from(record.input.gravity.is_some())))?;
         map.serialize_entry("step", &record.step)?;
         map.serialize_entry("devices", &Named(&names.devices, device))?;
         let obstacle = |at: usize| PoseMessage::from(record.input.obstacles[at]);
         map.serialize_entry("obstacles", &Named(&names.obstacles, obstacle))?;
+        if let Some(gravity) = record.input.gravity {
+            map.serialize_entry("gravity", &Xyz::from(gravity))?;
+        }
         map.serialize_entry("objects", &Named(&names.objects, object))?;
         map.serialize_entry("energy", &EnergyMessage::from(&record.energy))?;
         map.serialize_entry("status", &status)?;

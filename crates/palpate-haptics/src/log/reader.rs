@@ -148,7 +148,8 @@ impl LoggedStep {
     pub fn input(&self, names: &SceneNames, modes: &[DeviceMode]) -> Result<Input, Error> {
         let step = self.step;
         let missing = |name: &String| LogError::PartMissing { step, name: name.clone() };
-        let mut input = Input::default();
+        let gravity = self.message.gravity.map(DVec3::from);
+        let mut input = Input { gravity, ..Input::default() };
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
             let mode = match device.holds {

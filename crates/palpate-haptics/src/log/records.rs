@@ -74,6 +74,7 @@ impl StepRecord {
         (self.time_s, self.energy, self.status) = (*time_s, *energy, *status);
         self.input.devices.copy_from_slice(&input.devices);
         self.input.obstacles.copy_from_slice(&input.obstacles);
+        self.input.gravity = input.gravity;
         self.devices.copy_from_slice(devices);
         self.objects.copy_from_slice(objects);
     }

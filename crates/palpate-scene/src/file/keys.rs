@@ -1,7 +1,7 @@
 //! Keys of a scene file. Keys of earlier versions are aliases.
 
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error, MapAccess, Visitor};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 use toml::Spanned;
@@ -17,7 +17,7 @@ pub(super) const RETIRED_KEYS: [&str; 5] = ["motion", "most_contact_points", "mo
 pub(super) struct SceneFile {
     pub step: Option<Spanned<f64>>,
     #[serde(default)]
-    pub gravity: Numbers<3>,
+    pub gravity: Gravity,
     #[serde(alias = "motion")]
     pub integrator: Option<Spanned<String>>,
     pub rigid_compliance: Option<bool>,
@@ -198,6 +198,40 @@ pub(super) struct PathEntry {
     pub file: Spanned<PathBuf>,
     #[serde(default)]
     pub repeat: bool,
+}
+
+/// Gravity: a vector, or a file with its course in time.
+pub(super) enum Gravity {
+    Constant(Numbers<3>),
+    Changing(PathEntry),
+}
+
+impl Default for Gravity {
+    fn default() -> Self {
+        Self::Constant(Numbers::default())
+    }
+}
+
+impl<'de> Deserialize<'de> for Gravity {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Choice;
+        impl<'de> Visitor<'de> for Choice {
+            type Value = Gravity;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("[x, y, z] in m/s², or { file = \"…\" } with the columns t, x, y, z")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, numbers: A) -> Result<Self::Value, A::Error> {
+                Numbers::deserialize(SeqAccessDeserializer::new(numbers)).map(Gravity::Constant)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                PathEntry::deserialize(MapAccessDeserializer::new(map)).map(Gravity::Changing)
+            }
+        }
+        deserializer.deserialize_any(Choice)
+    }
 }
 
 /// Array of finite numbers below [`LARGEST`].

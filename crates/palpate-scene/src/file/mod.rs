@@ -13,8 +13,9 @@ use crate::initial_checks::check_start;
 use crate::scene::Scene;
 use crate::warning::Warning;
 use glam::DVec3;
-use keys::{RETIRED_KEYS, SceneFile};
-use palpate::{Model, ModelObject, ModelParameters, RigidCompliance, RigidIntegrator};
+use keys::{Gravity, RETIRED_KEYS, SceneFile};
+use palpate::{Model, ModelObject, ModelParameters, ResponseForm, RigidCompliance, RigidIntegrator, Support};
+use palpate_haptics::{Columns, MotionPath};
 use source::Source;
 pub use source::{Relocated, read_path};
 use std::collections::HashSet;
@@ -129,6 +130,7 @@ fn assemble(
     let (mut warnings, mut choices) = (Vec::new(), Vec::new());
     let object_names: Vec<String> = file.object.iter().map(|o| o.name.get_ref().clone()).collect();
     let mut parameters = read_parameters(source, file, mode)?;
+    let gravity = read_gravity(source, file, &objects, &object_names, &mut parameters)?;
     for entry in &file.device {
         let mut device = devices::read_parameters(source, entry)?;
         let step_s = parameters.step_s;
@@ -161,8 +163,16 @@ fn assemble(
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
     let held_only: Vec<Warning> = objects::objects_with_tables(&objects, &object_names).collect();
     let inputs = inputs(source, file);
-    let mut scene =
-        Scene { model: Arc::new(model), object_names, devices, obstacles, warnings, choices, inputs };
+    let mut scene = Scene {
+        model: Arc::new(model),
+        object_names,
+        devices,
+        obstacles,
+        gravity,
+        warnings,
+        choices,
+        inputs,
+    };
     if scene.can_touch() {
         scene.warnings.extend(held_only);
     }
@@ -247,16 +257,39 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
     let max_contact_samples =
         count("max_contact_samples", &file.max_contact_samples, usual_samples, CONTACT_SAMPLES)?;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
-    let gravity = DVec3::from_array(file.gravity.0);
-    Ok(ModelParameters {
-        step_s,
-        gravity,
-        motion,
-        rigid_compliance,
-        max_contact_points,
-        max_contact_samples,
-        ..usual
-    })
+    Ok(ModelParameters { step_s, motion, rigid_compliance, max_contact_points, max_contact_samples, ..usual })
+}
+
+/// Reads gravity into the parameters; gives its course in time, if it has one.
+fn read_gravity(
+    source: &Source,
+    file: &SceneFile,
+    objects: &[ModelObject],
+    names: &[String],
+    parameters: &mut ModelParameters,
+) -> Result<Option<MotionPath>, SceneError> {
+    let entry = match &file.gravity {
+        Gravity::Constant(gravity) => {
+            parameters.gravity = DVec3::from_array(gravity.0);
+            return Ok(None);
+        }
+        Gravity::Changing(entry) => entry,
+    };
+    let gravity = source.motion_path(entry, Columns::Position)?;
+    parameters.gravity = gravity.at(0.0).position;
+    let sags_by_table = |object: &ModelObject| {
+        let is_fixed = object.recording.metadata.support == Support::Fixed;
+        is_fixed && !matches!(object.response, ResponseForm::Modal)
+    };
+    if let Some(at) = objects.iter().position(sags_by_table) {
+        let message = format!(
+            "gravity changes, but the table of {:?}, which has fixed nodes, tells how it sags under a constant one: use \
+             response = \"modal\" there",
+            names[at]
+        );
+        return source.fail(entry.file.span(), SceneErrorKind::Conflict, "gravity", message);
+    }
+    Ok(Some(gravity))
 }
 
 /// Builds the model; an error gets the line of the object that it names.
@@ -288,7 +321,11 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
     let planes = file.plane.iter().filter_map(|plane| Some(&plane.get_ref().path.as_ref()?.file));
-    let files = recordings.chain(paths).chain(planes).chain(meshes).chain(moves);
+    let gravity = match &file.gravity {
+        Gravity::Changing(entry) => Some(&entry.file),
+        Gravity::Constant(_) => None,
+    };
+    let files = recordings.chain(paths).chain(planes).chain(meshes).chain(moves).chain(gravity);
     let mut inputs = vec![source.path.to_path_buf()];
     inputs.extend(files.map(|file| source.named_path(file.get_ref())));
     inputs

@@ -102,6 +102,11 @@ impl Object {
         matches!(self.response, Response::Modal(_))
     }
 
+    /// Whether gravity may change: a table of a body with fixed nodes tells how it sags under a constant one.
+    pub(crate) fn allows_gravity_change(&self) -> bool {
+        self.inertia.is_some() || self.is_touchable()
+    }
+
     /// Rigid motion over a step of h [s] under contact force [N], torque [N·m] and weight; a fixed body stays.
     /// `nearly` is a step under nearly the same forces, to start the iteration from.
     ///

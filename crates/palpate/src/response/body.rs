@@ -295,6 +295,13 @@ impl Body {
         self.patch(footprint).map_or(&self.bounds, |patch| &patch.bounds)
     }
 
+    /// Sag of a location beyond the modes under a gravity [m/s², body]; zero for a free body [m, body].
+    pub(crate) fn sag(&self, location: &ContactLocation, gravity: DVec3) -> DVec3 {
+        let Some(response) = &self.recording.gravity else { return DVec3::ZERO };
+        let corners = self.corners(location).into_iter();
+        corners.map(|(node, weight)| response.residual_displacement(node, gravity) * weight).sum()
+    }
+
     /// Residual compliance between two locations [m/N]; zero between different footprints, which couple by the modes
     /// alone.
     ///

@@ -254,6 +254,19 @@ impl ContactPoints {
         }
     }
 
+    /// Let the sag of all points follow a change of gravity.
+    ///
+    /// # Real time
+    pub(crate) fn change_gravity(&mut self, view: &mut ResponseView) {
+        if view.body.recording.gravity.is_some() {
+            for point in &mut self.points {
+                let change = view.body.sag(&point.location, view.gravity) - point.state.sag;
+                let LocationState { displacement, residual, sag } = &mut point.state;
+                [displacement, residual, sag].into_iter().for_each(|value| *value += change);
+            }
+        }
+    }
+
     /// Predict the displacement of points that are new since then.
     ///
     /// # Real time

@@ -147,9 +147,7 @@ impl SampledModes {
         for (node, weight) in corners.into_iter().filter(|(_, w)| *w != 0.0) {
             body.add_rows(location.footprint, node, weight, rows);
         }
-        let sag = body.recording.gravity.as_ref().map_or(DVec3::ZERO, |response| {
-            corners.iter().map(|&(node, w)| response.residual_displacement(node, gravity) * w).sum()
-        });
+        let sag = body.sag(location, gravity);
         let residual = sag + state.residual_displacement(body, location);
         LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
     }

@@ -33,7 +33,7 @@ pub(super) fn slop(model: &Model, object: usize) -> f64 {
 /// # Real time
 /// Costs the contacts of the step.
 pub(super) fn depenetrate(
-    model: &Model,
+    (model, gravity): (&Model, DVec3),
     objects: &mut [ObjectState],
     contacts: &[Contact],
     constraints: &[Constraint],
@@ -62,9 +62,9 @@ pub(super) fn depenetrate(
         if apart == DVec3::ZERO || own + of_other == 0.0 {
             continue;
         }
-        shift(model, objects, object, -apart * (own / (own + of_other)));
+        shift((model, gravity), objects, object, -apart * (own / (own + of_other)));
         if let Some(other) = other {
-            shift(model, objects, other, apart * (of_other / (own + of_other)));
+            shift((model, gravity), objects, other, apart * (of_other / (own + of_other)));
         }
     }
 }
@@ -87,8 +87,8 @@ fn mean_penetration(contacts: &[Contact], constraints: &[Constraint], slop: f64)
 }
 
 /// Shift an object without velocity [m, world].
-fn shift(model: &Model, objects: &mut [ObjectState], object: usize, by: DVec3) {
+fn shift((model, gravity): (&Model, DVec3), objects: &mut [ObjectState], object: usize, by: DVec3) {
     let own = &mut objects[object];
     own.rigid.pose.position += by;
-    own.ledger.input -= model.objects[object].body.recording.mass() * model.parameters.gravity.dot(by);
+    own.ledger.input -= model.objects[object].body.recording.mass() * gravity.dot(by);
 }

@@ -32,7 +32,7 @@ use crate::collision::{
 use crate::contact::{Constraint, ContactProblem, SOLVER, SolverReport, StepRules, UNSOLVED};
 use crate::device::{DeviceState, LastTouch};
 use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
-use crate::object::ObjectState;
+use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
 use crate::spatial::Pose;
@@ -40,12 +40,12 @@ use crate::state::{State, Workspace};
 use glam::DVec3;
 
 impl Model {
-    /// Rules of a step.
-    fn step_rules(&self) -> StepRules {
+    /// Rules of a step under a gravity [m/s², world].
+    fn step_rules(&self, gravity: DVec3) -> StepRules {
         let parameters = &self.parameters;
         StepRules {
             step_s: parameters.step_s,
-            gravity: parameters.gravity,
+            gravity,
             integrator: parameters.motion,
             includes_rigid_compliance: parameters.rigid_compliance == RigidCompliance::Included,
         }
@@ -58,6 +58,7 @@ impl Model {
 /// No allocation, lock or system call. The cost grows with modes × contacts, not with the mesh.
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
     state.output.status = StepStatus::default();
+    change_gravity(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
     find_contacts(model, state, input);
@@ -69,9 +70,26 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     &state.output
 }
 
+/// Change gravity between two steps. What this adds to the potential energy of an object is input; the sag of bodies with fixed nodes
+/// beyond their modes follows at once.
+fn change_gravity(model: &Model, state: &mut State, input: &Input) {
+    let Some(gravity) = input.gravity.filter(|&gravity| gravity != state.gravity) else { return };
+    if !(gravity.is_finite() && model.objects.iter().all(Object::allows_gravity_change)) {
+        state.output.status.rejected_inputs += 1;
+        return;
+    }
+    state.gravity = gravity;
+    for (object, own) in model.objects.iter().zip(&mut state.objects) {
+        own.points.change_gravity(&mut object.view(gravity, &own.rigid, &mut own.response));
+        let before = own.ledger.potential;
+        own.update_ledger(object, gravity);
+        own.ledger.input += own.ledger.potential - before;
+    }
+}
+
 /// Predict every object at the end of the step without contact force.
 fn predict(model: &Model, state: &mut State) {
-    let rules = model.step_rules();
+    let rules = model.step_rules(state.gravity);
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
         let mut view = object.view(rules.gravity, &own.rigid, &mut own.response);
         // A step predicts the next one, if gravity and step size stay.
@@ -113,8 +131,19 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, obstacles, contacts, inside, levels, couplings, workspace, output } =
-        state;
+    let State {
+        steps,
+        objects,
+        devices,
+        obstacles,
+        gravity,
+        contacts,
+        inside,
+        levels,
+        couplings,
+        workspace,
+        output,
+    } = state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
     let step = *steps;
@@ -173,7 +202,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     for (number, object) in (0..devices.len()).flat_map(|n| touchable().map(move |object| (n, object))) {
         context.rebuild_ahead(number, object);
     }
-    let bodies = (&*model.objects, model.parameters.gravity);
+    let bodies = (&*model.objects, *gravity);
     output.status.dropped_contacts += match_contacts(
         bodies,
         objects,
@@ -186,10 +215,10 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
 fn set_up_constraints(model: &Model, state: &mut State) {
-    let State { steps, objects, devices, contacts, workspace, output, .. } = state;
+    let State { steps, objects, devices, contacts, gravity, workspace, output, .. } = state;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let orientation = own.rigid.pose.orientation;
-        let mut view = object.view(model.parameters.gravity, &own.rigid, &mut own.response);
+        let mut view = object.view(*gravity, &own.rigid, &mut own.response);
         own.points.predict_new(&mut view);
         own.points.resum_next(*steps);
         for point in &mut own.points.points {
@@ -238,12 +267,12 @@ fn set_up_constraints(model: &Model, state: &mut State) {
 /// Solve for the contact forces. Losses of earlier steps must pay for pushing out tips: if they do not, penetrations stay as
 /// they are, and in the last resort contacts carry no force.
 fn solve(model: &Model, state: &mut State) {
-    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let State { objects, devices, contacts, gravity, workspace, output, .. } = state;
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
     let mut problem = ContactProblem {
         objects: &model.objects,
-        rules: model.step_rules(),
+        rules: model.step_rules(*gravity),
         states: objects,
         devices,
         contacts,
@@ -271,13 +300,13 @@ fn solve(model: &Model, state: &mut State) {
 
 /// Integrate deformation and rigid motion with the forces held, and account for the energy.
 fn integrate(model: &Model, state: &mut State) {
-    let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
+    let State { objects, devices, contacts, obstacles, gravity, workspace, couplings, output, .. } = state;
     for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
     }
     remember_touches(objects, devices, contacts);
-    let gravity = model.parameters.gravity;
+    let gravity = *gravity;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
@@ -288,7 +317,7 @@ fn integrate(model: &Model, state: &mut State) {
         own.ledger.dissipated += view.advance(&mut own.points.points);
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
     }
-    depenetration::depenetrate(model, objects, contacts, &workspace.constraints);
+    depenetration::depenetrate((model, gravity), objects, contacts, &workspace.constraints);
     for (object, own) in model.objects.iter().zip(objects) {
         own.update_ledger(object, gravity);
         own.ledger.defect =

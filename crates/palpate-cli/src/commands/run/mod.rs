@@ -143,6 +143,7 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let step_s = scene.model.parameters().step_s;
     let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
     let paths = devices.chain(scene.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
+    let paths = paths.chain(&scene.gravity);
     let longest = paths.map(|path| path.end()).fold(0.0, f64::max);
     let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });
     let steps = (duration / step_s).round();
@@ -166,6 +167,7 @@ fn move_input(scene: &Scene, time: f64, input: &mut Input) {
     for (obstacle, pose) in scene.obstacles.iter().zip(&mut input.obstacles) {
         *pose = obstacle.pose_at(time);
     }
+    input.gravity = scene.gravity_at(time);
 }
 
 /// Ends the run of a scene of held points at an unsolved step, in which the object would be released. In scenes with contacts

@@ -128,6 +128,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         start,
         devices,
         obstacle_trajectories: movers(scene),
+        gravity: scene.gravity.clone(),
         steps,
         frame_rate_hz: options.pictures,
         scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
