@@ -73,7 +73,7 @@ pub use energy::EnergyLedger;
 pub use error::{Error, ModelError, RecordingError, RecordingPart};
 pub use io::{ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, StepStatus};
 pub use motion::RigidIntegrator;
-pub use object::ObjectStart;
+pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory, Damping, FORMAT_VERSION,

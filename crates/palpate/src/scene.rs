@@ -4,7 +4,7 @@ use crate::collision::{Grasp, MAX_TIP_CONTACTS};
 use crate::device::DeviceParameters;
 use crate::error::{Error, ModelError};
 use crate::motion::RigidIntegrator;
-use crate::object::{Object, ObjectRules, ObjectStart};
+use crate::object::{InitialDeformation, Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
 use crate::recording::Recording;
 use crate::response::ResponseForm;
@@ -73,6 +73,8 @@ pub struct ModelObject {
     pub response: ResponseForm,
     /// Placement and velocity at the start.
     pub start: ObjectStart,
+    /// Deformation at the start.
+    pub deformation: InitialDeformation,
     /// Coulomb's coefficient of friction against other objects [1]; of a pair, the geometric mean.
     pub friction: f64,
 }
@@ -81,9 +83,15 @@ pub struct ModelObject {
 const FRICTION: f64 = 0.5;
 
 impl ModelObject {
-    /// Object with the modal form of its response and the default friction.
+    /// Undeformed object with the modal form of its response and the default friction.
     pub fn new(recording: Arc<Recording>, start: ObjectStart) -> Self {
-        Self { recording, response: ResponseForm::Modal, start, friction: FRICTION }
+        Self {
+            recording,
+            response: ResponseForm::Modal,
+            start,
+            deformation: InitialDeformation::default(),
+            friction: FRICTION,
+        }
     }
 }
 
@@ -130,8 +138,8 @@ impl Model {
             max_contact_samples: if uses_samples { parameters.max_contact_samples } else { usize::MAX },
         };
         let make = |(number, object): (usize, ModelObject)| {
-            let ModelObject { recording, response, start, friction } = object;
-            Object::new(recording, response, start, friction, rules)
+            let ModelObject { recording, response, start, deformation, friction } = object;
+            Object::new(recording, response, (start, deformation), friction, rules)
                 .map_err(|error| ModelError::Object { object: number, error: Box::new(error) })
         };
         let objects: Result<Vec<Object>, _> = objects.into_iter().enumerate().map(make).collect();

@@ -292,3 +292,21 @@ fn untouchable_point_cannot_be_held() {
     let held = holding(DVec3::ZERO, Grasp { object: 0, point });
     assert_eq!(step(&model, &mut state, &held).status.rejected_inputs, 1);
 }
+
+#[test]
+fn a_table_of_a_fixed_body_knows_constant_gravity_alone_and_starts_undeformed() {
+    let recording = fixed_block();
+    let object = ModelObject {
+        response: ResponseForm::Fir(Arc::new(table(&recording, 5, H))),
+        ..ModelObject::new(recording, start_at(DVec3::ZERO))
+    };
+    let model = Model::new(ModelParameters::default(), vec![object.clone()]).expect("a good model");
+    let mut state = State::new(&model);
+    let same = Input { gravity: Some(DVec3::ZERO), ..Input::default() };
+    assert_eq!(step(&model, &mut state, &same).status.rejected_inputs, 0);
+    let changed = Input { gravity: Some(DVec3::Y), ..Input::default() };
+    assert_eq!(step(&model, &mut state, &changed).status.rejected_inputs, 1);
+    let object = ModelObject { deformation: palpate::InitialDeformation::Equilibrium, ..object };
+    let refused = Model::new(ModelParameters::default(), vec![object]).expect_err("it starts undeformed");
+    assert_eq!(refused.to_string(), "object 0: uses a table, which starts undeformed: use the modal form");
+}

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 use palpate::{
-    DeviceInput, DeviceParameters, Input, Model, ModelObject, ModelParameters, Recording, State, step,
+    DeviceInput, DeviceParameters, InitialDeformation, Input, Model, ModelObject, ModelParameters, Recording,
+    State, step,
 };
 use palpate_testkit::{
     GRAVITY_M_S2, energy_imbalance, fixed_block, floor, free_block, grasp, half_extent, holding,
@@ -166,4 +167,45 @@ fn gravity_that_is_not_finite_is_refused_and_the_old_one_stays() {
     // The hands of the step are used all the same.
     let bad = Input { devices: vec![DeviceInput::inactive()], ..under(DVec3::splat(f64::INFINITY)) };
     assert_eq!(step(&model, &mut state, &bad).status.rejected_inputs, 1);
+}
+
+#[test]
+fn a_fixed_body_that_starts_at_equilibrium_stays_there_and_a_free_one_has_none() {
+    let gravity = DVec3::new(0.0, -GRAVITY_M_S2, 2.0);
+    let parameters = ModelParameters { gravity, ..ModelParameters::default() };
+    let start = start_at(DVec3::ZERO);
+    let object = |recording| ModelObject {
+        deformation: InitialDeformation::Equilibrium,
+        ..ModelObject::new(recording, start)
+    };
+    let recording = fixed_block();
+    let nodes = recording.surface.positions.len();
+    let (model, mut state) = model_and_state(parameters.clone(), vec![object(recording.clone())]);
+    let (mut sag, mut now) = (vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]);
+    state.surface_displacement(&model, 0, &mut sag);
+    let most = sag.iter().fold(0.0_f64, |most, u| most.max(u.length()));
+    for _ in 0..2000 {
+        step(&model, &mut state, &Input::default());
+    }
+    state.surface_displacement(&model, 0, &mut now);
+    assert!(sag.iter().zip(&now).all(|(a, b)| (*a - *b).length() < 1e-9 * most), "{most}");
+    assert!(
+        state.output().energy.kinetic < 1e-15 * state.output().energy.elastic,
+        "{:?}",
+        state.output().energy
+    );
+    // Second route: an undeformed body with much damping comes to rest at it.
+    let damped = with_stiffness_damping(&recording, 0.05);
+    let (model, mut state) = model_and_state(parameters.clone(), vec![ModelObject::new(damped, start)]);
+    for _ in 0..20_000 {
+        step(&model, &mut state, &Input::default());
+    }
+    state.surface_displacement(&model, 0, &mut now);
+    assert!(sag.iter().zip(&now).all(|(a, b)| (*a - *b).length() < 1e-9 * most), "{most}");
+
+    let refused = Model::new(parameters, vec![object(free_block())]).expect_err("it would fall").to_string();
+    assert_eq!(
+        refused,
+        "object 0: has no fixed nodes: without contact it has no static equilibrium to start from"
+    );
 }

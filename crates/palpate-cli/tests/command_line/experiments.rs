@@ -198,6 +198,31 @@ fn gravity_is_a_vector_or_a_file() {
 }
 
 #[test]
+fn an_object_with_fixed_nodes_starts_at_its_sag() {
+    let workplace = Workplace::new();
+    workplace.succeed(&[&STIFF_CUBE[..], &["beam.palp", "--fix", "x<-0.049"]].concat());
+    let run = |start: &str| {
+        let object = format!("[[object]]\nname = \"beam\"\nrecording = \"beam.palp\"\n{start}");
+        workplace.write("scene.toml", format!("gravity = [0.0, -{GRAVITY}, 0.0]\n{object}"));
+        workplace.succeed(&["run", "scene.toml", "--duration", "0.5", "--csv", "steps.csv"]);
+        Table::parse(&workplace.text("steps.csv"))
+    };
+    let elastic = |table: &Table| table.column("energy.elastic");
+    let (still, swinging) = (elastic(&run("start = \"equilibrium\"\n")), elastic(&run("")));
+    let most = still.iter().fold(0.0_f64, |most, e| most.max(*e));
+    assert!(most > 0.0 && still.iter().all(|e| (e / most - 1.0).abs() < 1e-9), "{most}");
+    // Undeformed, it overshoots to nearly twice the sag and comes to rest at it.
+    assert!(swinging.iter().any(|e| *e > 2.0 * most), "{most}");
+    assert!((swinging[swinging.len() - 1] / most - 1.0).abs() < 1e-3, "{most} {:?}", swinging.last());
+    workplace
+        .write("scene.toml", "[[object]]\nname = \"beam\"\nrecording = \"beam.palp\"\nstart = \"still\"\n");
+    assert_eq!(
+        workplace.fail(&["run", "scene.toml"]),
+        "scene.toml: line 4: start is \"still\", expected \"undeformed\" or \"equilibrium\""
+    );
+}
+
+#[test]
 fn a_plane_has_a_point_or_a_path() {
     let workplace = workplace();
     workplace.write("lift.csv", "0,0,0,0\n");

@@ -50,6 +50,7 @@ pub(super) struct ObjectEntry {
     pub velocity: Numbers<3>,
     #[serde(default)]
     pub angular_velocity: Numbers<3>,
+    pub start: Option<Spanned<String>>,
     pub friction: Option<Spanned<f64>>,
 }
 

@@ -6,7 +6,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::recording_file::read_recording;
 use crate::warning::{Warning, WarningKind};
 use glam::{DQuat, DVec3};
-use palpate::{ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
+use palpate::{InitialDeformation, ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
 use palpate_fem::FORCE_ERROR_WARNING;
 use palpate_store::{Location, TableStore};
 use std::sync::Arc;
@@ -24,8 +24,16 @@ pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<Model
             angular: DVec3::from_array(object.angular_velocity.0),
         },
     };
+    let deformation = match object.start.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+        None | Some(("undeformed", _)) => InitialDeformation::Undeformed,
+        Some(("equilibrium", _)) => InitialDeformation::Equilibrium,
+        Some((other, span)) => {
+            let message = format!("start is {other:?}, expected \"undeformed\" or \"equilibrium\"");
+            return source.fail(span, SceneErrorKind::UnknownValue, "start", message);
+        }
+    };
     let friction = source.friction(object.friction.as_ref())?;
-    Ok(ModelObject { recording, response, start, friction })
+    Ok(ModelObject { recording, response, start, deformation, friction })
 }
 
 /// Recording and form of the response: from a recording file, a store of impulse responses, or both.

@@ -22,6 +22,17 @@ pub struct ObjectStart {
     pub twist: Twist,
 }
 
+/// Deformation of an object at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum InitialDeformation {
+    /// None.
+    #[default]
+    Undeformed,
+    /// Static equilibrium with gravity; of a body with fixed nodes in modal form.
+    Equilibrium,
+}
+
 /// Rules of a scene that an object is made for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ObjectRules<'a> {
@@ -45,6 +56,7 @@ pub(crate) struct Object {
     /// Mass and inertia; none for a body with fixed nodes.
     pub(crate) inertia: Option<Inertia>,
     pub(crate) start: ObjectStart,
+    pub(crate) deformation: InitialDeformation,
     /// Radius of the sphere about the centre of mass that holds the body at rest [m]: the scale of the solver's tolerance.
     pub(crate) radius: f64,
 }
@@ -54,7 +66,7 @@ impl Object {
     pub(crate) fn new(
         recording: Arc<Recording>,
         form: ResponseForm,
-        start: ObjectStart,
+        (start, deformation): (ObjectStart, InitialDeformation),
         friction: f64,
         rules: ObjectRules,
     ) -> Result<Self, ModelError> {
@@ -83,6 +95,18 @@ impl Object {
             let what = "has fixed nodes, and its impulse response does not tell how it sags under gravity";
             return Err(ModelError::ImpulseResponse { what: what.into() });
         }
+        if deformation == InitialDeformation::Equilibrium {
+            let what = match (&inertia, &response) {
+                (Some(_), _) => {
+                    "has no fixed nodes: without contact it has no static equilibrium to start from"
+                }
+                (None, Response::Fir(_)) => "uses a table, which starts undeformed: use the modal form",
+                (None, Response::Modal(_)) => "",
+            };
+            if !what.is_empty() {
+                return fail("deformation", what.into());
+            }
+        }
         if !(0.0..1e6).contains(&friction) {
             return fail("friction", format!("friction is {friction}, expected a number not below 0"));
         }
@@ -94,7 +118,15 @@ impl Object {
         let is_modal = matches!(response, Response::Modal(_));
         let max_samples = if is_modal { rules.max_contact_samples } else { usize::MAX };
         let body = Body::new(recording, &radii, max_samples);
-        Ok(Self { body, response, friction, inertia, start: ObjectStart { pose, twist }, radius })
+        Ok(Self {
+            body,
+            response,
+            friction,
+            inertia,
+            start: ObjectStart { pose, twist },
+            deformation,
+            radius,
+        })
     }
 
     /// Whether contacts are searched for on it: a table knows only points that are chosen beforehand.

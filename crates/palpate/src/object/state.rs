@@ -1,6 +1,6 @@
 //! State of one object: rigid motion, response, contact points and energy ledger.
 
-use super::Object;
+use super::{InitialDeformation, Object};
 use crate::energy::EnergyLedger;
 use crate::motion::{RigidIncrement, RigidState, RigidStep};
 use crate::response::{ContactPoints, ResponseState};
@@ -28,7 +28,7 @@ pub(crate) struct ObjectState {
 }
 
 impl ObjectState {
-    /// Undeformed object at its start, with room for contact points.
+    /// Object at its start, with room for contact points.
     pub(crate) fn new(object: &Object, gravity: DVec3, capacity: usize) -> Self {
         let nodes = object.body.recording.surface.positions.len();
         let twist = object.start.twist;
@@ -51,6 +51,10 @@ impl ObjectState {
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };
+        if object.deformation == InitialDeformation::Equilibrium {
+            let gravity = object.gravity_in_body(gravity, &pose);
+            state.response.start_at_equilibrium(&object.body, gravity);
+        }
         state.update_ledger(object, gravity);
         state.stored_at_start = state.ledger.stored();
         state

@@ -107,6 +107,16 @@ fn is_inertia(tensor: &DMat3) -> bool {
 const MIN_MOVABLE_WEIGHT: f64 = 1e-3;
 
 impl Recording {
+    /// Add the modal forces of a gravity [m/s², body] on a body with fixed nodes [N/√kg]; a free body has none.
+    pub(crate) fn add_gravity_load(&self, gravity: DVec3, forces: &mut [f64]) {
+        let Some(response) = &self.gravity else { return };
+        for (axis, a) in gravity.to_array().into_iter().enumerate() {
+            for (force, load) in forces.iter_mut().zip(&response.modal_forces[axis * self.modes.len()..]) {
+                *force += a * load;
+            }
+        }
+    }
+
     /// Whether a surface point can move: its corners are not all fixed nodes, but for a thousandth of their weight.
     pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
         let moves = |node: usize| {

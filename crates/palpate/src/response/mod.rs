@@ -260,6 +260,13 @@ impl ResponseState {
         }
     }
 
+    /// Start at the static equilibrium with a gravity [m/s², body]; a table starts undeformed.
+    pub(crate) fn start_at_equilibrium(&mut self, body: &Body, gravity: DVec3) {
+        if let Self::Modal(state) = self {
+            state.start_at_equilibrium(&body.recording, gravity);
+        }
+    }
+
     /// Modal coordinates at the end of the step without contact force; none with a table.
     pub(crate) fn free_coordinates(&self) -> &[f64] {
         match self {

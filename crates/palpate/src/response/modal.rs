@@ -88,6 +88,16 @@ impl ModalState {
         self.q.iter_mut().zip(modes).for_each(|(q, mode)| *q = mode.q);
     }
 
+    /// Set the modal states to the static equilibrium with a gravity, q = p/ω² [m/s², body].
+    pub(super) fn start_at_equilibrium(&mut self, recording: &Recording, gravity: DVec3) {
+        recording.add_gravity_load(gravity, &mut self.forces);
+        let loads = self.forces.iter().zip(&recording.modes.angular_frequencies);
+        for ((mode, q), (p, omega)) in self.modes.iter_mut().zip(&mut self.q).zip(loads) {
+            *q = p / (omega * omega);
+            *mode = OscillatorState { q: *q, v: 0.0 };
+        }
+    }
+
     fn rows(&self, slot: usize) -> &[f64] {
         let m = self.modes.len();
         &self.rows[3 * m * slot..3 * m * (slot + 1)]
@@ -188,20 +198,13 @@ impl SampledModes {
     ///
     /// # Real time
     pub(crate) fn predict(&self, recording: &Recording, state: &mut ModalState, gravity: DVec3) -> bool {
-        let m = self.len();
         let predicted = Some((gravity, self.step_s));
         if state.predicted == predicted {
             return true;
         }
         state.predicted = predicted;
         state.forces.fill(0.0);
-        if let Some(response) = &recording.gravity {
-            for (axis, a) in gravity.to_array().into_iter().enumerate() {
-                for (force, load) in state.forces.iter_mut().zip(&response.modal_forces[axis * m..]) {
-                    *force += a * load;
-                }
-            }
-        }
+        recording.add_gravity_load(gravity, &mut state.forces);
         let pairs = self.oscillators.iter().zip(&state.modes).zip(&state.forces);
         for (((oscillator, &mode), &p), free) in pairs.zip(&mut state.free) {
             *free = oscillator.advance(mode, p).q;
