@@ -234,12 +234,12 @@ export function decodeFrame(buffer: ArrayBuffer): Frame {
   for (let i = 0; i < contactCount; i++) {
     const packed = reader.u32();
     const numbers = reader.finiteFloats(7);
-    const collider = COLLIDER_KINDS[(packed >>> 8) & 0xff];
+    const collider = COLLIDER_KINDS[packed & 3];
     if (collider === undefined) throw new DecodeError("a contact with an unknown collider");
     contacts.push({
-      object: packed & 0xff,
+      object: (packed >>> 2) & 0x7fff,
       collider,
-      colliderIndex: packed >>> 16,
+      colliderIndex: packed >>> 17,
       point: vector(numbers, 0),
       force: vector(numbers, 3),
       slip: numbers[6],

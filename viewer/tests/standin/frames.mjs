@@ -68,7 +68,7 @@ export function encodeFrame(box, format, generation, scene) {
     writer.f32(...device.position, ...device.proxy, ...device.force);
   }
   for (const { object, kind, number, point, force, slip } of contacts) {
-    writer.u32(object | (kind << 8) | (number << 16));
+    writer.u32(kind | (object << 2) | (number << 17));
     writer.f32(...point, ...force, slip);
   }
   return writer.bytes();

@@ -16,7 +16,7 @@ test("a modal frame is decoded with its padding", () => {
     .f32(...POSE)
     .u32(2)
     .f32(1, 2, 3, 4, 5, 6, 7, 8, 9)
-    .u32(0 | (1 << 8) | (5 << 16))
+    .u32(1 | (300 << 2) | (5 << 17))
     .f32(1, 2, 3, 0, 10, 0, 0.125);
   const frame = decodeFrame(bytes.buffer);
   expect(frame.generation).toBe(3);
@@ -31,7 +31,7 @@ test("a modal frame is decoded with its padding", () => {
   expect([...shape.residualNodes]).toEqual([4, 5, 65540]);
   expect([...shape.residuals]).toEqual([1, -2, 3, 127, -127, 0, 0, 0, 0]);
   expect(frame.devices[0]).toEqual({ mode: "held", position: [1, 2, 3], proxy: [4, 5, 6], force: [7, 8, 9] });
-  expect(frame.contacts[0]).toEqual({ object: 0, collider: "obstacle", colliderIndex: 5, point: [1, 2, 3], force: [0, 10, 0], slip: 0.125 });
+  expect(frame.contacts[0]).toEqual({ object: 300, collider: "obstacle", colliderIndex: 5, point: [1, 2, 3], force: [0, 10, 0], slip: 0.125 });
 });
 
 test("a vertex frame is decoded", () => {

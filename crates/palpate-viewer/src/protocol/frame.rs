@@ -18,6 +18,9 @@ const MAX_CONTACTS: usize = 512;
 /// Residual displacements below this are not sent [m].
 const MIN_RESIDUAL: f64 = 1e-9;
 
+/// Largest number of an object or a collider in a contact: 15 bits.
+const NUMBER: u32 = 0x7fff;
+
 /// Format of the surfaces in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -107,12 +110,7 @@ impl FrameEncoder {
             [input.position, output.proxy, output.force_on_hand].into_iter().for_each(|v| out.vector(v));
         }
         for contact in &self.strongest {
-            let (kind, index) = match contact.against {
-                Collider::Device(index) => (0, index),
-                Collider::Obstacle(index) => (1, index),
-                Collider::Object(index) => (2, index),
-            };
-            out.u32(contact.object as u32 & 0xff | kind << 8 | (index as u32) << 16);
+            out.u32(sides(contact.object, contact.against));
             [contact.point, contact.force].into_iter().for_each(|v| out.vector(v));
             out.f32(contact.slip_speed);
         }
@@ -128,6 +126,16 @@ impl FrameEncoder {
             self.strongest.truncate(MAX_CONTACTS);
         }
     }
+}
+
+/// Sides of a contact in one word: the collider's kind, the object's number, the collider's number.
+fn sides(object: usize, against: Collider) -> u32 {
+    let (kind, index) = match against {
+        Collider::Device(index) => (0, index),
+        Collider::Obstacle(index) => (1, index),
+        Collider::Object(index) => (2, index),
+    };
+    kind | (object as u32 & NUMBER) << 2 | (index as u32) << 17
 }
 
 /// Residual displacements of at least half a unit, in units of 1/127 of the largest component.
@@ -173,6 +181,13 @@ mod tests {
             residuals[node] += DVec3::new(axis(0), axis(1), axis(2));
         }
         residuals
+    }
+
+    #[test]
+    fn sides_of_a_contact_keep_numbers_beyond_a_byte() {
+        // As in viewer/tests/unit/frame.test.ts.
+        assert_eq!(sides(300, Collider::Obstacle(5)), 1 | 300 << 2 | 5 << 17);
+        assert_eq!(sides(0x7fff, Collider::Object(0x7fff)), 0xffff_fffe);
     }
 
     #[test]
