@@ -56,7 +56,7 @@ function start(): void {
     help: () => help?.showModal(),
     theme: () => display.toggle("dark"),
   });
-  layout.overlayTop.append(notifications.banner, notifications.list);
+  layout.overlayTop.append(notifications.banner, notifications.warnings, notifications.list);
   document.body.append(layout.page);
 
   const fit = () => sceneView.resize(layout.viewArea.clientWidth, layout.viewArea.clientHeight, Math.min(MAX_PIXEL_RATIO, devicePixelRatio || 1));

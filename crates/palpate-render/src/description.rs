@@ -16,5 +16,9 @@ pub fn describe_scene(
     });
     let devices: Vec<(String, bool)> =
         scene.devices.iter().map(|device| (device.name.clone(), device.pointer)).collect();
-    SceneDescription::new(titles, &scene.model, objects.collect(), &scene.names().obstacles, &devices)
+    let obstacles = scene.names().obstacles;
+    SceneDescription {
+        warnings: scene.warnings.iter().map(ToString::to_string).collect(),
+        ..SceneDescription::new(titles, &scene.model, objects.collect(), &obstacles, &devices)
+    }
 }

@@ -138,6 +138,7 @@ export class LiveMode implements PageMode {
     this.physics.update(scene);
     this.material.update(scene);
     this.accuracy.update([scene]);
+    this.notifications.showWarnings(scene.warnings);
     this.showLoading("Loading the scene …");
     const onProgress = (fraction: number, bytes: number) => {
       if (bytes > 2e6) this.showLoading(`Loading the scene: ${Math.round(100 * fraction)} % of ${Math.round(bytes / 1e6)} MB`);

@@ -88,6 +88,7 @@ export interface SceneMessage {
   objects: SceneObject[];
   obstacles: SceneObstacle[];
   devices: SceneDevice[];
+  warnings: string[];
   view: { center: Vector; radius: number };
 }
 
@@ -203,6 +204,7 @@ const CHECKS: Record<ServerMessage["type"], Check> = {
     m.objects.every((o) => isObject(o) && typeof o.radius === "number" && isList(o.certificate)) &&
     isList(m.obstacles) &&
     m.obstacles.every((o) => isObject(o) && isObject(o.shape) && isNumbers(o.pose, 7)) &&
+    isList(m.warnings) &&
     isList(m.devices) &&
     m.devices.every((d) => isObject(d) && typeof d.tip_radius === "number") &&
     isView(m.view),

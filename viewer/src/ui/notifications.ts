@@ -1,4 +1,4 @@
-// Notifications: toasts that disappear, and one banner for a lasting problem.
+// Notifications: toasts that disappear, one banner for a lasting problem, and the warnings of a scene until they are closed.
 
 import { element, iconButton } from "./elements";
 
@@ -8,10 +8,12 @@ const MAX_NOTIFICATIONS = 3;
 export class Notifications {
   readonly list = element("div", { class: "notifications", role: "status", attributes: { "aria-live": "polite" } });
   readonly banner = element("div", { class: "banner", role: "alert" });
+  readonly warnings = element("div", { class: "warnings", role: "status" });
   private readonly notifiedOnce = new Set<string>();
 
   constructor() {
     this.banner.hidden = true;
+    this.warnings.hidden = true;
   }
 
   notify(text: string, kind: "info" | "error" = "info"): void {
@@ -29,6 +31,16 @@ export class Notifications {
     if (this.notifiedOnce.has(key)) return;
     this.notifiedOnce.add(key);
     this.notify(text, "error");
+  }
+
+  /** Shows the warnings of a scene in place of those before. */
+  showWarnings(lines: readonly string[]): void {
+    const title = lines.length === 1 ? "A warning about this scene" : `${lines.length} warnings about this scene`;
+    this.warnings.replaceChildren(
+      element("div", {}, element("strong", { text: title }), element("ul", {}, ...lines.map((text) => element("li", { text: String(text) })))),
+      iconButton("close", "Close the warnings", () => (this.warnings.hidden = true)),
+    );
+    this.warnings.hidden = lines.length === 0;
   }
 
   showBanner(text: string, action: { text: string; run: () => void } | null): void {

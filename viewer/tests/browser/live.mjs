@@ -45,6 +45,33 @@ export const liveCases = [
     },
   },
   {
+    name: "the warnings of a scene are shown on desk and phone until they are closed",
+    standinOnly: true,
+    async run(browser) {
+      const warnings = [
+        'the object "cube" begins 2.00 mm inside "floor": it is let out without velocity; move it by as much along (0.00, 1.00, 0.00)',
+        'device "finger" touches with a patch of 1.00e-2 m, less than 3 mean edges of "cube"',
+      ];
+      const server = browser.keep(await start({ warnings }));
+      for (const [name, options] of [
+        ["desk", { width: 1280, height: 720 }],
+        ["phone-dark", { width: 390, height: 844, touch: true, scale: 2, dark: true }],
+      ]) {
+        const page = await browser.page(server.url, options);
+        await waitForScene(page);
+        const lines = await page.locator(".warnings li").allTextContents();
+        assert(JSON.stringify(lines) === JSON.stringify(warnings), `${name}: ${lines}`);
+        const overlapping = await overlaps(page, PARTS.slice(0, 4));
+        assert(overlapping.length === 0, `${name}: ${overlapping.join("; ")}`);
+        await screenshot(page, `warnings-${name}`);
+        await page.click('[aria-label="Close the warnings"]');
+        assert(!(await page.isVisible(".warnings")), `${name}: the warnings stay`);
+        assertNoConsoleErrors(page);
+        await page.context().close();
+      }
+    },
+  },
+  {
     name: "help, scenes, pause, single step, slow motion and reset work by keys and buttons",
     async run(browser) {
       const server = browser.keep(await start());

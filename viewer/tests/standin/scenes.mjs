@@ -41,6 +41,7 @@ export function makeScene(id, generation, options) {
     about: found.about,
     step_s: 0.001,
     gravity: box.gravity,
+    warnings: options?.warnings ?? [],
     objects: [
       {
         name: "cube",

@@ -19,8 +19,8 @@ function argument(name, otherwise) {
   return at < 0 ? otherwise : (process.argv[at + 1] ?? "");
 }
 
-export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null } = {}) {
-  const options = { cells, modes };
+export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null, warnings = [] } = {}) {
+  const options = { cells, modes, warnings };
   let generation = 1;
   let scene = makeScene("bounce", generation, options);
   let [paused, slowdown, pendingTime, boxBytes] = [false, 1, 0, null];

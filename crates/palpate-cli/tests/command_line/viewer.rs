@@ -94,6 +94,17 @@ impl Page {
         self.0.send(Message::text(text)).expect("it hears");
     }
 
+    /// Description of the scene.
+    fn scene(&mut self) -> serde_json::Value {
+        loop {
+            let Message::Text(text) = self.0.read().expect("messages come") else { continue };
+            let message: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+            if message["type"] == "scene" {
+                return message;
+            }
+        }
+    }
+
     /// Wait for a picture that is so.
     fn see(&mut self, is: impl Fn(&Picture) -> bool) {
         loop {
@@ -189,6 +200,25 @@ fn pointers_are_of_pages_and_nobody_else() {
     ] {
         let error = workplace.fail(arguments);
         assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn a_page_gets_the_warnings_of_its_scene() {
+    let workplace = realtime::workplace();
+    let text = workplace.text("fingers.toml");
+    workplace.write("good.toml", &text);
+    workplace
+        .write("sunk.toml", text.replace("position = [0.0, 0.0, 0.0501]", "position = [0.0, 0.0, 0.048]"));
+    for (scene, expected) in [("good.toml", 0), ("sunk.toml", 1)] {
+        let serving = Serving::new(&workplace, &[scene]);
+        let warnings = serving.page().scene()["warnings"].clone();
+        let about_floor = |line: &&serde_json::Value| {
+            line.as_str().is_some_and(|line| line.contains("begins 2.00 mm inside \"floor\""))
+        };
+        let found = warnings.as_array().expect("a list").iter().filter(about_floor).count();
+        assert_eq!(found, expected, "{scene}: {warnings}");
+        assert_eq!(serving.interrupt(), Some(0));
     }
 }
 

@@ -25,6 +25,8 @@ pub struct SceneDescription {
     pub obstacles: Vec<ObstacleDescription>,
     /// Devices, in the order of the model.
     pub devices: Vec<DeviceDescription>,
+    /// Warnings for the author of the scene.
+    pub warnings: Vec<String>,
     /// Region that the camera shows at first.
     pub view: View,
     /// Frames, of a log.
@@ -233,6 +235,7 @@ impl SceneDescription {
             objects,
             obstacles: obstacles.iter().zip(shapes).map(obstacle).collect(),
             devices: devices.iter().zip(parameters).map(device).collect(),
+            warnings: Vec::new(),
             view: view(model),
             frames: None,
         }

@@ -10,8 +10,8 @@ use palpate_scene::{
     SettingsChange, attach_path, attach_real,
 };
 use palpate_viewer::{
-    MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
-    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+    MaterialDescription, PhysicsSettings, ProgressCallback, SceneDescription, SceneError, SceneProvider,
+    SceneSummary, SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -42,8 +42,11 @@ impl LibraryProvider {
     }
 
     fn viewer_scene(&self, opened: OpenedScene) -> Result<ViewerScene, Failure> {
-        let OpenedScene { scene, text, id, title, about, recordable, .. } = opened;
-        let description = describe_scene(&scene, (id, title, about), &recordable);
+        let OpenedScene { scene, text, id, title, about, recordable, warnings } = opened;
+        let description = SceneDescription {
+            warnings: warnings.iter().map(ToString::to_string).collect(),
+            ..describe_scene(&scene, (id, title, about), &recordable)
+        };
         let content = SceneLog::new(&scene, Some(text));
         let log = self.logs.as_ref().map(|logs| logs.opener(content)).transpose()?;
         let movers = scene.obstacles.iter().map(|obstacle| {
