@@ -74,9 +74,7 @@ impl Snapshot {
         let Output { time_s, devices, contacts, energy, status, .. } = state.output();
         (self.step, self.time_s, self.energy, self.status) = (step, *time_s, *energy, *status);
         self.objects.iter_mut().for_each(|object| object.copy_from(state));
-        self.input.devices.copy_from_slice(&input.devices);
-        self.input.obstacles.copy_from_slice(&input.obstacles);
-        self.input.gravity = input.gravity;
+        self.input.copy_from(input);
         self.devices.copy_from_slice(devices);
         self.contacts.clear();
         self.contacts.extend_from_slice(contacts);

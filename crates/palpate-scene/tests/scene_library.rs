@@ -19,7 +19,11 @@ fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
     let pointers: Vec<&str> = opened.scene.devices.iter().map(|device| device.name.as_str()).collect();
     assert_eq!(pointers, ["finger1", "finger2", "finger3", "finger4"]);
     assert_eq!(opened.recordable.len(), 1);
-    assert!(opened.warnings.iter().all(|warning| warning.part != "finger1"), "{:?}", opened.warnings);
+    assert!(
+        opened.scene.warnings.iter().all(|warning| warning.part != "finger1"),
+        "{:?}",
+        opened.scene.warnings
+    );
 
     let change =
         SettingsChange { gravity: Some([0.0, -1.6, 0.0]), friction: Some(0.9), ..Default::default() };

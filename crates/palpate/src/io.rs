@@ -71,6 +71,18 @@ pub struct Input {
     pub gravity: Option<DVec3>,
 }
 
+impl Input {
+    /// Copy another input of the same scene.
+    ///
+    /// # Real time
+    /// No allocation.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.devices.copy_from_slice(&other.devices);
+        self.obstacles.copy_from_slice(&other.obstacles);
+        self.gravity = other.gravity;
+    }
+}
+
 /// One device's part of a step's output.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DeviceOutput {

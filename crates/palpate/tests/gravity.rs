@@ -146,7 +146,7 @@ fn a_block_on_a_floor_carries_the_weight_of_the_moment_and_slides_beyond_the_ang
         let (share, along) = (impulse / weight, if slides { friction } else { slope });
         assert!((share.y - 1.0).abs() < SWAY && (share.x + along).abs() < SWAY, "{share} {along}");
         if slides {
-            // What it gains in the last second; before, the soft sole slips part by part.
+            // Gain of speed in the last second; before, the soft sole slips part by part.
             let gained = output.objects[0].twist.linear.x - leaned_at;
             assert!((gained / (GRAVITY_M_S2 * (slope - friction)) - 1.0).abs() < SWAY, "{gained}");
         } else {

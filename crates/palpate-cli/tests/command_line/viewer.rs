@@ -227,7 +227,7 @@ fn what_is_done_with_a_pointer_is_logged_and_every_scene_is_a_log_of_its_own() {
     let workplace = realtime::workplace();
     let text = workplace.text("fingers.toml");
     let (text, _) = text.split_once("[[device]]").expect("devices");
-    // Where gravity changes in time, a scene begins anew with other settings.
+    // Constant gravity: a scene whose gravity changes in time begins anew with other settings.
     workplace.write("cube.toml", text.replace("{ file = \"gravity.csv\" }", "[0.0, 0.0, -9.81]"));
     workplace.write("run-2.mcap", "of somebody else");
     let serving = Serving::new(&workplace, &["cube.toml", "--log", "run.mcap"]);

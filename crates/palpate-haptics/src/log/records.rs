@@ -72,9 +72,7 @@ impl StepRecord {
     pub fn capture(&mut self, input: &Input, state: &State) {
         let Output { time_s, devices, objects, energy, status, .. } = state.output();
         (self.time_s, self.energy, self.status) = (*time_s, *energy, *status);
-        self.input.devices.copy_from_slice(&input.devices);
-        self.input.obstacles.copy_from_slice(&input.obstacles);
-        self.input.gravity = input.gravity;
+        self.input.copy_from(input);
         self.devices.copy_from_slice(devices);
         self.objects.copy_from_slice(objects);
     }

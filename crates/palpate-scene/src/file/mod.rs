@@ -220,14 +220,8 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
 /// Parameters of the whole scene, without devices and obstacles.
 fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<ModelParameters, SceneError> {
     let usual = ModelParameters::default();
-    let motion = match file.integrator.as_ref().map(|m| (m.get_ref().as_str(), m.span())) {
-        None | Some(("exact", _)) => RigidIntegrator::ExactHold,
-        Some(("paper", _)) => RigidIntegrator::Paper,
-        Some((other, span)) => {
-            let message = format!("integrator is {other:?}, expected \"exact\" or \"paper\"");
-            return source.fail(span, SceneErrorKind::UnknownValue, "integrator", message);
-        }
-    };
+    let integrators = [("exact", RigidIntegrator::ExactHold), ("paper", RigidIntegrator::Paper)];
+    let motion = source.word("integrator", file.integrator.as_ref(), integrators)?;
     let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
         RigidCompliance::Included
     } else {

@@ -24,14 +24,9 @@ pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<Model
             angular: DVec3::from_array(object.angular_velocity.0),
         },
     };
-    let deformation = match object.start.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
-        None | Some(("undeformed", _)) => InitialDeformation::Undeformed,
-        Some(("equilibrium", _)) => InitialDeformation::Equilibrium,
-        Some((other, span)) => {
-            let message = format!("start is {other:?}, expected \"undeformed\" or \"equilibrium\"");
-            return source.fail(span, SceneErrorKind::UnknownValue, "start", message);
-        }
-    };
+    let deformations =
+        [("undeformed", InitialDeformation::Undeformed), ("equilibrium", InitialDeformation::Equilibrium)];
+    let deformation = source.word("start", object.start.as_ref(), deformations)?;
     let friction = source.friction(object.friction.as_ref())?;
     Ok(ModelObject { recording, response, start, deformation, friction })
 }

@@ -79,6 +79,24 @@ impl Source<'_> {
         Ok(if *repeat { path.repeating() } else { path })
     }
 
+    /// Value of a word; the first of two by default.
+    pub fn word<T>(
+        &self,
+        key: &str,
+        given: Option<&Spanned<String>>,
+        [(first, usual), (second, other)]: [(&str, T); 2],
+    ) -> Result<T, SceneError> {
+        let Some(given) = given else { return Ok(usual) };
+        match given.get_ref().as_str() {
+            word if word == first => Ok(usual),
+            word if word == second => Ok(other),
+            word => {
+                let message = format!("{key} is {word:?}, expected {first:?} or {second:?}");
+                self.fail(given.span(), SceneErrorKind::UnknownValue, key, message)
+            }
+        }
+    }
+
     /// Positive number.
     pub fn positive(&self, number: &Spanned<f64>, of: Quantity) -> Result<f64, SceneError> {
         let value = *number.get_ref();

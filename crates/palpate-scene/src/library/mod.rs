@@ -9,8 +9,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::file::{RunMode, read_edited_scene, read_text};
 use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
-use crate::scene::{Scene, SceneDevice};
-use crate::warning::Warning;
+use crate::scene::Scene;
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
 use palpate::{Coupling, Damping, Material};
 use palpate_fem::ElementOrder;
@@ -44,8 +43,6 @@ pub struct OpenedScene {
     pub about: String,
     /// Whether an object can be recorded again with another material, by object.
     pub recordable: Vec<bool>,
-    /// Warnings for the author of the scene; none about added pointers.
-    pub warnings: Vec<Warning>,
 }
 
 /// New values of settings; none leaves a setting as it is.
@@ -144,16 +141,16 @@ impl SceneLibrary {
     /// Reads the text of a scene, adds pointers if it has none, and makes it the current scene.
     fn open_text(&self, mut current: Current, text: String) -> Result<OpenedScene, SceneError> {
         let given = text.clone();
-        let (scene, text) =
+        let (mut scene, text) =
             read_edited_scene(&current.path, text, RunMode::RealTime, pointers::with_pointers)?;
         current.text = text.parse().map_err(|error| {
             SceneError::of_file(SceneErrorKind::Syntax, &current.path, format!("{error}"))
         })?;
         // Nobody has chosen the size of added pointers.
-        let added = |device: &&SceneDevice| device.pointer && text != given;
-        let is_of_added =
-            |warning: &Warning| scene.devices.iter().filter(added).any(|device| device.name == warning.part);
-        let warnings = scene.warnings.iter().filter(|warning| !is_of_added(warning)).cloned().collect();
+        if text != given {
+            let Scene { devices, warnings, .. } = &mut scene;
+            warnings.retain(|warning| !devices.iter().any(|d| d.pointer && d.name == warning.part));
+        }
         let recordable = current.add_recipes(&scene);
         let opened = OpenedScene {
             id: current.id.clone(),
@@ -162,7 +159,6 @@ impl SceneLibrary {
             scene,
             text,
             recordable,
-            warnings,
         };
         *self.lock() = current;
         Ok(opened)

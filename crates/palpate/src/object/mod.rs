@@ -96,15 +96,15 @@ impl Object {
             return Err(ModelError::ImpulseResponse { what: what.into() });
         }
         if deformation == InitialDeformation::Equilibrium {
-            let what = match (&inertia, &response) {
-                (Some(_), _) => {
-                    "has no fixed nodes: without contact it has no static equilibrium to start from"
-                }
-                (None, Response::Fir(_)) => "uses a table, which starts undeformed: use the modal form",
-                (None, Response::Modal(_)) => "",
-            };
-            if !what.is_empty() {
+            if inertia.is_some() {
+                let what = "has no fixed nodes: without contact it has no static equilibrium to start from";
                 return fail("deformation", what.into());
+            }
+            if matches!(response, Response::Fir(_)) {
+                return fail(
+                    "deformation",
+                    "uses a table, which starts undeformed: use the modal form".into(),
+                );
             }
         }
         if !(0.0..1e6).contains(&friction) {

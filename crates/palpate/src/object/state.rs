@@ -71,6 +71,14 @@ impl ObjectState {
     pub(crate) fn update_ledger(&mut self, object: &Object, gravity: DVec3) {
         let elastic = self.response.energy(&object.response);
         let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
+        self.ledger.kinetic = elastic.kinetic + rigid;
+        self.ledger.elastic = elastic.elastic;
+        self.ledger.residual = elastic.residual;
+        self.ledger.potential = self.potential(object, gravity);
+    }
+
+    /// Potential energy of the state in a gravity field [J].
+    pub(crate) fn potential(&self, object: &Object, gravity: DVec3) -> f64 {
         let mut potential = -object.body.recording.mass() * gravity.dot(self.rigid.pose.position);
         if let Some(response) = &object.body.recording.gravity {
             let acceleration = object.gravity_in_body(gravity, &self.rigid.pose);
@@ -81,10 +89,7 @@ impl ObjectState {
                 potential -= a * work;
             }
         }
-        self.ledger.kinetic = elastic.kinetic + rigid;
-        self.ledger.elastic = elastic.elastic;
-        self.ledger.residual = elastic.residual;
-        self.ledger.potential = potential;
+        potential
     }
 
     /// Force in body axes whose work on the deformation is exact, Rᵀ·(1 − v̂/2)·f [N] (see `step`).

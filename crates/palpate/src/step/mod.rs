@@ -81,9 +81,9 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     state.gravity = gravity;
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
         own.points.change_gravity(&mut object.view(gravity, &own.rigid, &mut own.response));
-        let before = own.ledger.potential;
-        own.update_ledger(object, gravity);
-        own.ledger.input += own.ledger.potential - before;
+        let potential = own.potential(object, gravity);
+        own.ledger.input += potential - own.ledger.potential;
+        own.ledger.potential = potential;
     }
 }
 
@@ -131,22 +131,11 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    let State {
-        steps,
-        objects,
-        devices,
-        obstacles,
-        gravity,
-        contacts,
-        inside,
-        levels,
-        couplings,
-        workspace,
-        output,
-    } = state;
+    let (step, gravity) = (state.steps, state.gravity);
+    let State { objects, devices, obstacles, contacts, inside, levels, couplings, workspace, output, .. } =
+        state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
-    let step = *steps;
     let scene = model.collision_scene();
     let mut context =
         CollisionContext { scene, states: objects, contacts, levels, workspace: collision, step };
@@ -202,7 +191,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     for (number, object) in (0..devices.len()).flat_map(|n| touchable().map(move |object| (n, object))) {
         context.rebuild_ahead(number, object);
     }
-    let bodies = (&*model.objects, *gravity);
+    let bodies = (&*model.objects, gravity);
     output.status.dropped_contacts += match_contacts(
         bodies,
         objects,
@@ -215,10 +204,11 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
 fn set_up_constraints(model: &Model, state: &mut State) {
-    let State { steps, objects, devices, contacts, gravity, workspace, output, .. } = state;
+    let gravity = state.gravity;
+    let State { steps, objects, devices, contacts, workspace, output, .. } = state;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let orientation = own.rigid.pose.orientation;
-        let mut view = object.view(*gravity, &own.rigid, &mut own.response);
+        let mut view = object.view(gravity, &own.rigid, &mut own.response);
         own.points.predict_new(&mut view);
         own.points.resum_next(*steps);
         for point in &mut own.points.points {
@@ -267,17 +257,12 @@ fn set_up_constraints(model: &Model, state: &mut State) {
 /// Solve for the contact forces. Losses of earlier steps must pay for pushing out tips: if they do not, penetrations stay as
 /// they are, and in the last resort contacts carry no force.
 fn solve(model: &Model, state: &mut State) {
-    let State { objects, devices, contacts, gravity, workspace, output, .. } = state;
+    let rules = model.step_rules(state.gravity);
+    let State { objects, devices, contacts, workspace, output, .. } = state;
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
-    let mut problem = ContactProblem {
-        objects: &model.objects,
-        rules: model.step_rules(*gravity),
-        states: objects,
-        devices,
-        contacts,
-        constraints,
-    };
+    let mut problem =
+        ContactProblem { objects: &model.objects, rules, states: objects, devices, contacts, constraints };
     for attempt in 0..3 {
         let SolverReport { residual_m, iterations, dependent_rows, unsolved_islands } =
             solver.solve(&mut problem);
@@ -300,13 +285,13 @@ fn solve(model: &Model, state: &mut State) {
 
 /// Integrate deformation and rigid motion with the forces held, and account for the energy.
 fn integrate(model: &Model, state: &mut State) {
-    let State { objects, devices, contacts, obstacles, gravity, workspace, couplings, output, .. } = state;
+    let gravity = state.gravity;
+    let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
     for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
     }
     remember_touches(objects, devices, contacts);
-    let gravity = *gravity;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);

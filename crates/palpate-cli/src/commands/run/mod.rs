@@ -110,8 +110,8 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
     let step_s = scene.model.parameters().step_s;
     let steps = count_steps(scene, arguments)?;
     let mut state = State::new(&scene.model);
-    let mut input = scene.input_at(0.0);
-    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, &input, steps)?;
+    let start = scene.input_at(0.0);
+    let mut outputs = Outputs::new(&arguments.outputs, scene, &state, &start, steps)?;
     let bar = if std::io::stderr().is_terminal() && steps > PROGRESS_FROM {
         ProgressBar::new(steps as u64)
     } else {
@@ -121,8 +121,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         if number % 1024 == 0 {
             bar.set_position(number as u64);
         }
-        let time = number as f64 * step_s;
-        move_input(scene, time, &mut input);
+        let input = scene.input_at(number as f64 * step_s);
         let before = Instant::now();
         step(&scene.model, &mut state, &input);
         let took = before.elapsed();
@@ -158,16 +157,6 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
         )));
     }
     Ok(steps as usize)
-}
-
-fn move_input(scene: &Scene, time: f64, input: &mut Input) {
-    for (device, entry) in scene.devices.iter().zip(&mut input.devices) {
-        entry.position = device.position_at(time);
-    }
-    for (obstacle, pose) in scene.obstacles.iter().zip(&mut input.obstacles) {
-        *pose = obstacle.pose_at(time);
-    }
-    input.gravity = scene.gravity_at(time);
 }
 
 /// Ends the run of a scene of held points at an unsolved step, in which the object would be released. In scenes with contacts

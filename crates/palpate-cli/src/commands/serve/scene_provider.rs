@@ -10,8 +10,8 @@ use palpate_scene::{
     SettingsChange, attach_path, attach_real,
 };
 use palpate_viewer::{
-    MaterialDescription, PhysicsSettings, ProgressCallback, SceneDescription, SceneError, SceneProvider,
-    SceneSummary, SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+    MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ impl LibraryProvider {
     /// Opens a scene file, and prints its warnings.
     pub fn open_file(&self, path: &Path) -> Result<ViewerScene, Failure> {
         let opened = self.library.open_file(path)?;
-        let warnings = opened.warnings.iter().map(|warning| format!("warning: {warning}"));
+        let warnings = opened.scene.warnings.iter().map(|warning| format!("warning: {warning}"));
         let messages: Vec<String> = warnings.chain(opened.scene.choices.iter().cloned()).collect();
         let scene = self.viewer_scene(opened)?;
         messages.iter().for_each(|line| notify(line));
@@ -42,11 +42,8 @@ impl LibraryProvider {
     }
 
     fn viewer_scene(&self, opened: OpenedScene) -> Result<ViewerScene, Failure> {
-        let OpenedScene { scene, text, id, title, about, recordable, warnings } = opened;
-        let description = SceneDescription {
-            warnings: warnings.iter().map(ToString::to_string).collect(),
-            ..describe_scene(&scene, (id, title, about), &recordable)
-        };
+        let OpenedScene { scene, text, id, title, about, recordable } = opened;
+        let description = describe_scene(&scene, (id, title, about), &recordable);
         let content = SceneLog::new(&scene, Some(text));
         let log = self.logs.as_ref().map(|logs| logs.opener(content)).transpose()?;
         let movers = scene.obstacles.iter().map(|obstacle| {
