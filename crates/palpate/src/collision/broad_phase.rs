@@ -27,7 +27,8 @@ impl CollisionContext<'_> {
         };
         let objects = self.scene.objects;
         let edge = objects[a].body.edge.max(objects[b].body.edge);
-        let slack = COLLISION.margin * edge + COLLISION.motion_factor * (motion(a) + motion(b));
+        let heights = objects[a].body.max_height + objects[b].body.max_height;
+        let slack = heights + COLLISION.margin * edge + COLLISION.motion_factor * (motion(a) + motion(b));
         let between = self.states[b].rigid.pose.position - self.states[a].rigid.pose.position;
         let Some(along) = between.try_normalize() else {
             return Some([HalfSpace { direction: DVec3::X, offset: f64::NEG_INFINITY }; 2]);

@@ -44,6 +44,25 @@ pub(crate) enum FeatureId {
     HeldPoint,
 }
 
+impl FeatureId {
+    /// Node of an object against an obstacle at a level of detail.
+    pub(super) fn of_node(level: usize, node: usize) -> Self {
+        match level {
+            0 => Self::Node(node as u32),
+            level => Self::Sample { level: level as u8, node: node as u32 },
+        }
+    }
+
+    /// Level of detail, of a node against an obstacle.
+    pub(super) fn level(&self) -> Option<usize> {
+        match self {
+            Self::Node(_) => Some(0),
+            Self::Sample { level, .. } => Some(usize::from(*level)),
+            _ => None,
+        }
+    }
+}
+
 /// Identity of a contact: the two sides and the feature between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ContactId {

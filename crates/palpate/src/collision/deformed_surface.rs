@@ -214,27 +214,28 @@ impl<'a> DeformedSurface<'a> {
 
     /// Position with the residual displacement of a node added [m], that of excluded contacts left out.
     fn add_residual(&self, node: usize, modal: DVec3) -> DVec3 {
-        let forces = self.spring_forces.iter().filter(|force| force.location.footprint == self.footprint);
         let own = || self.own.iter().flatten();
+        let at = (self.footprint, node);
         if self.footprint != Footprint::Point {
             let flat = |force: &SpringForce| {
                 if own().any(|(own, _)| *own == force.location) { self.flat_radius } else { 0.0 }
             };
-            let displacement =
-                |force: &SpringForce| self.body.residual_displacement(node, force, flat(force));
+            let couples = |force: &&SpringForce| self.body.couples(self.footprint, force.location.footprint);
+            let forces = self.spring_forces.iter().filter(couples);
+            let displacement = |force: &SpringForce| self.body.residual_displacement(at, force, flat(force));
             return modal + forces.map(displacement).sum::<DVec3>();
         }
         let mut position = modal;
         if let Some(nodal) = self.nodal {
-            position += nodal.residual_displacement(&self.body.recording.residual, node);
+            position += nodal.residual_displacement(self.body, self.spring_forces, node);
         }
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
         for (own, displacement) in own() {
             let is_beside = |force: &&SpringForce| {
                 force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
             };
-            if let Some(force) = forces.clone().find(is_beside) {
-                position += *displacement - self.body.residual_displacement(node, force, 0.0);
+            if let Some(force) = self.spring_forces.iter().find(is_beside) {
+                position += *displacement - self.body.residual_displacement(at, force, 0.0);
             }
         }
         position

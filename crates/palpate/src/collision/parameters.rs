@@ -37,9 +37,13 @@ pub(super) struct CollisionParameters {
     /// Number of cached triangles above which only seeds are kept: local minima of the distance, from which a descent leads
     /// to the present ones.
     pub(super) seed_above: usize,
-    /// An object is refined after this many steps with less than this share of the allowed samples near.
+    /// The next finer level of detail is tried after this many steps, and kept with at most this share of the allowed samples near.
     pub(super) refine_after_steps: u64,
     pub(super) refine_below: f64,
+    /// Depth of a node between contact samples from which finer samples are added, as a share of the object's radius.
+    pub(super) sample_tolerance: f64,
+    /// Spheres and triangles that a step visits to find such nodes.
+    pub(super) search_visits: usize,
 }
 
 /// The parameters.
@@ -58,7 +62,9 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     rebuild_steps: 4,
     seed_above: 48,
     refine_after_steps: 50,
-    refine_below: 1.0 / 6.0,
+    refine_below: 0.8,
+    sample_tolerance: 3e-4,
+    search_visits: 64,
 };
 
 /// Relative difference that is round-off: of distances, and of barycentric weights.

@@ -15,6 +15,8 @@ pub(crate) struct SolverParameters {
     pub(crate) loose_tolerance: f64,
     pub(super) visits: u32,
     pub(super) visits_with_samples: u32,
+    /// Penetration that contacts themselves push out where contact samples stand for nodes: what the search for deep nodes leaves.
+    pub(crate) sample_slop: f64,
     /// Residual that is used, and reported as unsolved, at the limit of sweeps.
     pub(super) rough_tolerance: f64,
     /// Upper limits of exact evaluations, each of which reduces the residual of the rotation by a factor of about
@@ -49,6 +51,7 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     loose_tolerance: 1e-5,
     visits: 600,
     visits_with_samples: 60,
+    sample_slop: 2e-3,
     rough_tolerance: 1e-4,
     max_evaluations: 40,
     max_sweeps: 400,

@@ -5,11 +5,12 @@
 use super::dot_products::{dot3, dot3_single};
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
-use super::residual_kernel::FactoredForce;
+use super::residual_kernel::{FactoredForce, ResidualKernel};
 use super::sample_surface::SampleSurface;
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals, triangles_around,
+    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals, smooth_heights,
+    triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -86,6 +87,9 @@ pub(crate) struct Body {
     first_around: Vec<u32>,
     /// Outward unit normal of every surface node at rest [body].
     normals: Vec<DVec3>,
+    /// Height of the smooth surface over every surface node [m], and the largest.
+    heights: Vec<f64>,
+    pub(crate) max_height: f64,
     /// Bounding box at rest [m, body].
     low: DVec3,
     high: DVec3,
@@ -103,8 +107,10 @@ impl Body {
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
         let normals = node_normals(&recording.surface);
+        let heights = smooth_heights(&recording.surface, recording.metadata.mesh.order);
+        let max_height = heights.iter().copied().fold(0.0, f64::max);
         for level in &*recording.levels_down_to(max_contact_samples) {
-            patches.push(PatchField::at_samples(&recording, level, &normals));
+            patches.push(PatchField::at_samples(&recording, level, &normals, &heights));
         }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {
@@ -123,6 +129,8 @@ impl Body {
             around,
             first_around,
             normals,
+            heights,
+            max_height,
             low,
             high,
         }
@@ -219,6 +227,23 @@ impl Body {
         self.normals[node]
     }
 
+    /// Height [m] of the smooth surface over a location; 0 on the decimated surface between contact samples, which lie on it.
+    ///
+    /// # Real time
+    pub(crate) fn smooth_height(&self, location: &ContactLocation) -> f64 {
+        match location.footprint {
+            Footprint::Patch(_) => 0.0,
+            Footprint::Point => {
+                self.corners(location).into_iter().map(|(node, weight)| self.heights[node] * weight).sum()
+            }
+        }
+    }
+
+    /// Height [m] of the smooth surface over a footprint's node.
+    pub(crate) fn node_height(&self, footprint: Footprint, node: usize) -> f64 {
+        if footprint == Footprint::Point { self.heights[node] } else { 0.0 }
+    }
+
     /// Rest position of a location [m, body].
     pub(crate) fn rest_position(&self, location: &ContactLocation) -> DVec3 {
         self.surface(location.footprint).rest_position(&location.point)
@@ -302,28 +327,65 @@ impl Body {
         corners.map(|(node, weight)| response.residual_displacement(node, gravity) * weight).sum()
     }
 
-    /// Residual compliance between two locations [m/N]; zero between different footprints, which couple by the modes
-    /// alone.
+    /// Residual compliance between two locations [m/N]; zero between patches of tips and other footprints, which couple by the
+    /// modes alone.
     ///
     /// # Real time
     pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
-        let recording = &*self.recording;
-        match (a.footprint == b.footprint, self.patch(a.footprint).map(|patch| &patch.centres)) {
-            (false, _) => DMat3::ZERO,
-            (true, Some(PatchCentres::Nodes(kernel))) => kernel.between(recording, &a.point, &b.point),
-            (true, Some(PatchCentres::Samples(samples))) => samples.residual(&a.point, &b.point),
-            (true, None) => {
-                let corners = |location: &ContactLocation| recording.surface.corners(&location.point);
-                let used = |corner: &(usize, f64)| corner.1 != 0.0;
-                let mut sum = DMat3::ZERO;
-                for (i, wi) in corners(a).into_iter().filter(used) {
-                    for (j, wj) in corners(b).into_iter().filter(used) {
-                        sum += recording.residual.block(i, j) * (wi * wj);
+        match self.kernel(a.footprint) {
+            Some(kernel) if a.footprint == b.footprint => kernel.between(&self.recording, &a.point, &b.point),
+            _ => used(self.corners(a))
+                .map(|(node, weight)| self.residual_at(a.footprint, node, b) * weight)
+                .sum(),
+        }
+    }
+
+    /// Residual compliance [m/N] of a surface node or a contact sample: its displacement per force at a location.
+    ///
+    /// # Real time
+    /// Costs a few blocks; between samples of different levels a patch.
+    fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
+        let is_tip = |footprint: Footprint| self.kernel(footprint).is_some();
+        if is_tip(footprint) || is_tip(location.footprint) {
+            return DMat3::ZERO;
+        }
+        match (self.samples(footprint), self.samples(location.footprint)) {
+            (None, None) => self.residual_of_node(node, location),
+            (Some(own), _) if footprint == location.footprint => own.residual_at(node, &location.point),
+            (Some(own), _) => {
+                let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
+                    None => own.to_nodes.between(own.index(node), corner) * weight,
+                    Some(patch) => {
+                        let nodes = patch.weights.of(patch.index(corner));
+                        own.to_nodes.averaged(own.index(node), nodes) * weight
                     }
-                }
-                sum
+                };
+                used(self.corners(location)).map(sum).sum()
+            }
+            (None, Some(other)) => {
+                let of = |sample: usize| other.to_nodes.between(other.index(sample), node).transpose();
+                used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
             }
         }
+    }
+
+    /// Whether forces at one footprint displace another one by the residual compliance.
+    pub(crate) fn couples(&self, a: Footprint, b: Footprint) -> bool {
+        a == b || self.kernel(a).is_none() && self.kernel(b).is_none()
+    }
+
+    fn kernel(&self, footprint: Footprint) -> Option<&ResidualKernel> {
+        match &self.patch(footprint)?.centres {
+            PatchCentres::Nodes(kernel) => Some(kernel),
+            PatchCentres::Samples(_) => None,
+        }
+    }
+
+    /// Nearest contact sample of a level of detail to a surface node, by its node; the node itself at level 0.
+    ///
+    /// # Real time
+    pub(crate) fn nearest_sample(&self, level: usize, node: usize) -> Option<usize> {
+        self.samples(self.footprint_at_level(level)).map_or(Some(node), |samples| samples.nearest(node))
     }
 
     /// Spring force [N, body] at a location.
@@ -340,24 +402,21 @@ impl Body {
         SpringForce { location, force, rest, factored }
     }
 
-    /// Residual displacement of a surface node under a force [m, body], averaged over the force's footprint. That of a patch
-    /// is constant up to a distance `flat_radius` [m] from the force.
+    /// Residual displacement of a footprint's node under a force [m, body]. That of a tip's patch is constant up to a distance
+    /// `flat_radius` [m] from the force.
     ///
     /// # Real time
     pub(crate) fn residual_displacement(
         &self,
-        node: usize,
+        (footprint, node): (Footprint, usize),
         applied: &SpringForce,
         flat_radius: f64,
     ) -> DVec3 {
-        match self.patch(applied.location.footprint).map(|patch| &patch.centres) {
-            Some(PatchCentres::Nodes(kernel)) => {
+        match self.kernel(footprint) {
+            Some(kernel) if footprint == applied.location.footprint => {
                 kernel.displacement(&self.recording, node, &applied.factored, flat_radius)
             }
-            Some(PatchCentres::Samples(samples)) => {
-                samples.residual_at(node, &applied.location.point) * applied.force
-            }
-            None => self.residual_of_node(node, &applied.location) * applied.force,
+            _ => self.residual_at(footprint, node, &applied.location) * applied.force,
         }
     }
 
@@ -380,4 +439,9 @@ impl Body {
         self.distribute(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
         sum
     }
+}
+
+/// Corners that carry weight.
+fn used(corners: [(usize, f64); 3]) -> impl Iterator<Item = (usize, f64)> {
+    corners.into_iter().filter(|(_, weight)| *weight != 0.0)
 }

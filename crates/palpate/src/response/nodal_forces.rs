@@ -1,5 +1,6 @@
 //! Spring forces of the residual compliance on nodes, and their displacements.
 
+use super::{Body, Footprint, SpringForce};
 use crate::recording::ResidualCompliance;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -65,25 +66,20 @@ impl NodalForces {
         }
     }
 
-    /// Residual displacement of a node [m, body].
+    /// Residual displacement of a node under these forces and the springs of contact samples [m, body].
     ///
     /// # Real time
-    /// Costs the loaded nodes, unless it is cached.
-    pub(crate) fn residual_displacement(&self, residual: &ResidualCompliance, node: usize) -> DVec3 {
-        let sum =
-            || self.loaded.iter().map(|&(other, force)| residual.block(node, other as usize) * force).sum();
+    /// Costs the loaded nodes and the springs, unless it is cached.
+    pub(crate) fn residual_displacement(&self, body: &Body, springs: &[SpringForce], node: usize) -> DVec3 {
+        let sum = || {
+            let residual = &body.recording.residual;
+            let at_nodes = self.loaded.iter();
+            let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
+            let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
+            let point = (Footprint::Point, node);
+            at_nodes.chain(of_samples.map(|spring| body.residual_displacement(point, spring, 0.0))).sum()
+        };
         self.displacements[node].unwrap_or_else(sum)
-    }
-
-    /// Residual displacement of a node [m, body], cached until the forces change.
-    pub(super) fn cached_residual_displacement(
-        &mut self,
-        residual: &ResidualCompliance,
-        node: usize,
-    ) -> DVec3 {
-        let displacement = self.residual_displacement(residual, node);
-        self.store(node, displacement);
-        displacement
     }
 
     /// Cache the residual displacement of a node [m, body].

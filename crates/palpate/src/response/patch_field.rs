@@ -54,13 +54,19 @@ impl PatchField {
         Self { radius, weights, rows, bounds, centres: PatchCentres::Nodes(kernel) }
     }
 
-    /// Patches about the contact samples of a level, with the outward normals of all surface nodes. A patch reaches to the next
+    /// Patches about the contact samples of a level, with the outward normals of all surface nodes and the
+    /// heights [m] of the smooth surface over them. A patch reaches to the next
     /// samples, so that patches cover the surface.
-    pub(crate) fn at_samples(recording: &Recording, level: &SampleLevel, normals: &[DVec3]) -> Self {
+    pub(crate) fn at_samples(
+        recording: &Recording,
+        level: &SampleLevel,
+        normals: &[DVec3],
+        heights: &[f64],
+    ) -> Self {
         let radius = level.spacing;
         let order = recording.metadata.mesh.order;
         let weights = PatchWeights::new(&recording.surface, order, radius, &level.nodes);
-        let samples = SampleSurface::new(recording, level, &weights, normals);
+        let samples = SampleSurface::new(recording, level, &weights, (normals, heights));
         let rows = averaged_rows(recording, &weights);
         let distances = ModalDistances::new(recording, &rows);
         let index = |node: usize| samples.index(node);

@@ -37,18 +37,23 @@ pub(crate) struct SampleSurface {
     pub(crate) tree: SphereTree,
     /// Residual compliance D between samples [m/N].
     pub(super) residual: ResidualCompliance,
+    /// Residual compliance between samples and surface nodes [m/N].
+    pub(super) to_nodes: PatchNodeCompliance,
+    /// Nearest sample of each surface node whose patch holds it, by its node; [`NONE`] without one.
+    nearest: Vec<u32>,
 }
 
 /// Sample index of a surface node without sample.
 const NONE: u32 = u32::MAX;
 
 impl SampleSurface {
-    /// Contact samples of a level, whose patches have these weights; with the outward normals of all surface nodes.
+    /// Contact samples of a level, whose patches have these weights; with the outward normals of all surface nodes and the heights of
+    /// the smooth surface over them [m].
     pub(super) fn new(
         recording: &Recording,
         level: &SampleLevel,
         weights: &PatchWeights,
-        normals: &[DVec3],
+        (normals, heights): (&[DVec3], &[f64]),
     ) -> Self {
         let (surface, nodes) = (&recording.surface, &level.nodes);
         let mut indices = vec![NONE; surface.positions.len()];
@@ -62,12 +67,24 @@ impl SampleSurface {
         }
         let surface = Surface {
             triangles,
-            positions: averaged_positions(surface, nodes, weights, normals),
+            positions: averaged_positions(surface, nodes, weights, (normals, heights)),
             ..surface.clone()
         };
         let tree = SphereTree::new(&surface.positions, &surface.triangles);
-        let residual = averaged(&recording.residual, weights, surface.positions.len());
-        Self { indices, nodes: nodes.clone(), surface, is_surface, triangle, tree, residual }
+        let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, surface.positions.len());
+        let residual = averaged(&recording.residual, &to_nodes, weights);
+        let nearest = nearest_samples(&recording.surface, nodes, weights);
+        Self {
+            indices,
+            nodes: nodes.clone(),
+            surface,
+            is_surface,
+            triangle,
+            tree,
+            residual,
+            to_nodes,
+            nearest,
+        }
     }
 
     /// Surface nodes of the samples.
@@ -82,19 +99,19 @@ impl SampleSurface {
         self.indices[node] as usize
     }
 
+    /// Node of the sample that is nearest to a surface node, of those whose patches hold it.
+    ///
+    /// # Real time
+    pub(super) fn nearest(&self, node: usize) -> Option<usize> {
+        Some(self.nearest[node]).filter(|&sample| sample != NONE).map(|sample| sample as usize)
+    }
+
     /// Sample as a point of the decimated surface.
     pub(super) fn node_point(&self, node: usize) -> SurfacePoint {
         let triangle = self.triangle[self.index(node)];
         let corners = self.surface.triangles[triangle as usize];
         let first = corners.iter().position(|corner| *corner as usize == node);
         SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
-    }
-
-    /// Residual compliance [m/N] between two points of the decimated surface, interpolated between its corners as the modes are.
-    ///
-    /// # Real time
-    pub(super) fn residual(&self, a: &SurfacePoint, b: &SurfacePoint) -> DMat3 {
-        self.used_corners(a).map(|(node, weight)| self.residual_at(node, b) * weight).sum()
     }
 
     /// Residual compliance [m/N] of a sample: its displacement per force at a point of the decimated surface.
@@ -110,19 +127,34 @@ impl SampleSurface {
     }
 }
 
-/// Node positions [m] with those of the samples averaged along their normals.
+/// Nearest sample of each node, of those whose patches hold it.
+fn nearest_samples(surface: &Surface, samples: &[u32], weights: &PatchWeights) -> Vec<u32> {
+    let mut nearest = vec![(f64::INFINITY, NONE); surface.positions.len()];
+    for (c, &sample) in samples.iter().enumerate() {
+        for (node, _) in weights.of(c) {
+            let distance = (surface.positions[node] - surface.positions[sample as usize]).length();
+            if distance < nearest[node].0 {
+                nearest[node] = (distance, sample);
+            }
+        }
+    }
+    nearest.into_iter().map(|(_, sample)| sample).collect()
+}
+
+/// Node positions [m] with those of the samples on the smooth surface, averaged along their normals.
 fn averaged_positions(
     surface: &Surface,
     samples: &[u32],
     weights: &PatchWeights,
-    normals: &[DVec3],
+    (normals, heights): (&[DVec3], &[f64]),
 ) -> Vec<DVec3> {
     let mut positions = surface.positions.clone();
     for (c, node) in samples.iter().map(|&node| node as usize).enumerate() {
         let (centre, normal) = (surface.positions[node], normals[node]);
         let smooth = weights.of(c).filter(|(other, _)| normals[*other].dot(normal) > EDGE_COSINE);
         let (sum, height) = smooth.fold((0.0, 0.0), |(sum, height), (other, w)| {
-            (sum + w, height + w * normal.dot(surface.positions[other] - centre))
+            let over = surface.positions[other] - centre + normals[other] * heights[other];
+            (sum + w, height + w * normal.dot(over))
         });
         if sum > 0.0 {
             positions[node] += normal * (height / sum);
@@ -131,80 +163,47 @@ fn averaged_positions(
     positions
 }
 
-/// Residual compliance between patches, averaged over both: W·S·Wᵀ.
-fn averaged(residual: &ResidualCompliance, weights: &PatchWeights, nodes: usize) -> ResidualCompliance {
-    // Patches that each node belongs to, with its weights in them.
-    let mut patches_of = vec![Vec::new(); nodes];
-    for c in 0..weights.len() {
-        weights.of(c).for_each(|(node, w)| patches_of[node].push((c, w)));
-    }
+/// Residual compliance between patches, averaged over both, from that between patches and nodes: (W·S)·Wᵀ.
+fn averaged(
+    residual: &ResidualCompliance,
+    to_nodes: &PatchNodeCompliance,
+    weights: &PatchWeights,
+) -> ResidualCompliance {
+    let count = weights.len();
     match residual {
         ResidualCompliance::None => ResidualCompliance::None,
-        ResidualCompliance::Whole(packed) => {
-            ResidualCompliance::Whole(averaged_whole(packed, weights, &patches_of))
-        }
-        ResidualCompliance::NearField(near) => {
-            ResidualCompliance::NearField(averaged_near_field(near, weights, &patches_of))
-        }
-    }
-}
-
-/// W·S·Wᵀ of a packed lower triangle. With its half L, S = L + Lᵀ, so that only contiguous rows are read.
-fn averaged_whole(packed: &[f32], weights: &PatchWeights, patches_of: &[Vec<(usize, f64)>]) -> Vec<f32> {
-    let count = weights.len();
-    let start = |row: usize| row * (row + 1) / 2;
-    let mut out = vec![0.0; start(3 * count)];
-    let mut rows = vec![0.0; 9 * patches_of.len()];
-    let mut sums = vec![0.0; 9 * count];
-    for c in 0..count {
-        // Three rows of W·L.
-        rows.fill(0.0);
-        let width = 3 * patches_of.len();
-        for (node, w) in weights.of(c) {
-            for (axis, row) in rows.chunks_exact_mut(width).enumerate() {
-                let at = 3 * node + axis;
-                let numbers = &packed[start(at)..start(at + 1)];
-                row.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += w * f64::from(*x));
-                // Half of the diagonal.
-                row[at] -= 0.5 * w * f64::from(numbers[at]);
-            }
-        }
-        // Three rows of W·L·Wᵀ.
-        sums.fill(0.0);
-        for (row, sums) in rows.chunks_exact(width).zip(sums.chunks_exact_mut(3 * count)) {
-            for (numbers, patches) in row.chunks_exact(3).zip(patches_of) {
-                if numbers != [0.0; 3] {
-                    for &(d, w) in patches {
-                        sums[3 * d..3 * d + 3].iter_mut().zip(numbers).for_each(|(sum, x)| *sum += w * x);
+        ResidualCompliance::Whole(_) => {
+            let mut packed = vec![0.0; 3 * count * (3 * count + 1) / 2];
+            for (c, d) in (0..count).flat_map(|c| (0..=c).map(move |d| (c, d))) {
+                let block = to_nodes.averaged(c, weights.of(d));
+                for axis in 0..3 {
+                    let row = 3 * c + axis;
+                    let width = if c == d { axis + 1 } else { 3 };
+                    let at = row * (row + 1) / 2 + 3 * d;
+                    for (out, x) in packed[at..at + width].iter_mut().zip(block.row(axis).to_array()) {
+                        *out = x as f32;
                     }
                 }
             }
+            ResidualCompliance::Whole(packed)
         }
-        for (axis, sums) in sums.chunks_exact(3 * count).enumerate() {
-            let own = 3 * c + axis;
-            for (other, sum) in sums.iter().enumerate() {
-                let at = start(own.max(other)) + own.min(other);
-                out[at] += (if own == other { 2.0 * sum } else { *sum }) as f32;
-            }
+        ResidualCompliance::NearField(near) => {
+            ResidualCompliance::NearField(averaged_near_field(near.radius, to_nodes, weights))
         }
     }
-    out
 }
 
 /// W·S·Wᵀ of a near field: blocks between patches with nodes within each other's near field.
-fn averaged_near_field(
-    near: &NearField,
-    weights: &PatchWeights,
-    patches_of: &[Vec<(usize, f64)>],
-) -> NearField {
-    let mut field = Accumulator::new(patches_of.len());
+fn averaged_near_field(radius: f64, to_nodes: &PatchNodeCompliance, weights: &PatchWeights) -> NearField {
+    // Patches that each node belongs to, with its weights in them.
+    let mut patches_of = vec![Vec::new(); to_nodes.node_count];
+    for c in 0..weights.len() {
+        weights.of(c).for_each(|(node, w)| patches_of[node].push((c, w)));
+    }
     let mut sums = Accumulator::new(weights.len());
     let mut lower: Vec<Vec<(u32, DMat3)>> = Vec::with_capacity(weights.len());
     for c in 0..weights.len() {
-        for (node, w) in weights.of(c) {
-            near.row(node).for_each(|(other, block)| field.add(other, block * w));
-        }
-        for (node, block) in field.drain() {
+        for (node, block) in to_nodes.row(c) {
             for &(d, w) in patches_of[node].iter().take_while(|(d, _)| *d <= c) {
                 sums.add(d, block * w);
             }
@@ -217,7 +216,7 @@ fn averaged_near_field(
             rows[*d as usize].push((c as u32, block.transpose()));
         }
     }
-    let mut out = NearField { radius: near.radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
+    let mut out = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
     for row in rows {
         for (d, block) in row {
             out.nodes.push(d);
@@ -226,6 +225,75 @@ fn averaged_near_field(
         out.offsets.push(out.nodes.len() as u32);
     }
     out
+}
+
+/// Residual compliance W·S between patches and surface nodes [m/N]: displacement of a patch per force at a node. Sparse by rows;
+/// a row with all nodes is indexed directly.
+#[derive(Debug, Clone)]
+pub(super) struct PatchNodeCompliance {
+    node_count: usize,
+    offsets: Vec<usize>,
+    nodes: Vec<u32>,
+    blocks: Vec<f32>,
+}
+
+impl PatchNodeCompliance {
+    fn new(residual: &ResidualCompliance, weights: &PatchWeights, node_count: usize) -> Self {
+        let mut out = Self { node_count, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
+        let mut sums = Accumulator::new(node_count);
+        for c in 0..weights.len() {
+            for (node, w) in weights.of(c) {
+                match residual {
+                    ResidualCompliance::None => {}
+                    ResidualCompliance::Whole(_) => {
+                        (0..node_count).for_each(|other| sums.add(other, residual.block(node, other) * w));
+                    }
+                    ResidualCompliance::NearField(near) => {
+                        near.row(node).for_each(|(other, block)| sums.add(other, block * w));
+                    }
+                }
+            }
+            for (node, block) in sums.drain() {
+                out.nodes.push(node as u32);
+                out.blocks.extend(block.transpose().to_cols_array().map(|x| x as f32));
+            }
+            out.offsets.push(out.nodes.len());
+        }
+        out
+    }
+
+    fn block(&self, at: usize) -> DMat3 {
+        let b = &self.blocks[9 * at..9 * at + 9];
+        let row =
+            |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
+        DMat3::from_cols(row(0), row(1), row(2)).transpose()
+    }
+
+    /// Blocks of a patch's row, with their nodes.
+    fn row(&self, patch: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
+        (self.offsets[patch]..self.offsets[patch + 1]).map(|at| (self.nodes[at] as usize, self.block(at)))
+    }
+
+    /// Displacement of a patch per force at a node [m/N].
+    ///
+    /// # Real time
+    pub(super) fn between(&self, patch: usize, node: usize) -> DMat3 {
+        let (first, end) = (self.offsets[patch], self.offsets[patch + 1]);
+        if end - first == self.node_count {
+            return self.block(first + node);
+        }
+        match self.nodes[first..end].binary_search(&(node as u32)) {
+            Ok(at) => self.block(first + at),
+            Err(_) => DMat3::ZERO,
+        }
+    }
+
+    /// Displacement of a patch per force that nodes share by weights [m/N].
+    ///
+    /// # Real time
+    pub(super) fn averaged(&self, patch: usize, nodes: impl Iterator<Item = (usize, f64)>) -> DMat3 {
+        nodes.map(|(node, weight)| self.between(patch, node) * weight).sum()
+    }
 }
 
 /// Sparse sums of blocks by index.

@@ -16,18 +16,20 @@ const FORGOTTEN_AT_NODES: f64 = 1e-13;
 pub(super) const RELAXING: usize = 256;
 
 impl ModalState {
-    /// Residual displacement of a location at the start of the step [m, body].
+    /// Residual displacement of a location at the start of the step [m, body]; that of nodes is cached until the forces change.
     pub(super) fn residual_displacement(&mut self, body: &Body, location: &ContactLocation) -> DVec3 {
-        if location.footprint == Footprint::Point {
-            let corners = body.recording.surface.corners(&location.point).into_iter();
-            let used = corners.filter(|(_, weight)| *weight != 0.0);
-            return used
-                .map(|(node, weight)| {
-                    self.nodal.cached_residual_displacement(&body.recording.residual, node) * weight
-                })
-                .sum();
+        let springs = &self.spring_forces;
+        if location.footprint != Footprint::Point {
+            return springs.iter().map(|other| body.residual(location, &other.location) * other.force).sum();
         }
-        self.spring_forces.iter().map(|other| body.residual(location, &other.location) * other.force).sum()
+        let corners = body.recording.surface.corners(&location.point).into_iter();
+        let mut sum = DVec3::ZERO;
+        for (node, weight) in corners.filter(|(_, weight)| *weight != 0.0) {
+            let displacement = self.nodal.residual_displacement(body, springs, node);
+            self.nodal.store(node, displacement);
+            sum += displacement * weight;
+        }
+        sum
     }
 
     /// Let all spring forces decay by a factor, and forget those that are small.

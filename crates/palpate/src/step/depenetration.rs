@@ -25,7 +25,12 @@ const TIME_CONSTANT_S: f64 = 0.02;
 /// Penetration [m] up to which contacts themselves let an object out, if losses pay for it: what the solver leaves. Depenetration alone would
 /// lift objects at rest off their contacts, or let them creep.
 pub(super) fn slop(model: &Model, object: usize) -> f64 {
-    SOLVER.loose_tolerance * model.objects[object].radius
+    let share = if model.parameters.max_contact_samples < usize::MAX {
+        SOLVER.sample_slop
+    } else {
+        SOLVER.loose_tolerance
+    };
+    share * model.objects[object].radius
 }
 
 /// Move objects out of obstacles and out of each other, at the end of a step. An object that a device holds stays in its hand.

@@ -273,9 +273,12 @@ fn solve(model: &Model, state: &mut State) {
             return;
         }
         let pairs = problem.contacts.iter_mut().zip(&mut *problem.constraints);
-        for (contact, constraint) in pairs.filter(|(contact, _)| !contact.is_held()) {
+        for (contact, constraint) in pairs {
+            let ContactLaw::Unilateral { friction } = contact.law else { continue };
             if attempt == 0 {
-                constraint.min_gap = contact.gap(constraint.start).min(0.0);
+                // Sides that sink by what the solver leaves, in the gap and in the slip, take the work that they could give.
+                let left = 2.0 * (1.0 + friction) * residual_m;
+                constraint.min_gap = contact.gap(constraint.start).min(0.0) - left;
             } else {
                 (constraint.min_gap, contact.force) = (f64::NEG_INFINITY, DVec3::ZERO);
             }

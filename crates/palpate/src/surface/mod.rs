@@ -16,6 +16,7 @@ mod triangle;
 pub(crate) use decimation::decimate;
 pub(crate) use patch_weights::{PatchWeights, patch_kernel, triangles_around};
 pub(crate) use poisson_disk::{EDGE_COSINE, node_normals, poisson_disk_sample};
+pub(crate) use quadratic_face::smooth_heights;
 pub(crate) use sample_level::MAX_LEVELS;
 pub use sample_level::{MIN_CONTACT_SAMPLES, SampleLevel};
 pub(crate) use sphere_tree::{

@@ -4,6 +4,7 @@ mod obstacle;
 mod pair;
 mod phong_projection;
 mod point_surface;
+mod refinement;
 mod tip;
 
 pub(crate) use tip::TipPair;

@@ -20,14 +20,14 @@ use crate::surface::{Centre, SurfacePoint, at_weights};
 use glam::{DAffine3, DVec3};
 
 /// An object and an obstacle over a step.
-struct ObstacleQuery<'a> {
-    object: usize,
-    number: usize,
-    body: &'a Body,
-    own: &'a ObjectState,
+pub(super) struct ObstacleQuery<'a> {
+    pub(super) object: usize,
+    pub(super) number: usize,
+    pub(super) body: &'a Body,
+    pub(super) own: &'a ObjectState,
     obstacle: &'a Obstacle,
     /// Level of detail of the object: 0 for all nodes.
-    level: usize,
+    pub(super) level: usize,
     /// Obstacle at the start and at the end.
     before: Pose,
     after: Pose,
@@ -73,7 +73,10 @@ impl CollisionContext<'_> {
         let max_samples = self.scene.max_contact_samples;
         let level = self.level_against_obstacle(at, number);
         let mark = self.workspace.candidates.mark();
-        loop {
+        let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
+        let before_level = self.levels[level].level;
+        self.levels[level].begin(self.step);
+        let is_near = loop {
             query.level = self.levels[level].level;
             let footprint = body.footprint_at_level(query.level);
             let positions = &mut self.workspace.positions[at];
@@ -81,20 +84,22 @@ impl CollisionContext<'_> {
             let surface =
                 &mut DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
             surface.cover_prediction();
-            let reach = object.radius + surface.max_displacement() + travel + query.margin;
+            let reach = object.radius + surface.max_displacement() + travel + query.margin + body.max_height;
             let candidates = &mut self.workspace.candidates;
-            if apart - reach <= obstacle.shape.radius() {
-                let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
-                query.nodes(surface, known, candidates, mark.len.saturating_add(max_samples));
+            let is_near = apart - reach <= obstacle.shape.radius();
+            let allowed = self.levels[level].allowed(max_samples);
+            if is_near {
+                query.nodes(surface, known, candidates, mark.len.saturating_add(allowed));
             }
-            let found = candidates.list.len() - mark.len;
-            if found > max_samples && query.level < body.coarsest_level() {
-                candidates.rewind(mark);
-                self.levels[level] = self.levels[level].coarser(self.step);
-                continue;
+            if candidates.list.len() - mark.len <= allowed || query.level == body.coarsest_level() {
+                break is_near;
             }
-            self.levels[level] = self.levels[level].after(found, max_samples, self.step);
-            break;
+            candidates.rewind(mark);
+            self.levels[level].coarsen(self.step);
+        };
+        if is_near && query.level > 0 {
+            let is_coarser = query.level > before_level;
+            query.refine(self, if is_coarser { &[] } else { known }, level, mark.len);
         }
         if obstacle.shape.has_corners() {
             query.corners(self);
@@ -104,9 +109,15 @@ impl CollisionContext<'_> {
 
 impl ObstacleQuery<'_> {
     /// Distance of a body point from the obstacle at the start [m]; infinite where it is more than `most`.
-    fn distance(&self, p: DVec3, most: f64) -> f64 {
+    pub(super) fn distance(&self, p: DVec3, most: f64) -> f64 {
         let local = self.obstacle_from_body.transform_point3(p);
         self.obstacle.shape.signed_distance(local, most).map_or(f64::INFINITY, |(distance, _)| distance)
+    }
+
+    /// Gap [m] of the smooth surface over a footprint's node at a body position; infinite where it is more than `most`.
+    pub(super) fn gap(&self, p: DVec3, (footprint, node): (Footprint, usize), most: f64) -> f64 {
+        let height = self.body.node_height(footprint, node);
+        self.distance(p, most + height) - height
     }
 
     /// Distance of a body point at the end of the step without contact force [m].
@@ -141,7 +152,7 @@ impl ObstacleQuery<'_> {
                 if is_full.get() {
                     return false;
                 }
-                let reach = radius + self.margin + self.sweep_margin;
+                let reach = radius + self.margin + self.sweep_margin + self.body.max_height;
                 match of {
                     Centre::Rest => self.distance(centre, reach + self.travel) < reach + self.travel,
                     Centre::Deformed(node) => {
@@ -154,14 +165,15 @@ impl ObstacleQuery<'_> {
                     if !surface.mark_node(node) {
                         continue;
                     }
-                    let feature = self.feature(node);
+                    let feature = FeatureId::of_node(self.level, node);
                     let position = match known.binary_search_by(|c| c.id.feature.cmp(&feature)) {
                         Ok(contact) => {
                             let point = self.own.points.of(known[contact].slot);
                             point.rest + point.state.displacement
                         }
                         Err(_) => {
-                            let reach = self.margin + residual + self.sweep_margin;
+                            let height = self.body.node_height(footprint, node);
+                            let reach = self.margin + residual + self.sweep_margin + height;
                             let modal = surface.modal_position(node);
                             if !self.approaches(modal, || surface.predicted_position(node), reach) {
                                 continue;
@@ -218,7 +230,7 @@ impl ObstacleQuery<'_> {
     }
 
     /// Push a candidate if a point that moves from one body position to another comes near the obstacle.
-    fn meet(
+    pub(super) fn meet(
         &self,
         candidates: &mut CandidateList,
         from: DVec3,
@@ -231,7 +243,10 @@ impl ObstacleQuery<'_> {
             self.obstacle_from_body.transform_point3(from),
             self.obstacle_from_body_after.transform_point3(to),
         );
-        let distance = |p: DVec3| shape.signed_distance(p, f64::INFINITY);
+        let height = self.body.smooth_height(&location);
+        let distance = |p: DVec3| {
+            shape.signed_distance(p, f64::INFINITY).map(|(distance, outward)| (distance - height, outward))
+        };
         let (Some((first, _)), Some((last, _))) = (distance(start), distance(end)) else { return };
         let travel = (end - start).length();
         // In the obstacle's frame: where a fast point first touches, else where it is.
@@ -253,17 +268,9 @@ impl ObstacleQuery<'_> {
             return;
         }
         let Some((gap, outward)) = distance(position) else { return };
-        let nearest = position - outward * gap;
+        let nearest = position - outward * (gap + height);
         let normal = -(self.before.orientation * outward);
         self.push(candidates, feature, location, normal, nearest);
-    }
-
-    /// Feature of a node at the present level of detail.
-    fn feature(&self, node: usize) -> FeatureId {
-        match self.level {
-            0 => FeatureId::Node(node as u32),
-            level => FeatureId::Sample { level: level as u8, node: node as u32 },
-        }
     }
 
     /// Push a contact of a location with a point of the obstacle, in its frame.
@@ -285,7 +292,7 @@ impl ObstacleQuery<'_> {
             },
             law: ContactLaw::Unilateral { friction: self.obstacle.friction },
             normal,
-            distance: 0.0,
+            distance: self.body.smooth_height(&location),
         });
     }
 
@@ -300,7 +307,7 @@ impl ObstacleQuery<'_> {
         let (response, points) = (&self.own.response, &self.own.points);
         let surface =
             &mut DeformedSurface::new(self.body, Footprint::Point, response, points, positions, moment);
-        let grown = surface.max_displacement() + self.margin + self.travel;
+        let grown = surface.max_displacement() + self.margin + self.travel + self.body.max_height;
         self.obstacle.shape.corners(
             |centre, radius| {
                 let centre = start.body_from_world(self.before.world_from_body(centre));
@@ -314,7 +321,8 @@ impl ObstacleQuery<'_> {
                 let known = known.map(|at| self.own.points.of(contacts[at].slot).location.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(position));
                 let travel = (free.body_from_world(self.after.world_from_body(position)) - point).length();
-                let moving = MovingPoint { point, travel, facing: DVec3::ZERO, known, edge: self.body.edge };
+                let (facing, heights, edge) = (DVec3::ZERO, self.body.max_height, self.body.edge);
+                let moving = MovingPoint { point, travel, facing, known, heights, edge };
                 if let Some((point, normal)) = point_against_surface(query, surface, &moving) {
                     let location = ContactLocation { point, footprint: Footprint::Point };
                     self.push(candidates, feature, location, start.orientation * normal, position);

@@ -32,6 +32,8 @@ impl CollisionContext<'_> {
     fn find_contacts_of_pair(&mut self, a: usize, b: usize) {
         let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
+        let details = [(a, b), (b, a)].map(|(own, other)| self.level_against_object(own, other));
+        details.iter().for_each(|&at| self.levels[at].begin(self.step));
         loop {
             let found = match self.overlap(a, b) {
                 Some([of_a, of_b]) => {
@@ -39,25 +41,20 @@ impl CollisionContext<'_> {
                 }
                 None => [0; 2],
             };
-            let sides = [(a, b, found[0]), (b, a, found[1])];
-            let near =
-                sides.map(|(own, other, found)| if self.can_be_coarser(own, other) { found } else { 0 });
+            let can_be_coarser = [self.can_be_coarser(a, b), self.can_be_coarser(b, a)];
+            let near = [0, 1].map(|side| if can_be_coarser[side] { found[side] } else { 0 });
+            let allowed = details.map(|at| self.levels[at].allowed(max_samples));
             let is_too_much = self.workspace.candidates.list.len() - mark.len > max_samples;
             // Coarsen a side that has too many near, or the one that has more of them.
-            let coarsens = near.map(|found| {
-                found > max_samples || is_too_much && found > 0 && found == near[0].max(near[1])
+            let coarsens = [0, 1].map(|side| {
+                let is_larger = near[side] > 0 && near[side] == near[0].max(near[1]);
+                near[side] > allowed[side] || is_too_much && is_larger
             });
-            for ((own, other, found), coarsens) in sides.into_iter().zip(coarsens) {
-                let at = self.level_against_object(own, other);
-                let level = self.levels[at];
-                self.levels[at] = if coarsens {
-                    level.coarser(self.step)
-                } else {
-                    level.after(found, max_samples, self.step)
-                };
-            }
             if !coarsens.contains(&true) {
                 return;
+            }
+            for (at, _) in details.into_iter().zip(coarsens).filter(|(_, coarsens)| *coarsens) {
+                self.levels[at].coarsen(self.step);
             }
             self.workspace.candidates.rewind(mark);
         }
@@ -166,7 +163,9 @@ impl Side<'_> {
         let (pose, base_pose) = (own.rigid.pose, base.own.rigid.pose);
         let grown = base.surface.max_displacement()
             + travel
-            + COLLISION.margin * object.body.edge.min(base.object.body.edge);
+            + COLLISION.margin * object.body.edge.min(base.object.body.edge)
+            + object.body.max_height
+            + base.object.body.max_height;
         let direction = pose.orientation.inverse() * half_space.direction;
         let residual = surface.max_residual();
         let is_near = |point: DVec3, radius: f64| {
@@ -216,6 +215,7 @@ fn approach(
         travel: travel + deformation,
         facing: nodes.direction_in(base, nodes.object.body.outward_normal(node)),
         known: known.map(|(_, location)| location.point.triangle),
+        heights: nodes.object.body.node_height(nodes.footprint, node) + base.object.body.max_height,
         edge: nodes.object.body.edge.min(base.object.body.edge),
     };
     // Residual displacement costs more: it is bounded here.
@@ -257,6 +257,6 @@ fn meet(
         other: CandidateSide::Object { number: nodes.number, location: of_node },
         law: ContactLaw::Unilateral { friction: libm::sqrt(nodes.object.friction * base.object.friction) },
         normal: base.own.rigid.pose.orientation * normal,
-        distance: 0.0,
+        distance: base.object.body.smooth_height(&location) + nodes.object.body.smooth_height(&of_node),
     })
 }

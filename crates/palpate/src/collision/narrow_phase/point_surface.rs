@@ -19,6 +19,8 @@ pub(crate) struct MovingPoint {
     pub(crate) facing: DVec3,
     /// Triangle that it was in contact with.
     pub(crate) known: Option<u32>,
+    /// Heights of the smooth surfaces over the point and, at most, over the other surface [m].
+    pub(crate) heights: f64,
     /// Mean edge that distances are scaled with [m].
     pub(crate) edge: f64,
 }
@@ -26,8 +28,9 @@ pub(crate) struct MovingPoint {
 impl MovingPoint {
     /// Distance within which the surface can be met [m].
     pub(crate) fn reach(&self) -> f64 {
-        let Self { travel, known, edge, .. } = *self;
-        COLLISION.margin * edge
+        let Self { travel, known, heights, edge, .. } = *self;
+        heights
+            + COLLISION.margin * edge
             + 2.0 * travel
             + if known.is_some() { edge } else { COLLISION.max_depth * edge }
     }
@@ -41,11 +44,12 @@ pub(crate) fn point_against_surface(
     surface: &mut DeformedSurface,
     moving: &MovingPoint,
 ) -> Option<(SurfacePoint, DVec3)> {
-    let MovingPoint { point, travel, facing, known, edge } = *moving;
+    let MovingPoint { point, travel, facing, known, heights, edge } = *moving;
     let (margin, reach) = (COLLISION.margin * edge, moving.reach());
     query.nearest_triangles(surface, (point, facing), reach, known);
     let nearest = query.found.first().copied()?;
-    let allowed = margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
+    let allowed =
+        heights + margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
     let on_face = nearest.weights.iter().all(|w| *w > ROUND_OFF);
     let mut inside = query.is_inside(surface.body, point);
     let mut at_border = false;
