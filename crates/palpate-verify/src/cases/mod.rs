@@ -2,6 +2,7 @@
 
 mod adversarial;
 mod aligned_faces;
+mod bodies;
 mod bounce;
 mod closed_loop;
 mod compliance;
@@ -146,6 +147,11 @@ pub const CASES: &[Case] = &[
         name: "closed-loop",
         about: "device, hand, rate and delay: where the loop begins to swing, and what the controller leaves of it",
         compute: closed_loop::study,
+    },
+    Case {
+        name: "bodies",
+        about: "a set of bodies that rest, slide, roll, land, are punched, pinched and stacked: nothing sinks",
+        compute: bodies::bodies,
     },
     Case {
         name: "adversarial",

@@ -1,0 +1,116 @@
+//! Bodies of the set: meshes of about 10 cm, each coarse and fine.
+
+use crate::error::VerifyError;
+use glam::{DMat3, DVec3};
+use palpate::Recording;
+use palpate_fem::ElementOrder;
+use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
+use palpate_testkit::ElasticMaterial;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Soft silicone, damped so that it comes to rest within a second.
+pub const SOFT: ElasticMaterial =
+    ElasticMaterial { young_pa: 3e4, poisson: 0.45, density_kg_m3: 1000.0, stiffness_damping_s: 2e-3 };
+
+/// Number of modes: those of a recording by default.
+const MODES: usize = 200;
+
+/// Shape of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BodyShape {
+    Cube,
+    Ball,
+    Torus,
+    Blob,
+    Sheet,
+    Rod,
+    Horseshoe,
+}
+
+/// Fineness of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fineness {
+    Coarse,
+    Fine,
+}
+
+impl BodyShape {
+    pub const ALL: [Self; 7] =
+        [Self::Cube, Self::Ball, Self::Torus, Self::Blob, Self::Sheet, Self::Rod, Self::Horseshoe];
+
+    /// Mesh about its centre, with the axis of symmetry along y.
+    fn mesh(self, fineness: Fineness) -> Result<Mesh, VerifyError> {
+        let n = |coarse: u32, fine: u32| if fineness == Fineness::Coarse { coarse } else { fine };
+        let mesh = match self {
+            Self::Cube => box_mesh([0.1; 3], [n(4, 6); 3])?,
+            Self::Ball => ball_mesh(0.05, n(4, 6))?,
+            Self::Blob => mapped(ball_mesh(0.05, n(4, 6))?, blob),
+            Self::Sheet => box_mesh([0.12, 0.008, 0.12], [n(8, 12), 1, n(8, 12)])?,
+            Self::Rod => mapped(box_mesh([0.16, 0.024, 0.024], [n(12, 20), n(2, 4), n(2, 4)])?, round(0.012)),
+            Self::Horseshoe => {
+                let bar = box_mesh([0.16, 0.024, 0.024], [n(12, 20), n(2, 4), n(2, 4)])?;
+                mapped(bar, |p| bend(0.75 * TAU / 0.16, p))
+            }
+            Self::Torus => {
+                let bar = box_mesh([1.0, 0.03, 0.03], [n(16, 24), n(2, 4), n(2, 4)])?;
+                joined(mapped(mapped(bar, round(0.015)), |p| bend(TAU, p)))
+            }
+        };
+        Ok(mesh)
+    }
+
+    /// Recording of the body.
+    pub fn recording(self, fineness: Fineness) -> Result<Arc<Recording>, VerifyError> {
+        Ok(SOFT.free_body(self.mesh(fineness)?, ElementOrder::Quadratic, MODES)?)
+    }
+}
+
+fn mapped(mut mesh: Mesh, map: impl Fn(DVec3) -> DVec3) -> Mesh {
+    mesh.nodes.iter_mut().for_each(|node| *node = map(*node));
+    mesh
+}
+
+/// Ball to a liver-like blob: flat below, with a bulge.
+fn blob(p: DVec3) -> DVec3 {
+    let bulge = 1.0 + 0.25 * (p.x / 0.05 * 2.0).sin() * (p.z / 0.05 * 1.5 + 0.5).cos();
+    DVec3::new(1.2 * p.x, 0.6 * p.y * bulge, 0.9 * p.z + 0.15 * p.x)
+}
+
+/// Square section of half width a in y and z to a disk.
+fn round(a: f64) -> impl Fn(DVec3) -> DVec3 {
+    move |p| {
+        let (y, z) = (p.y / a, p.z / a);
+        let (s, r) = (y.abs().max(z.abs()), y.hypot(z));
+        let share = if r > 0.0 { s / r } else { 0.0 };
+        // Between square and disk inside, the disk at the rim: no element degenerates.
+        let share = 1.0 + (share - 1.0) * s;
+        DVec3::new(p.x, a * y * share, a * z * share)
+    }
+}
+
+/// Bar along x to an arc in the plane of x and z, with a radius of 3.4 cm about y.
+fn bend(turn: f64, p: DVec3) -> DVec3 {
+    const RADIUS: f64 = 0.034;
+    DMat3::from_rotation_y(turn * p.x) * DVec3::new(0.0, p.y, RADIUS + p.z)
+}
+
+/// Mesh with nodes at one place joined.
+fn joined(mesh: Mesh) -> Mesh {
+    let mut kept: Vec<DVec3> = Vec::new();
+    let mut number = Vec::with_capacity(mesh.nodes.len());
+    for node in &mesh.nodes {
+        let known = kept.iter().position(|other| (*other - *node).length() < 1e-9);
+        number.push(known.unwrap_or_else(|| {
+            kept.push(*node);
+            kept.len() - 1
+        }) as u32);
+    }
+    let tets = mesh.tets.iter().map(|tet| tet.map(|n| number[n as usize])).collect();
+    Mesh { nodes: kept, tets, ..mesh }
+}
+
+/// Turn about an axis by an angle in degrees.
+pub fn turned(axis: DVec3, degrees: f64) -> glam::DQuat {
+    glam::DQuat::from_axis_angle(axis.normalize(), degrees * PI / 180.0)
+}
