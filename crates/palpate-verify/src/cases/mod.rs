@@ -89,8 +89,13 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "peak-force",
-        about: "certified peak force errors against bodies with all their modes: 54 cases, one to three held places",
-        compute: peak_force::peak_force,
+        about: "certified peak force errors against bodies with all their modes: free and fixed, one to three held places",
+        compute: peak_force::held,
+    },
+    Case {
+        name: "peak-force-touched",
+        about: "the same with one to three fingers that press patches in",
+        compute: peak_force::touched,
     },
     Case {
         name: "impulse",
