@@ -67,7 +67,24 @@ def force(depth, nu, rings):
         active &= ~pulling
 
 
+def check(nu):
+    """Stress in the centre of a ball that opposite forces P press at its poles, over P/(pi R^2): known in closed form (Sternberg & Rosenthal 1952)."""
+    mu = 1 / (2 * (1 + nu))
+    lame = 2 * mu * nu / (1 - 2 * nu)
+    c = -(10 + 4 / (1 - 2 * nu)) / (2 + 5 / (1 - 2 * nu))
+    traction = np.array([[4 * mu, lame * (4 + 5 * c) + 6 * mu * (2 + c)], [2 * mu, mu * (4 + c)]])
+    strain = np.linalg.solve(traction, [-2.5, 0])[0]
+    assert np.allclose(-0.5 + 4 * mu * strain, -(42 + 15 * nu) / (14 + 10 * nu))
+    assert np.allclose(-0.5 - 2 * mu * strain, 21 / (28 + 20 * nu))
+    # Betti's theorem, and the half-space for short waves.
+    pair = compliance(4, nu)
+    assert np.allclose(pair[0, 1], 20 * pair[1, 0])
+    assert np.allclose(4000 * compliance(4000, nu)[0, 0], 2 * (1 - nu**2), rtol=1e-3)
+
+
 if __name__ == "__main__":
+    check(POISSON)
+    check(0.3)
     roots = np.linspace(0.03, 0.26, 12)
     hertz = 4 / 3 / (1 - POISSON**2) * roots**3
     for rings in (60, 100):

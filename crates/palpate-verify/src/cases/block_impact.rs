@@ -25,7 +25,7 @@ const FOAM: ElasticMaterial =
 const SPEED: f64 = 0.1;
 const MODES: usize = 200;
 
-/// What is left after a fall.
+/// Energy and speed after a fall.
 struct Left {
     /// Energy over that at the start.
     energy: f64,

@@ -151,7 +151,7 @@ fn over_beam(length: f64, poisson: f64, checks: &mut Vec<Check>) -> Result<OverB
 pub fn cantilever() -> Result<Vec<Check>, VerifyError> {
     /// Two quadratic elements across, and for the tip force the indentation of the point that is held: 1/3000 of the beam's compliance.
     const BEAM: f64 = 0.002;
-    /// What the clamped end adds is b/L times a number below 1, and extrapolated away to the order (b/L)².
+    /// Stiffening by the clamped end: it is b/L times a number below 1, and extrapolated away to the order (b/L)².
     const EXTRAPOLATED: f64 = 0.003;
     let mut checks = Vec::new();
     let straight = over_beam(LENGTHS[0], 0.0, &mut checks)?;

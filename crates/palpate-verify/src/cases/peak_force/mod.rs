@@ -109,7 +109,7 @@ impl Body {
     }
 }
 
-/// The same modes with another damping.
+/// Recording with the same modes and another damping.
 fn damped(unreduced: &Recording, damping: Damping) -> Arc<Recording> {
     let mut damped = unreduced.clone();
     damped.metadata.damping = damping;
