@@ -3,7 +3,11 @@
 mod adversarial;
 mod aligned_faces;
 mod bodies;
+mod ball_between_planes;
+mod block_impact;
 mod bounce;
+mod boussinesq;
+mod cantilever;
 mod closed_loop;
 mod compliance;
 mod contact_samples;
@@ -19,8 +23,10 @@ mod pinch_lift;
 mod press;
 mod residual_relaxation;
 mod rigid_motion;
+mod rolling_ball;
 mod shaken_block;
 mod sphere;
+mod spinning_block;
 mod stack;
 
 use crate::case::Case;
@@ -36,6 +42,11 @@ pub const CASES: &[Case] = &[
         name: "momentum",
         about: "a held force gives momentum f·h and angular momentum r×f·h",
         compute: rigid_motion::momentum,
+    },
+    Case {
+        name: "spin",
+        about: "a block that spins without torque against Jacobi's elliptic functions",
+        compute: spinning_block::spinning_block,
     },
     Case {
         name: "energy",
@@ -79,8 +90,13 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "peak-force",
-        about: "certified peak force errors against bodies with all their modes: 54 cases, one to three held places",
-        compute: peak_force::peak_force,
+        about: "certified peak force errors against bodies with all their modes: free and fixed, one to three held places",
+        compute: peak_force::held,
+    },
+    Case {
+        name: "peak-force-touched",
+        about: "the same with one to three fingers that press patches in",
+        compute: peak_force::touched,
     },
     Case {
         name: "impulse",
@@ -123,6 +139,26 @@ pub const CASES: &[Case] = &[
         compute: hertz_indentation::indentation,
     },
     Case {
+        name: "cantilever",
+        about: "sag of a cantilever, at once and settled, and the force of its tip, against Timoshenko's beam",
+        compute: cantilever::cantilever,
+    },
+    Case {
+        name: "boussinesq",
+        about: "a footprint pressed into ever larger blocks against Boussinesq's half-space",
+        compute: boussinesq::boussinesq,
+    },
+    Case {
+        name: "ball-between-planes",
+        about: "an elastic ball pressed between two planes against Hertz's law with the ball's finite size",
+        compute: ball_between_planes::ball_between_planes,
+    },
+    Case {
+        name: "rolling-ball",
+        about: "a ball that spins on the spot (3πμNa/16), slides until it rolls (5/7 of its speed), and rolls on",
+        compute: rolling_ball::rolling_ball,
+    },
+    Case {
         name: "pinch-lift",
         about: "two fingers pinch a cube, lift, shake and throw it",
         compute: pinch_lift::pinch_lift,
@@ -131,6 +167,11 @@ pub const CASES: &[Case] = &[
         name: "drop-block",
         about: "a block with ν = 0 dropped flat: force ρcvA for 2L/c, and it leaves as it came",
         compute: drop_block::drop_block,
+    },
+    Case {
+        name: "block-impact",
+        about: "blocks with ν = 0 dropped flat with the usual 200 modes: 97 % of the energy stays",
+        compute: block_impact::block_impact,
     },
     Case { name: "stack", about: "two cubes rest on one another for a minute", compute: stack::stack },
     Case {
