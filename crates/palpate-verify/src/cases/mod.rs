@@ -12,6 +12,7 @@ mod frequencies;
 mod friction;
 mod hertz_indentation;
 mod impulse_response;
+mod let_out;
 mod peak_force;
 mod pinch;
 mod pinch_lift;
@@ -136,6 +137,11 @@ pub const CASES: &[Case] = &[
         name: "faces",
         about: "flat faces on one another: St Venant's two bars; cubes on cubes, aligned, shifted and turned",
         compute: aligned_faces::aligned_faces,
+    },
+    Case {
+        name: "let-out",
+        about: "600 tips that appear inside five bodies: none stays inside, and none strikes",
+        compute: let_out::let_out,
     },
     Case {
         name: "fingers-hold",

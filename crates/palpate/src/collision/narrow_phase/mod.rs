@@ -5,5 +5,6 @@ mod pair;
 mod phong_projection;
 mod point_surface;
 mod tip;
+mod tip_place;
 
 pub(crate) use tip::TipPair;
