@@ -3,6 +3,7 @@
 mod adversarial;
 mod aligned_faces;
 mod bounce;
+mod built_in_scenes;
 mod closed_loop;
 mod compliance;
 mod contact_samples;
@@ -152,6 +153,11 @@ pub const CASES: &[Case] = &[
         name: "closed-loop",
         about: "device, hand, rate and delay: where the loop begins to swing, and what the controller leaves of it",
         compute: closed_loop::study,
+    },
+    Case {
+        name: "built-in-scenes",
+        about: "built-in scenes for ten minutes alone, and for minutes with random pointers: in reach, in shape, energies in order",
+        compute: built_in_scenes::built_in_scenes,
     },
     Case {
         name: "adversarial",
