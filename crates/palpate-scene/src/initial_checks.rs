@@ -194,14 +194,10 @@ fn overlap(a: &Placed, b: &Placed) -> Option<Warning> {
 fn tip_inside(name: &str, centre: DVec3, radius: f64, object: &Placed) -> Option<Warning> {
     let solid = Shape::Mesh(object.solid.clone()?);
     let (distance, _) = solid.signed_distance(object.pose.body_from_world(centre), radius)?;
-    let consequence = if distance < 0.0 {
-        "it touches nothing until it has been outside"
-    } else {
-        "what it overlaps by counts as touched and not as pressed"
-    };
     (radius - distance > object.allowed()).then(|| {
         let message = format!(
-            "the tip of {name:?} begins {} inside the object {:?}: {consequence}; begin its path outside",
+            "the tip of {name:?} begins {} inside the object {:?}: it starts on the surface, from where it presses its way to the \
+             hand within a tenth of a second; begin its path outside",
             millimetres(radius - distance),
             object.name
         );

@@ -16,6 +16,9 @@ pub enum VerifyError {
     /// A model.
     #[error(transparent)]
     Model(#[from] palpate::Error),
+    /// A built-in scene.
+    #[error(transparent)]
+    Scene(#[from] palpate_scene::SceneError),
     /// A device or its path.
     #[error(transparent)]
     Haptics(#[from] palpate_haptics::Error),

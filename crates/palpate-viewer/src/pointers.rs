@@ -8,7 +8,8 @@
 //! ```
 //!
 //! A steady motion is followed with a delay of 2/ω. The interface point starts to move once the force process has
-//! processed the press: a tip that begins inside an object makes no contact, and a step may be late, slow or paused.
+//! processed the press: a tip that begins inside an object starts at its nearest surface, not where the pointer pressed, and a step may
+//! be late, slow or paused.
 
 use glam::DVec3;
 use palpate::DeviceMode;

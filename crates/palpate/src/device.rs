@@ -8,12 +8,22 @@
 //! f = k·e⁺ + d·(e⁺ − e)/h        so        e⁺ = (f + d/h·e) / (k + d/h)
 //! ```
 //!
-//! Equations: docs/theory.md (C50), (C51), (C52), (C53).
+//! A tip that appears, or ends up, inside an object is let out: the proxy is moved to the surface, and the interface point with
+//! it, so that nothing is stretched. The offset o of the interface point from the device then decays, critically damped:
+//!
+//! ```text
+//! o″ + 2/T·o′ + o/T² = 0
+//! ```
+//!
+//! Equations: docs/theory.md (C50), (C51), (C52), (C53), (C71), (C72).
 
 use crate::error::ModelError;
 use crate::surface::SurfacePoint;
 use alloc::format;
 use glam::DVec3;
+
+/// Time constant T with which tips and objects are let out of what they are inside of [s]: that of MuJoCo's contacts by default.
+pub(crate) const LET_OUT_S: f64 = 0.02;
 
 /// Spring and damper between a device and its proxy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,9 +89,14 @@ impl DeviceParameters {
 pub(crate) struct DeviceState {
     /// Whether it touched or held in the last step.
     pub(crate) active: bool,
-    /// Interface point at the start and at the end of the step [m, world].
+    /// Interface point at the start and at the end of the step [m, world]: the device's position and the offset.
     pub(crate) start: DVec3,
     pub(crate) target: DVec3,
+    /// Offset of the interface point from the device, at the start and at the end of the step [m, world], and its rate [m/s].
+    pub(crate) offset: [DVec3; 2],
+    offset_rate: DVec3,
+    /// Whether its proxy may be inside an object without contact, and has to be let out.
+    pub(crate) may_be_inside: bool,
     /// Proxy at the start of the step [m, world].
     pub(crate) proxy: DVec3,
     /// Stretch of the coupling that its damper leaves at the end of the step without force [m].
@@ -110,6 +125,9 @@ impl DeviceState {
             active: false,
             start: zero,
             target: zero,
+            offset: [zero; 2],
+            offset_rate: zero,
+            may_be_inside: false,
             proxy: zero,
             relaxed_stretch: zero,
             compliance: 0.0,
@@ -118,12 +136,31 @@ impl DeviceState {
         }
     }
 
-    /// Begin a step that ends with the device at `target`. A device that was inactive starts at `from`.
-    pub(crate) fn begin(&mut self, parameters: &DeviceParameters, step_s: f64, target: DVec3, from: DVec3) {
-        if !self.active {
-            (self.active, self.start, self.proxy) = (true, from, from);
+    /// Activate a device that was inactive, with proxy and interface point at `from` [m, world].
+    pub(crate) fn activate(&mut self, from: DVec3) {
+        (self.active, self.start, self.proxy) = (true, from, from);
+        (self.offset, self.offset_rate) = ([DVec3::ZERO; 2], DVec3::ZERO);
+    }
+
+    /// Move proxy and interface point out of an object in a step that has begun [m, world]: the stretch stays.
+    pub(crate) fn let_out(&mut self, shift: DVec3) {
+        for point in [&mut self.start, &mut self.target, &mut self.proxy] {
+            *point += shift;
         }
-        self.target = target;
+        self.offset.iter_mut().for_each(|offset| *offset += shift);
+    }
+
+    /// Begin a step that ends with the device at `position` [m, world].
+    pub(crate) fn begin(&mut self, parameters: &DeviceParameters, step_s: f64, position: DVec3) {
+        // o = (a + b·t)·e^(−t/T)
+        let (a, b) = (self.offset[1], self.offset_rate + self.offset[1] / LET_OUT_S);
+        self.offset = [a; 2];
+        if (a, b) != (DVec3::ZERO, DVec3::ZERO) {
+            let decay = libm::exp(-step_s / LET_OUT_S);
+            self.offset[1] = (a + b * step_s) * decay;
+            self.offset_rate = b * decay - self.offset[1] / LET_OUT_S;
+        }
+        self.target = position + self.offset[1];
         self.force = DVec3::ZERO;
         (self.relaxed_stretch, self.compliance) = match parameters.coupling {
             Some(coupling) => {

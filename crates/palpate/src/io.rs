@@ -16,8 +16,8 @@ pub enum DeviceMode {
     Held(Grasp),
     /// Its tip touches surfaces (unilateral contact).
     Touch,
-    /// It is silent for now: no force, as [`Self::Inactive`]. A tip with a coupling that comes back inside the object which it touched
-    /// is outside again, where it was on the surface.
+    /// It is silent for now: no force, as [`Self::Inactive`]. A tip that comes back inside the object which it touched begins on the
+    /// surface where it was.
     Suspended,
 }
 
@@ -91,6 +91,9 @@ pub struct DeviceOutput {
     /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
     /// without contact the device's position, but for the lag of a coupling's damper.
     pub proxy: DVec3,
+    /// Offset of the interface point from the device's position at the start and at the end of the step [m, world], while a tip that
+    /// was inside an object is let out; it decays within some tenths of a second.
+    pub offset: [DVec3; 2],
 }
 
 /// Contact that carries force.

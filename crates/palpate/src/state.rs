@@ -41,8 +41,6 @@ pub struct State {
     pub(crate) gravity: DVec3,
     /// Contact cache, in the order of the ids.
     pub(crate) contacts: BoundedVec<Contact>,
-    /// Whether a proxy is inside an object without having crossed its surface: devices × objects.
-    pub(crate) inside: Vec<bool>,
     /// Levels of detail: objects × (obstacles + objects).
     pub(crate) levels: Vec<LevelOfDetail>,
     /// Energy of the virtual couplings.
@@ -93,7 +91,6 @@ impl State {
             gravity: parameters.gravity,
             devices: vec![DeviceState::new(); devices],
             contacts: BoundedVec::new(contacts),
-            inside: vec![false; devices * count],
             levels: vec![LevelOfDetail::default(); count * (obstacles.len() + count)],
             couplings: EnergyLedger::default(),
             workspace: Workspace {

@@ -33,7 +33,7 @@ pub const BUILT_IN_SCENES: [BuiltInScene; 6] = [
     BuiltInScene {
         id: "bounce",
         title: "A soft cube falls and bounces",
-        about: "The paper's cube falls from 5 cm (figure 5a). Poke it, squeeze it with two fingers, throw it.",
+        about: "The paper's cube falls from 5 cm (figure 5a). Poke it, squeeze it with two fingers, throw it: it slides back.",
         text: r#"
 gravity = [0.0, -9.81, 0.0]
 [[object]]
@@ -45,6 +45,26 @@ name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
 friction = 1.0
+[[plane]]
+name = "left-bank"
+point = [-0.15, 0.0, 0.0]
+normal = [0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "right-bank"
+point = [0.15, 0.0, 0.0]
+normal = [-0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "front-bank"
+point = [0.0, 0.0, 0.15]
+normal = [0.0, 0.866, -0.5]
+friction = 0.2
+[[plane]]
+name = "back-bank"
+point = [0.0, 0.0, -0.15]
+normal = [0.0, 0.866, 0.5]
+friction = 0.2
 "#,
         paths: &[],
         period_s: 0.0,
@@ -74,7 +94,7 @@ path = { file = "right.csv", repeat = true }
     BuiltInScene {
         id: "pinch",
         title: "Two fingers pinch and lift",
-        about: "Two fingers squeeze the cube, lift it by friction alone, shake it and put it down, again and again.",
+        about: "Two fingers squeeze the cube, lift it by friction alone, shake it and put it down into a hollow, again and again.",
         text: r#"
 gravity = [0.0, -9.81, 0.0]
 [[object]]
@@ -86,6 +106,26 @@ name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
 friction = 1.0
+[[plane]]
+name = "left-bank"
+point = [-0.058, 0.0, 0.0]
+normal = [0.7071, 0.7071, 0.0]
+friction = 0.1
+[[plane]]
+name = "right-bank"
+point = [0.058, 0.0, 0.0]
+normal = [-0.7071, 0.7071, 0.0]
+friction = 0.1
+[[plane]]
+name = "front-bank"
+point = [0.0, 0.0, 0.058]
+normal = [0.0, 0.7071, -0.7071]
+friction = 0.1
+[[plane]]
+name = "back-bank"
+point = [0.0, 0.0, -0.058]
+normal = [0.0, 0.7071, 0.7071]
+friction = 0.1
 [[device]]
 name = "left"
 mode = "touch"
@@ -125,6 +165,26 @@ name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
 friction = 1.0
+[[plane]]
+name = "left-bank"
+point = [-0.2, 0.0, 0.0]
+normal = [0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "right-bank"
+point = [0.2, 0.0, 0.0]
+normal = [-0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "front-bank"
+point = [0.0, 0.0, 0.2]
+normal = [0.0, 0.866, -0.5]
+friction = 0.2
+[[plane]]
+name = "back-bank"
+point = [0.0, 0.0, -0.2]
+normal = [0.0, 0.866, 0.5]
+friction = 0.2
 "#,
         paths: &[],
         period_s: 0.0,
@@ -132,7 +192,7 @@ friction = 1.0
     BuiltInScene {
         id: "ball",
         title: "A soft ball among obstacles",
-        about: "A ball rolls down a ramp into a tray with a post and a rail. Catch it, press it through, send it back.",
+        about: "A ball rolls down a ramp into a hollow with a post and a rail. Catch it, press it through, send it back.",
         text: r#"
 gravity = [0.0, -9.81, 0.0]
 [[object]]
@@ -157,22 +217,26 @@ name = "rail"
 capsule = { radius = 0.012, half_length = 0.12 }
 position = [0.22, 0.02, 0.0]
 orientation = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
-[[obstacle]]
-name = "left"
-box = { half_extents = [0.006, 0.025, 0.17] }
-position = [-0.26, 0.025, 0.0]
-[[obstacle]]
-name = "right"
-box = { half_extents = [0.006, 0.025, 0.17] }
-position = [0.32, 0.025, 0.0]
-[[obstacle]]
-name = "front"
-box = { half_extents = [0.284, 0.025, 0.006] }
-position = [0.03, 0.025, 0.164]
-[[obstacle]]
-name = "back"
-box = { half_extents = [0.284, 0.025, 0.006] }
-position = [0.03, 0.025, -0.164]
+[[plane]]
+name = "left-bank"
+point = [-0.24, 0.0, 0.0]
+normal = [0.5, 0.866, 0.0]
+friction = 0.5
+[[plane]]
+name = "right-bank"
+point = [0.3, 0.0, 0.0]
+normal = [-0.5, 0.866, 0.0]
+friction = 0.5
+[[plane]]
+name = "front-bank"
+point = [0.0, 0.0, 0.16]
+normal = [0.0, 0.866, -0.5]
+friction = 0.5
+[[plane]]
+name = "back-bank"
+point = [0.0, 0.0, -0.16]
+normal = [0.0, 0.866, 0.5]
+friction = 0.5
 "#,
         paths: &[],
         period_s: 0.0,
@@ -180,15 +244,44 @@ position = [0.03, 0.025, -0.164]
     BuiltInScene {
         id: "slab",
         title: "A slab in weightlessness",
-        about: "A thin slab that floats: flick its edge and watch the waves run through it. Nothing holds it but your fingers.",
+        about: "A thin slab that floats: flick its edge and watch the waves run through it. Four soft threads bring it back.",
         text: r#"
 [[object]]
 name = "slab"
 recording = "@slab"
 angular_velocity = [0.0, 0.4, 0.0]
+[[device]]
+name = "left"
+mode = "held"
+attach = { object = "slab", point = [-0.12, 0.0, 0.0] }
+coupling = { stiffness = 2.0, damping = 0.1 }
+path = { file = "left.csv", repeat = true }
+[[device]]
+name = "right"
+mode = "held"
+attach = { object = "slab", point = [0.12, 0.0, 0.0] }
+coupling = { stiffness = 2.0, damping = 0.1 }
+path = { file = "right.csv", repeat = true }
+[[device]]
+name = "front"
+mode = "held"
+attach = { object = "slab", point = [0.0, 0.0, 0.06] }
+coupling = { stiffness = 2.0, damping = 0.1 }
+path = { file = "front.csv", repeat = true }
+[[device]]
+name = "back"
+mode = "held"
+attach = { object = "slab", point = [0.0, 0.0, -0.06] }
+coupling = { stiffness = 2.0, damping = 0.1 }
+path = { file = "back.csv", repeat = true }
 "#,
-        paths: &[],
-        period_s: 0.0,
+        paths: &[
+            ("left.csv", |_| [-0.12, 0.0, 0.0]),
+            ("right.csv", |_| [0.12, 0.0, 0.0]),
+            ("front.csv", |_| [0.0, 0.0, 0.06]),
+            ("back.csv", |_| [0.0, 0.0, -0.06]),
+        ],
+        period_s: 1.0,
     },
 ];
 
@@ -250,12 +343,14 @@ fn shaking(side: f64, t: f64) -> [f64; 3] {
     [side * (0.05 - squeeze) + swing, 0.0, 0.0]
 }
 
-/// The finger on one side: closes, lifts, shakes, puts down and opens.
+/// The finger on one side: closes, lifts, shakes, puts down and opens. It takes the cube a centimetre above its centre of mass, so that it
+/// hangs, and opens so far that a finger slips off where it has come behind the cube.
 fn pinching(side: f64, t: f64) -> [f64; 3] {
     let squeeze = 0.015 * between(t, 0.6, 1.2) * between(t, 7.2, 6.6);
     let height = 0.05 * between(t, 1.4, 2.4) * between(t, 6.4, 5.4);
     let swing = 0.01 * between(t, 2.6, 3.0) * between(t, 5.2, 4.8) * (TAU * 2.0 * (t - 2.6)).sin();
-    [side * (0.05 + 0.005 + 0.004 - squeeze), 0.05 + height + swing, 0.0]
+    let away = 0.08 * (1.0 - between(t, 0.0, 0.5) * between(t, 7.7, 7.2));
+    [side * (0.05 + 0.005 + 0.004 + away - squeeze), 0.06 + height + swing, 0.0]
 }
 
 /// Smooth ramp from 0 at `from` to 1 at `to`, in either order.

@@ -8,6 +8,7 @@ mod block_impact;
 mod bounce;
 mod boussinesq;
 mod cantilever;
+mod built_in_scenes;
 mod closed_loop;
 mod compliance;
 mod contact_samples;
@@ -17,6 +18,7 @@ mod frequencies;
 mod friction;
 mod hertz_indentation;
 mod impulse_response;
+mod let_out;
 mod peak_force;
 mod pinch;
 mod pinch_lift;
@@ -180,6 +182,11 @@ pub const CASES: &[Case] = &[
         compute: aligned_faces::aligned_faces,
     },
     Case {
+        name: "let-out",
+        about: "600 tips that appear inside five bodies: none stays inside, and none strikes",
+        compute: let_out::let_out,
+    },
+    Case {
         name: "fingers-hold",
         about: "a finger that sticks against a hand that holds",
         compute: fingers_hold::fingers_hold,
@@ -193,6 +200,9 @@ pub const CASES: &[Case] = &[
         name: "bodies",
         about: "a set of bodies that rest, slide, roll, land, are punched, pinched and stacked: nothing sinks",
         compute: bodies::bodies,
+        name: "built-in-scenes",
+        about: "built-in scenes for ten minutes alone, and for minutes with random pointers: in reach, in shape, energies in order",
+        compute: built_in_scenes::built_in_scenes,
     },
     Case {
         name: "adversarial",

@@ -15,12 +15,10 @@
 
 use crate::collision::{Contact, OtherSide};
 use crate::contact::{Constraint, SOLVER};
+use crate::device::LET_OUT_S;
 use crate::object::ObjectState;
 use crate::scene::Model;
 use glam::DVec3;
-
-/// Time constant T of depenetration [s]: that of MuJoCo's contacts by default.
-const TIME_CONSTANT_S: f64 = 0.02;
 
 /// Penetration [m] up to which contacts themselves let an object out, if losses pay for it: what the solver leaves. Depenetration alone would
 /// lift objects at rest off their contacts, or let them creep.
@@ -47,7 +45,7 @@ pub(super) fn depenetrate(
     for contact in contacts.iter().filter(|contact| contact.is_held()) {
         objects[contact.object()].is_held = true;
     }
-    let share = (model.parameters.step_s / TIME_CONSTANT_S).min(1.0);
+    let share = (model.parameters.step_s / LET_OUT_S).min(1.0);
     let mut first = 0;
     for group in contacts.chunk_by(|a, b| (a.id.collider, a.object()) == (b.id.collider, b.object())) {
         let constraints = &constraints[first..first + group.len()];

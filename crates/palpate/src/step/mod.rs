@@ -132,8 +132,7 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let (step, gravity) = (state.steps, state.gravity);
-    let State { objects, devices, obstacles, contacts, inside, levels, couplings, workspace, output, .. } =
-        state;
+    let State { objects, devices, obstacles, contacts, levels, workspace, output, .. } = state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
     let scene = model.collision_scene();
@@ -152,18 +151,12 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         // A device that was inactive, or held a point, starts where it is.
         let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
         let touches = device_input.mode == DeviceMode::Touch;
-        let mut is_new = touches && (!device.active || held);
         device.active &= touches != held;
-        let (target, parameters) = (device_input.position, &model.parameters.devices[number]);
-        let last_touch = device.last_touch.filter(|_| is_new && parameters.coupling.is_some());
-        if let Some(proxy) = last_touch.and_then(|touch| context.returning_proxy(number, &touch, target)) {
-            (device.active, device.start, device.proxy) = (true, target, proxy);
-            is_new = false;
-            // The hand went there while nobody looked.
-            couplings.coupling += parameters.stored(target - proxy);
-            couplings.input += parameters.stored(target - proxy);
+        if !device.active {
+            device.activate(device_input.position);
+            device.may_be_inside = touches;
         }
-        device.begin(parameters, model.parameters.step_s, target, target);
+        device.begin(&model.parameters.devices[number], model.parameters.step_s, device_input.position);
         if let DeviceMode::Held(grasp) = device_input.mode {
             let collider = Collider::Device(number);
             context.workspace.candidates.push(ContactCandidate {
@@ -176,9 +169,20 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             });
             continue;
         }
-        for object in touchable() {
-            let inside = &mut inside[number * model.objects.len() + object];
-            context.find_tip_contacts(TipPair { number, device, object, is_new }, inside);
+        let before = context.workspace.candidates.mark();
+        for _ in 0..2 {
+            if device.may_be_inside {
+                let Some(place) = context.place_outside(number, device) else { break };
+                device.let_out(place - device.proxy);
+            }
+            // Again, where it is found inside without contact.
+            context.workspace.candidates.rewind(before);
+            let mut find = |object| context.find_tip_contacts(TipPair { number, device, object });
+            let inside = touchable().filter(|&object| find(object)).count();
+            device.may_be_inside = inside > 0;
+            if inside == 0 {
+                break;
+            }
         }
     }
     for object in touchable() {
@@ -233,8 +237,8 @@ fn set_up_constraints(model: &Model, state: &mut State) {
                 // The hand takes the point where it is.
                 let (parameters, h) = (&model.parameters.devices[number], model.parameters.step_s);
                 let device = &mut devices[number];
-                device.active = false;
-                device.begin(parameters, h, device.target, at(contact.object(), contact.slot));
+                device.activate(at(contact.object(), contact.slot));
+                device.begin(parameters, h, device.target);
             }
             workspace.constraints.push(Constraint::default());
             continue;
@@ -294,7 +298,7 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
     }
-    remember_touches(objects, devices, contacts);
+    remember_touches(objects, devices, contacts, &workspace.constraints);
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
@@ -317,14 +321,21 @@ fn integrate(model: &Model, state: &mut State) {
     obstacles.copy_from_slice(&workspace.next_obstacles);
 }
 
-/// Remember where each tip touches.
-fn remember_touches(objects: &[ObjectState], devices: &mut [DeviceState], contacts: &[Contact]) {
+/// Remember where each tip touches, and which have come through a surface because their contacts could not be solved.
+fn remember_touches(
+    objects: &[ObjectState],
+    devices: &mut [DeviceState],
+    contacts: &[Contact],
+    constraints: &[Constraint],
+) {
     devices.iter_mut().filter(|device| device.active).for_each(|device| device.last_touch = None);
-    for contact in contacts.iter().filter(|contact| !contact.is_held()) {
+    for (contact, constraint) in contacts.iter().zip(constraints).filter(|(contact, _)| !contact.is_held()) {
         let OtherSide::Device(number) = contact.other else { continue };
+        let DeviceState { last_touch, may_be_inside, .. } = &mut devices[number];
+        let is_through = contact.gap(constraint.end) < -contact.distance;
+        *may_be_inside |= is_through;
         let (object, force) = (contact.object(), contact.force.length());
-        let last_touch = &mut devices[number].last_touch;
-        if force > last_touch.map_or(0.0, |touch| touch.force) {
+        if is_through || force > last_touch.map_or(0.0, |touch| touch.force) {
             let point = objects[object].points.of(contact.slot).location.point;
             *last_touch = Some(LastTouch { object, point, force });
         }

@@ -23,6 +23,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
     for (number, out) in output.devices.iter_mut().enumerate() {
         let device = &devices[number];
         out.force_on_hand = if device.active { -device.force } else { DVec3::ZERO };
+        out.offset = if device.active { device.offset } else { [DVec3::ZERO; 2] };
         if device.active {
             out.proxy = device.proxy;
         } else if let Some(given) = input.devices.get(number).filter(|given| given.position.is_finite()) {

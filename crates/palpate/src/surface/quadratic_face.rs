@@ -106,7 +106,7 @@ impl QuadraticFaces {
 /// middle of each straight edge, 0 elsewhere (PN triangles, Vlachos et al. 2001, Proc. I3D, 159). Edges between faces that are
 /// no smooth surface stay straight.
 ///
-/// Equations: docs/theory.md (C62).
+/// Equations: docs/theory.md (C80).
 pub(crate) fn smooth_heights(surface: &Surface, order: u32) -> Vec<f64> {
     let faces = QuadraticFaces::new(surface, order);
     let mut heights = vec![0.0; surface.positions.len()];

@@ -16,7 +16,7 @@ const RUBBER: ElasticMaterial =
 const MODES: usize = 40;
 
 /// Names and recordings.
-pub fn bodies() -> Result<Vec<(&'static str, Arc<Recording>)>, VerifyError> {
+pub(in crate::cases) fn bodies() -> Result<Vec<(&'static str, Arc<Recording>)>, VerifyError> {
     let meshes = [
         ("cube", box_mesh([0.1; 3], [4; 3])?),
         ("plate", box_mesh([0.1, 0.004, 0.1], [6, 1, 6])?),

@@ -33,8 +33,8 @@ fn surfaces(model: &Model, state: &State) -> Option<Vec<[DVec3; 3]>> {
     Some(triangles)
 }
 
-/// A direction in which nothing is in front of a device's proxy, and the proxy [m].
-pub fn exit_direction(model: &Model, state: &State, device: usize) -> Option<(DVec3, DVec3)> {
+/// A direction in which nothing is in front of a device's proxy, the proxy, and the offset of the interface point from the device [m].
+pub fn exit_direction(model: &Model, state: &State, device: usize) -> Option<[DVec3; 3]> {
     let output = state.output();
     let proxy = output.devices[device].proxy;
     let touched = output.contacts.iter().filter(|contact| contact.against == Collider::Device(device));
@@ -53,7 +53,7 @@ pub fn exit_direction(model: &Model, state: &State, device: usize) -> Option<(DV
             ray_origins(proxy, *direction, radius)
                 .all(|from| triangles.iter().all(|t| !intersects(from, *direction, t)))
         })
-        .map(|direction| (direction, proxy))
+        .map(|direction| [direction, proxy, output.devices[device].offset[1]])
 }
 
 /// Origins of the rays: the centre, and a circle around it [m].

@@ -131,7 +131,7 @@ pub struct InvariantChecker<'a> {
     work: f64,
     /// Pose and velocity of each object after the last step.
     objects: Vec<ObjectOutput>,
-    /// Interface point and stretch of each device after the last step [m]; `None` when it was inactive.
+    /// Position and stretch of each device after the last step [m]; `None` when it was inactive.
     before: Vec<Option<[DVec3; 2]>>,
     pub violations: Violations,
 }
@@ -226,9 +226,11 @@ impl<'a> InvariantChecker<'a> {
             self.before[device] = None;
             return;
         }
-        let stretch = given.position - out.proxy;
+        // A tip that is let out has its interface point beside the device.
+        let stretch = given.position + out.offset[1] - out.proxy;
         let [place, last] = self.before[device].unwrap_or([given.position, DVec3::ZERO]);
-        self.work -= out.force_on_hand.dot(given.position - place);
+        let motion = given.position - place + (out.offset[1] - out.offset[0]);
+        self.work -= out.force_on_hand.dot(motion);
         self.violations.one_sided.count_if(is_one_sided(device, output), at);
         let tiny = 8.0 * f64::EPSILON * (given.position.length() + out.proxy.length());
         let parameters = &self.model.parameters().devices[device];

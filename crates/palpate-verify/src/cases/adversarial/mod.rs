@@ -17,6 +17,7 @@ mod random_device;
 
 use crate::check::Check;
 use crate::error::VerifyError;
+pub(super) use bodies::bodies;
 use glam::{DQuat, DVec3};
 use invariants::{InvariantChecker, Violations};
 use palpate::{
@@ -39,7 +40,7 @@ const FRICTIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// Checks of every body.
 pub fn adversarial() -> Result<Vec<Check>, VerifyError> {
-    let bodies = bodies::bodies()?;
+    let bodies = bodies()?;
     let play = |scene: usize| play(&bodies[scene / SCENES].1, scene / SCENES, scene % SCENES);
     let violations: Result<Vec<Violations>, VerifyError> =
         (0..bodies.len() * SCENES).into_par_iter().map(play).collect();

@@ -56,8 +56,9 @@ pub struct View<'a> {
     pub size: f64,
     /// Number of the step.
     pub step: usize,
-    /// A direction in which nothing is in the way of the proxy, and the proxy [m], where there is one.
-    pub exit_direction: &'a dyn Fn() -> Option<(DVec3, DVec3)>,
+    /// A direction in which nothing is in the way of the proxy, where there is one, the proxy, and the offset of the interface point from the
+    /// device [m].
+    pub exit_direction: &'a dyn Fn() -> Option<[DVec3; 3]>,
     /// Share of the stretch that the coupling's damper leaves after a step without force.
     pub lag: f64,
 }
@@ -108,9 +109,10 @@ impl RandomDevice {
         self.has_left = false;
         if self.phase == Phase::Leave {
             self.left = STAY;
-            if let Some((direction, proxy)) = (view.exit_direction)() {
+            if let Some([direction, proxy, offset]) = (view.exit_direction)() {
                 // With this position the coupling leads the proxy in that direction.
-                self.position = proxy + direction * (FAR * view.size) + (self.position - proxy) * view.lag;
+                let stretch = self.position + offset - proxy;
+                self.position = proxy + direction * (FAR * view.size) + stretch * view.lag - offset;
                 self.has_left = true;
             }
         }

@@ -6,5 +6,6 @@ mod phong_projection;
 mod point_surface;
 mod refinement;
 mod tip;
+mod tip_place;
 
 pub(crate) use tip::TipPair;

@@ -13,11 +13,11 @@ use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{
     DeformedSurface, MAX_TIP_CONTACTS, SurfaceTime, TriangleProjection,
 };
-use crate::collision::parameters::{COLLISION, MAX_ITERATIONS, ROUND_OFF};
+use crate::collision::parameters::{COLLISION, MAX_ITERATIONS};
 use crate::collision::proximity::ProximityQuery;
-use crate::device::{DeviceParameters, DeviceState, LastTouch};
+use crate::device::{DeviceParameters, DeviceState};
 use crate::response::{Body, ContactLocation, Footprint};
-use crate::surface::{SurfacePoint, area_normal, at_weights};
+use crate::surface::SurfacePoint;
 use glam::DVec3;
 
 /// Upper limit of samples along a slide.
@@ -29,8 +29,6 @@ pub(crate) struct TipPair<'a> {
     pub(crate) number: usize,
     pub(crate) device: &'a DeviceState,
     pub(crate) object: usize,
-    /// Whether the proxy appears in this step, so that the side it is on is not known.
-    pub(crate) is_new: bool,
 }
 
 /// Motion of a proxy relative to an object over a step, and how the object is read.
@@ -45,17 +43,16 @@ struct Path {
 }
 
 impl CollisionContext<'_> {
-    /// Find the contacts of a device with an object. `inside` says whether the proxy is known to be inside, where it
-    /// touches nothing until it has come out.
+    /// Find the contacts of a device with an object. Says whether the proxy may be inside without contact.
     ///
     /// # Real time
-    pub(crate) fn find_tip_contacts(&mut self, pair: TipPair, inside: &mut bool) {
-        let TipPair { number, device, object: at, is_new } = pair;
+    pub(crate) fn find_tip_contacts(&mut self, pair: TipPair) -> bool {
+        let TipPair { number, device, object: at } = pair;
         let (object, own) = (&self.scene.objects[at], &self.states[at]);
         let parameters = &self.scene.devices[number];
         let body = &object.body;
         let footprint = body.footprint(parameters.patch_radius);
-        let tip = parameters.tip_radius.max(0.5 * COLLISION.margin * body.edge);
+        let tip = parameters.ball_radius(body);
         let start = own.rigid.pose.body_from_world(device.proxy);
         let free = own.free.end.pose.body_from_world(device.proxy_under_force());
         let travel = (free - start).length();
@@ -69,17 +66,10 @@ impl CollisionContext<'_> {
         let mut surface =
             DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
         if start.length() - motion - tip > object.radius + surface.max_displacement() {
-            *inside = false;
-            return;
+            return false;
         }
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
-        if is_new || *inside {
-            *inside = is_inside(query, &mut surface, start);
-            if *inside {
-                return;
-            }
-        }
         let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
         let triangles = &mut workspace.triangles[triangle_cache];
         triangles.find(query, &mut surface, start, reach);
@@ -96,6 +86,7 @@ impl CollisionContext<'_> {
         if needed > reach {
             triangles.find(query, &mut surface, start, needed);
         }
+        let is_inside = query.is_inside(body, start);
         query.keep_local_minima(body, needed, 2 * MAX_TIP_CONTACTS);
         let mut contacts = TipContacts { list: [None; MAX_TIP_CONTACTS], count: 0, tip };
         for found in &query.found {
@@ -106,33 +97,7 @@ impl CollisionContext<'_> {
             self.sweep_tip(&mut contacts, &path);
         }
         self.push_tip_candidates(&contacts, number, &path);
-    }
-
-    /// Proxy [m, world] of a device that comes back at a target inside the object which it touched: outside, beside the
-    /// material point of that touch. None if it comes back outside.
-    ///
-    /// # Real time
-    pub(crate) fn returning_proxy(
-        &mut self,
-        number: usize,
-        touch: &LastTouch,
-        target: DVec3,
-    ) -> Option<DVec3> {
-        let (own, body) = (&self.states[touch.object], &self.scene.objects[touch.object].body);
-        let parameters = &self.scene.devices[number];
-        let footprint = body.footprint(parameters.patch_radius);
-        let positions = &mut self.workspace.positions[touch.object];
-        let moment = SurfaceTime::StepStart(self.step);
-        let mut surface =
-            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
-        let pose = own.rigid.pose;
-        if !is_inside(&mut self.workspace.query, &mut surface, pose.body_from_world(target)) {
-            return None;
-        }
-        let corners = surface.corners(touch.point.triangle);
-        let normal = area_normal(corners).normalize_or_zero();
-        let beside = at_weights(corners, touch.point.weights) + normal * parameters.tip_radius;
-        Some(pose.world_from_body(beside))
+        is_inside && contacts.count == 0
     }
 
     /// Continue the incremental rebuild of a device's triangle cache on an object.
@@ -291,19 +256,18 @@ impl CollisionContext<'_> {
     }
 }
 
-/// Whether a point [m, body] is inside a surface, by the triangles nearest to it.
-fn is_inside(query: &mut ProximityQuery, surface: &mut DeformedSurface, point: DVec3) -> bool {
-    let Some(nearest) = ProximityQuery::nearest(surface, point, f64::INFINITY) else { return false };
-    let reach = nearest.distance * (1.0 + ROUND_OFF) + ROUND_OFF * surface.body.edge;
-    query.triangles_within(surface, point, reach);
-    query.is_inside(surface.body, point)
-}
-
 /// Number of a tip contact; none for a held point.
 fn tip_number(contact: &Contact) -> Option<u8> {
     match contact.id.feature {
         FeatureId::Tip(number) => Some(number),
         _ => None,
+    }
+}
+
+impl DeviceParameters {
+    /// Radius of the tip against a body [m]: of a point, a share of the mean edge, since it needs a side from which it comes.
+    pub(super) fn ball_radius(&self, body: &Body) -> f64 {
+        self.tip_radius.max(0.5 * COLLISION.margin * body.edge)
     }
 }
 
