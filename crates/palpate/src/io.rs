@@ -14,6 +14,8 @@ pub enum DeviceMode {
     Inactive,
     /// Holds a point in all directions (bilateral constraint).
     Held(Grasp),
+    /// Exerts a prescribed force on a point, or on the patch about it, wherever the point goes.
+    Force(AppliedForce),
     /// Its tip touches surfaces (unilateral contact).
     Touch,
     /// It is silent for now: no force, as [`Self::Inactive`]. A tip with a coupling that comes back inside the object which it touched
@@ -22,16 +24,25 @@ pub enum DeviceMode {
 }
 
 impl DeviceMode {
-    /// Whether the device holds or touches.
+    /// Whether the device holds, touches or exerts a prescribed force.
     pub fn is_active(&self) -> bool {
-        matches!(self, Self::Held(_) | Self::Touch)
+        matches!(self, Self::Held(_) | Self::Touch | Self::Force(_))
     }
+}
+
+/// Prescribed force on a material point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AppliedForce {
+    /// Point that it acts on.
+    pub grasp: Grasp,
+    /// Force on the object, held over the step [N, world].
+    pub force: DVec3,
 }
 
 /// One device's part of a step's input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceInput {
-    /// Interface point at the end of the step [m, world].
+    /// Interface point at the end of the step [m, world]; without meaning where a force is prescribed.
     pub position: DVec3,
     /// Mode in the step.
     pub mode: DeviceMode,
@@ -57,6 +68,21 @@ impl DeviceInput {
     /// Device that touches, at a position [m, world].
     pub fn touching(position: DVec3) -> Self {
         Self { position, mode: DeviceMode::Touch }
+    }
+
+    /// Device that exerts a prescribed force.
+    pub fn exerting(applied: AppliedForce) -> Self {
+        Self { position: DVec3::ZERO, mode: DeviceMode::Force(applied) }
+    }
+
+    /// Position of the hand at the end of the step [m, world]: the interface point, or the point that a prescribed force acts on.
+    pub fn hand(&self, output: &DeviceOutput) -> DVec3 {
+        match self.mode {
+            DeviceMode::Force(_) => output.proxy,
+            DeviceMode::Inactive | DeviceMode::Held(_) | DeviceMode::Touch | DeviceMode::Suspended => {
+                self.position
+            }
+        }
     }
 }
 
@@ -88,8 +114,8 @@ impl Input {
 pub struct DeviceOutput {
     /// Reaction force on the hand, held over the step [N, world].
     pub force_on_hand: DVec3,
-    /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
-    /// without contact the device's position, but for the lag of a coupling's damper.
+    /// Proxy at the end of the step [m, world]: the held point, the point that a prescribed force acts on, or the
+    /// centre of the tip that stays outside the objects; without contact the device's position, but for the lag of a coupling's damper.
     pub proxy: DVec3,
 }
 
@@ -133,7 +159,7 @@ pub struct StepStatus {
     pub solver_residual_m: f64,
     /// Largest number of solver iterations of an island.
     pub iterations: u32,
-    /// Devices and obstacles with a position that is not finite, or a grasp that does not exist: the device is inactive, the
+    /// Devices and obstacles with a position or force that is not finite, or a grasp that does not exist: the device is inactive, the
     /// obstacle stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
     pub rejected_inputs: u32,
     /// Held directions that depend linearly on others and got no force.

@@ -71,7 +71,10 @@ pub use collision::{Collider, Grasp};
 pub use device::{Coupling, DeviceParameters};
 pub use energy::EnergyLedger;
 pub use error::{Error, ModelError, RecordingError, RecordingPart};
-pub use io::{ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, StepStatus};
+pub use io::{
+    AppliedForce, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output,
+    StepStatus,
+};
 pub use motion::RigidIntegrator;
 pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};

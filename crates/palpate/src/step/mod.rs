@@ -24,6 +24,7 @@
 mod accounting;
 mod depenetration;
 mod output;
+mod prescribed_forces;
 
 use crate::collision::{
     CandidateSide, Collider, CollisionContext, Contact, ContactCandidate, ContactId, ContactLaw, FeatureId,
@@ -31,7 +32,7 @@ use crate::collision::{
 };
 use crate::contact::{Constraint, ContactProblem, SOLVER, SolverReport, StepRules, UNSOLVED};
 use crate::device::{DeviceState, LastTouch};
-use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
+use crate::io::{AppliedForce, DeviceInput, DeviceMode, Input, Output, StepStatus};
 use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
@@ -59,10 +60,12 @@ impl Model {
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
     state.output.status = StepStatus::default();
     change_gravity(model, state, input);
+    prescribed_forces::place(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
     find_contacts(model, state, input);
     set_up_constraints(model, state);
+    prescribed_forces::predict(model, state);
     solve(model, state);
     integrate(model, state);
     state.steps += 1;
@@ -87,7 +90,7 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
-/// Predict every object at the end of the step without contact force.
+/// Predict every object at the end of the step without contact force; prescribed forces act with the arms at its start.
 fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
@@ -97,7 +100,7 @@ fn predict(model: &Model, state: &mut State) {
             own.points.predict(&mut view);
         }
         let motion = (rules.integrator, rules.step_s, rules.gravity);
-        own.free = object.advance_rigid(motion, &own.rigid, (DVec3::ZERO, DVec3::ZERO), None);
+        own.free = object.advance_rigid(motion, &own.rigid, own.prescribed_wrench(), None);
         own.surface_motion =
             object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
     }
@@ -125,6 +128,7 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
         DeviceMode::Inactive | DeviceMode::Suspended => false,
         DeviceMode::Held(grasp) => model.accepts(grasp),
         DeviceMode::Touch => true,
+        DeviceMode::Force(AppliedForce { grasp, force }) => model.accepts(grasp) && force.is_finite(),
     };
     (is_allowed && device_input.position.is_finite()).then_some(device_input)
 }
@@ -149,6 +153,10 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             device.last_touch = device.last_touch.filter(|_| is_suspended);
             continue;
         };
+        if let DeviceMode::Force(_) = device_input.mode {
+            (device.active, device.last_touch) = (false, None);
+            continue;
+        }
         // A device that was inactive, or held a point, starts where it is.
         let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
         let touches = device_input.mode == DeviceMode::Touch;
@@ -269,7 +277,8 @@ fn solve(model: &Model, state: &mut State) {
         if problem.dissipated() + paid >= -problem.rounding() || attempt == 2 {
             let status = &mut output.status;
             (status.solver_residual_m, status.iterations) = (residual_m, iterations);
-            (status.dependent_rows, status.unsolved_islands) = (dependent_rows, unsolved_islands);
+            status.dependent_rows = dependent_rows;
+            status.unsolved_islands += unsolved_islands;
             return;
         }
         let pairs = problem.contacts.iter_mut().zip(&mut *problem.constraints);
@@ -290,6 +299,9 @@ fn integrate(model: &Model, state: &mut State) {
     for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
+    }
+    for device in devices.iter() {
+        accounting::prescribed_force(device, objects);
     }
     remember_touches(objects, devices, contacts);
     for (object, own) in model.objects.iter().zip(&mut *objects) {

@@ -1,6 +1,7 @@
 //! Output of a step.
 
 use crate::collision::OtherSide;
+use crate::device::PrescribedForce;
 use crate::io::{ContactOutput, Input};
 use crate::scene::Model;
 use crate::state::State;
@@ -23,7 +24,11 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
     for (number, out) in output.devices.iter_mut().enumerate() {
         let device = &devices[number];
         out.force_on_hand = if device.active { -device.force } else { DVec3::ZERO };
-        if device.active {
+        if let Some(PrescribedForce { object, slot }) = device.prescribed {
+            let (own, point) = (&objects[object], objects[object].points.of(slot));
+            out.force_on_hand = -point.force;
+            out.proxy = own.rigid.pose.position + point.end_arm;
+        } else if device.active {
             out.proxy = device.proxy;
         } else if let Some(given) = input.devices.get(number).filter(|given| given.position.is_finite()) {
             out.proxy = given.position;
