@@ -55,7 +55,7 @@ impl StepsCsv {
     pub fn write(&mut self, input: &Input, output: &Output) -> Result<(), ExportError> {
         let mut numbers = vec![output.time_s];
         for (device, out) in input.devices.iter().zip(&output.devices) {
-            numbers.extend(device.position.to_array());
+            numbers.extend(device.hand(out).to_array());
             numbers.extend(out.force_on_hand.to_array());
             numbers.extend(out.proxy.to_array());
         }

@@ -3,7 +3,7 @@
 use crate::motion_path::MotionPath;
 use crate::port::{Effort, ForcePort, Motion};
 use glam::DVec3;
-use palpate::{DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
+use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
 
 /// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
@@ -82,7 +82,8 @@ impl ForceProcess {
         Self { model, state, input, slots, obstacle_trajectories, gravity: None, steps: 0, device_timeout_s }
     }
 
-    /// Lets a device follow a path in simulated time, also where that runs slower than the clock.
+    /// Lets a device follow a path in simulated time, also where that runs slower than the clock; where a force is prescribed, it is the
+    /// course of the force.
     ///
     /// # Panics
     /// If the model has no such device.
@@ -140,6 +141,11 @@ impl ForceProcess {
         // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent or
         // where their position is not finite.
         for (slot, input) in self.slots.iter_mut().zip(&mut self.input.devices) {
+            if let (Some(path), DeviceMode::Force(applied)) = (&slot.path, slot.mode) {
+                let force = path.mid_step(time_s, step_s);
+                *input = DeviceInput::exerting(AppliedForce { force, ..applied });
+                continue;
+            }
             let mut motion = slot.port.newest();
             if let Some(path) = &slot.path {
                 let position = path.at(time_s).position;

@@ -48,7 +48,7 @@ pub enum SessionDevice {
     Local(AttachedDevice),
     /// Device behind a link, or a pointer: its port.
     Remote(ForcePort, DeviceMode),
-    /// No device: a path in simulated time, without force feedback.
+    /// No device: a path in simulated time, without force feedback; with a prescribed force its course.
     Path(MotionPath, DeviceMode),
 }
 

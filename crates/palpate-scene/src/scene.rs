@@ -3,7 +3,7 @@
 use crate::devices::RealDevice;
 use crate::warning::Warning;
 use glam::DVec3;
-use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
+use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, SceneLabels};
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{DeviceSpec, Hand};
@@ -35,11 +35,12 @@ pub struct Scene {
 pub struct SceneDevice {
     /// Name.
     pub name: String,
-    /// Initial mode: held point or touch.
+    /// Initial mode: held point, touch or prescribed force.
     pub mode: DeviceMode,
     /// Parameters of the model.
     pub parameters: DeviceParameters,
-    /// Path of its position, or of the simulated hand; none for real and linked devices and for pointers.
+    /// Path of its position, of the simulated hand, or course of its prescribed force [N]; none for real and linked devices and
+    /// for pointers.
     pub path: Option<MotionPath>,
     /// Simulated device and hand, which follow the path as far as forces allow.
     pub simulated: Option<(DeviceSpec, Hand)>,
@@ -63,7 +64,23 @@ pub struct SceneObstacle {
 impl SceneDevice {
     /// Position of its path at a time [s]; the origin without a path [m, world].
     pub fn position_at(&self, time_s: f64) -> DVec3 {
-        self.path.as_ref().map_or(DVec3::ZERO, |path| path.at(time_s).position)
+        self.motion().map_or(DVec3::ZERO, |path| path.at(time_s).position)
+    }
+
+    /// Path of its motion; none where it prescribes a force.
+    pub fn motion(&self) -> Option<&MotionPath> {
+        self.path.as_ref().filter(|_| !matches!(self.mode, DeviceMode::Force(_)))
+    }
+
+    /// Input of the step of `step_s` [s] that ends at a time [s].
+    fn input_at(&self, time_s: f64, step_s: f64) -> DeviceInput {
+        match (self.mode, &self.path) {
+            (DeviceMode::Force(applied), Some(path)) => {
+                let force = path.mid_step(time_s, step_s);
+                DeviceInput::exerting(AppliedForce { force, ..applied })
+            }
+            (mode, _) => DeviceInput { position: self.position_at(time_s), mode },
+        }
     }
 }
 
@@ -103,10 +120,9 @@ impl Scene {
 
     /// Input at a time of all paths [s].
     pub fn input_at(&self, time_s: f64) -> Input {
-        let device =
-            |device: &SceneDevice| DeviceInput { position: device.position_at(time_s), mode: device.mode };
+        let step_s = self.model.parameters().step_s;
         Input {
-            devices: self.devices.iter().map(device).collect(),
+            devices: self.devices.iter().map(|device| device.input_at(time_s, step_s)).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
             gravity: self.gravity_at(time_s),
         }

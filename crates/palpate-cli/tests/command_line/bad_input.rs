@@ -99,7 +99,7 @@ fn what_a_scene_file_gets_wrong_is_named_with_its_line() {
         (
             "mode = \"held\"",
             "mode = \"push\"",
-            "scene.toml: line 10: mode is \"push\", expected \"held\" or \"touch\"",
+            "scene.toml: line 10: mode is \"push\", expected \"held\", \"touch\" or \"force\"",
         ),
         (
             "point = [0.05, 0.0, 0.0]",

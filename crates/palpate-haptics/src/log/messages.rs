@@ -3,7 +3,8 @@
 use super::records::{FrameRecord, StepRecord};
 use glam::{DQuat, DVec3};
 use palpate::{
-    Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose, SurfacePoint, Twist,
+    AppliedForce, Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose,
+    SurfacePoint, Twist,
 };
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
@@ -89,6 +90,28 @@ pub(super) struct DeviceMessage {
     /// Held point; `None` for a device that touches, and in logs of the first form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub holds: Option<HeldPointMessage>,
+    /// Prescribed force; `None` in other modes, and in logs before version 0.4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exerts: Option<AppliedForceMessage>,
+}
+
+/// Prescribed force [N, world] and the point that it acts on.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(super) struct AppliedForceMessage {
+    on: HeldPointMessage,
+    force: Xyz,
+}
+
+impl From<AppliedForce> for AppliedForceMessage {
+    fn from(AppliedForce { grasp, force }: AppliedForce) -> Self {
+        Self { on: grasp.into(), force: force.into() }
+    }
+}
+
+impl From<AppliedForceMessage> for AppliedForce {
+    fn from(AppliedForceMessage { on, force }: AppliedForceMessage) -> Self {
+        Self { grasp: on.into(), force: force.into() }
+    }
 }
 
 /// Held point: object, triangle of its surface, barycentric weights.
@@ -262,7 +285,11 @@ impl Serialize for StepMessageOf<'_> {
                 proxy: output.proxy.into(),
                 holds: match input.mode {
                     DeviceMode::Held(grasp) => Some(grasp.into()),
-                    DeviceMode::Inactive | DeviceMode::Suspended | DeviceMode::Touch => None,
+                    _ => None,
+                },
+                exerts: match input.mode {
+                    DeviceMode::Force(applied) => Some(applied.into()),
+                    _ => None,
                 },
             }
         };

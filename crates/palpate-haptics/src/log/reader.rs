@@ -152,11 +152,12 @@ impl LoggedStep {
         let mut input = Input { gravity, ..Input::default() };
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
-            let mode = match device.holds {
+            let mode = match (device.holds, device.exerts) {
                 _ if device.suspended => DeviceMode::Suspended,
                 _ if !device.present => DeviceMode::Inactive,
-                Some(hold) => DeviceMode::Held(hold.into()),
-                None => *mode,
+                (Some(hold), _) => DeviceMode::Held(hold.into()),
+                (None, Some(applied)) => DeviceMode::Force(applied.into()),
+                (None, None) => *mode,
             };
             input.devices.push(DeviceInput { position: device.position.into(), mode });
         }

@@ -15,6 +15,7 @@ mod impulse_response;
 mod peak_force;
 mod pinch;
 mod pinch_lift;
+mod prescribed_force;
 mod press;
 mod residual_relaxation;
 mod rigid_motion;
@@ -90,6 +91,11 @@ pub const CASES: &[Case] = &[
         name: "shaken-block",
         about: "block with ν = 0 shaken at both ends against 2EAk·tan(kL/2)·u₀",
         compute: shaken_block::shaken_block,
+    },
+    Case {
+        name: "prescribed-force",
+        about: "bar with ν = 0, one end fixed, under a force F·sin ωt at the other against F·tan(kL)/(EAk)",
+        compute: prescribed_force::prescribed_force,
     },
     Case {
         name: "bounce",

@@ -9,7 +9,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate::{Pose, State};
+use palpate::{DeviceMode, Pose, State};
 use palpate_export::AtomicFile;
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogSender, LogWriter};
@@ -109,6 +109,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
             let (attached, line) = attach_real(real, device.mode, rate, passivity)?;
             notify(&line);
             Ok(SessionDevice::Local(attached))
+        }
+        (None, Some(path)) if matches!(device.mode, DeviceMode::Force(_)) => {
+            Ok(SessionDevice::Path(path.clone(), device.mode))
         }
         (None, Some(path)) => {
             let attached = attach_path(path.clone(), device.simulated, device.mode, rate, passivity);

@@ -138,9 +138,11 @@ impl Summary {
             .devices
             .iter()
             .zip(&self.forces)
-            .map(|(device, forces)| {
+            .zip(&self.last.devices)
+            .map(|((device, forces), last)| {
                 json!({
                     "name": device.name,
+                    "proxy_last_m": last.proxy.to_array(),
                     "force_last_n": last_force(forces).length(),
                     "force_max_n": largest(forces),
                     "force_last_xyz_n": last_force(forces).to_array(),

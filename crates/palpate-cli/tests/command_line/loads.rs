@@ -1,0 +1,116 @@
+//! Prescribed forces of a scene: output, logs and errors.
+
+use crate::workplace::{Table, Workplace};
+
+const SCENE: &str = r#"
+[[object]]
+name = "beam"
+recording = "beam.palp"
+[[device]]
+name = "load"
+mode = "force"
+attach = { object = "beam", point = [0.05, 0.0, 0.0] }
+path = { file = "force.csv" }
+patch_radius = 0.03
+"#;
+
+/// A damped beam of 0.1 m that is fixed at one end, its scene, and a force that grows to 0.02 N and stays.
+fn workplace() -> Workplace {
+    let workplace = Workplace::new();
+    let body = ["record", "box:0.1x0.1x0.1/3x3x3", "--order", "1", "--young", "2000", "--poisson", "0.3"];
+    let rest = [
+        "--density",
+        "110",
+        "--rayleigh",
+        "20,2e-3",
+        "--modes",
+        "20",
+        "--fix",
+        "x<-0.049",
+        "-o",
+        "beam.palp",
+    ];
+    workplace.succeed(&[&body[..], &rest].concat());
+    workplace.write("scene.toml", SCENE);
+    workplace.write("force.csv", "t,fx,fy,fz\n0,0,0,0\n0.1,0.0,-0.02,0.01\n");
+    workplace
+}
+
+#[test]
+fn a_force_moves_its_point_and_its_work_is_input() {
+    let workplace = workplace();
+    workplace.succeed(&["run", "scene.toml", "--duration", "1", "--csv", "steps.csv"]);
+    let table = Table::parse(&workplace.text("steps.csv"));
+    let column = |name: &str| table.column(name);
+    // The middle of step 50 has the course at 49.5 ms; the hand feels the opposite.
+    assert!((column("load.fy")[49] - 0.02 * 0.495).abs() < 1e-15 && column("load.fy")[999] == 0.02);
+    assert_eq!(
+        table.vectors("load", ["x", "y", "z"]),
+        table.vectors("load", ["proxy_x", "proxy_y", "proxy_z"])
+    );
+    // Second route to the work: the sum of force times travel of the point.
+    let places = table.vectors("load", ["proxy_x", "proxy_y", "proxy_z"]);
+    let forces = table.vectors("load", ["fx", "fy", "fz"]);
+    let steps = places.windows(2).zip(&forces[1..]);
+    let work: f64 = steps.map(|(ends, force)| -force.dot(ends[1] - ends[0])).sum();
+    let input = column("energy.input");
+    assert!((work / (input[999] - input[0]) - 1.0).abs() < 1e-9, "{work} {}", input[999]);
+    assert!(places[999].y < -1e-4, "{}", places[999]);
+    assert!(column("energy.defect")[999].abs() < 1e-11 * input[999]);
+    let summary = workplace.json(&["run", "scene.toml", "--json"]);
+    assert_eq!(summary["steps"], 100, "to the end of the course");
+    assert_eq!(summary["devices"][0]["force_last_xyz_n"][2], -0.01 * 0.995);
+    assert!(
+        (summary["devices"][0]["proxy_last_m"][1].as_f64().expect("a number") - places[99].y).abs() < 1e-15
+    );
+}
+
+#[test]
+fn a_log_of_a_force_repeats_bit_for_bit() {
+    let workplace = workplace();
+    workplace.succeed(&["run", "scene.toml", "--realtime", "--log", "run.mcap", "--pictures", "0"]);
+    workplace.succeed(&["replay", "run.mcap", "--csv", "replayed.csv"]);
+    // As offline: the course follows simulated time.
+    workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv"]);
+    assert_eq!(workplace.text("replayed.csv"), workplace.text("steps.csv"));
+}
+
+#[test]
+fn keys_that_do_not_fit_a_force_are_refused() {
+    let workplace = workplace();
+    let fail = |from: &str, to: &str| {
+        assert!(SCENE.contains(from));
+        workplace.write("scene.toml", SCENE.replace(from, to));
+        workplace.fail(&["run", "scene.toml"])
+    };
+    assert_eq!(
+        fail("patch_radius = 0.03", "tip_radius = 0.03"),
+        "scene.toml: line 10: tip_radius is of a hand; with mode = \"force\" the path is the force: leave it out"
+    );
+    assert_eq!(
+        fail("patch_radius = 0.03", "coupling = { stiffness = 10.0 }"),
+        "scene.toml: line 10: coupling is of a hand; with mode = \"force\" the path is the force: leave it out"
+    );
+    assert_eq!(
+        fail("attach = { object = \"beam\", point = [0.05, 0.0, 0.0] }\n", ""),
+        "scene.toml: line 7: mode = \"force\" needs attach = { object = \"…\", point = [x, y, z] }, the point that the force acts on"
+    );
+    assert_eq!(
+        fail("path = { file = \"force.csv\" }\n", ""),
+        "scene.toml: line 6: mode = \"force\" needs path = { file = \"…\" } with the columns t,fx,fy,fz: the force on the object in \
+         world axes [N]"
+    );
+    assert_eq!(
+        fail("0.05, 0.0, 0.0", "-0.05, 0.0, 0.0"),
+        "scene.toml: line 8: the point of \"load\" lies on fixed nodes of \"beam\": no hand can move it"
+    );
+    assert_eq!(
+        fail("\"force\"", "\"pull\""),
+        "scene.toml: line 7: mode is \"pull\", expected \"held\", \"touch\" or \"force\""
+    );
+    workplace.write("force.csv", "t,x,y,z\n0,0,0,0\n");
+    assert_eq!(
+        fail("0.03", "0.04"),
+        "scene.toml: line 9: path force.csv: line 1: the columns are t,x,y,z, expected t,fx,fy,fz"
+    );
+}
