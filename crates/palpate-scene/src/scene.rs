@@ -4,7 +4,7 @@ use crate::devices::RealDevice;
 use crate::warning::Warning;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
-use palpate_export::{DeviceLabel, SceneLabels};
+use palpate_export::{DeviceLabel, ProbeLabel, SceneLabels};
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::log::SceneNames;
@@ -21,6 +21,8 @@ pub struct Scene {
     pub devices: Vec<SceneDevice>,
     /// Planes and obstacles, in the model's order.
     pub obstacles: Vec<SceneObstacle>,
+    /// Displacement probes.
+    pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
     pub gravity: Option<MotionPath>,
     /// Warnings for the author of the scene.
@@ -113,6 +115,7 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(label).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            probes: self.probes.clone(),
             can_touch: self.can_touch(),
             inputs: self.inputs.clone(),
         }

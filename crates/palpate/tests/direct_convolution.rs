@@ -180,6 +180,8 @@ fn prescribed_forces_displace_as_in_modal_form() {
             let devices = vec![on(3, force), on(held.len() / 2, -force)];
             let input = Input { devices, ..Input::default() };
             let [modal, fir] = scenes.each_mut().map(|(model, state)| step(model, state, &input).clone());
+            let probe = |(model, state): &(Model, State)| state.point_displacement(model, 0, &held[7]);
+            assert!((probe(&scenes[0]) - probe(&scenes[1])).length() < ROUND_OFF, "{number}");
             for (a, b) in modal.devices.iter().zip(&fir.devices) {
                 worst = worst.max((a.proxy - b.proxy).length());
                 largest = largest.max(a.proxy.length());

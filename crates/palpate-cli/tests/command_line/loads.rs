@@ -66,6 +66,40 @@ fn a_force_moves_its_point_and_its_work_is_input() {
 }
 
 #[test]
+fn a_probe_reads_the_point_and_changes_nothing() {
+    let workplace = workplace();
+    workplace.succeed(&["run", "scene.toml", "--csv", "without.csv"]);
+    let probe = "[[probe]]\nname = \"tip\"\nobject = \"beam\"\npoint = [0.05, 0.05, 0.0]\n";
+    workplace.write("scene.toml", format!("{SCENE}{probe}"));
+    let text = workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv", "--vtu", "frames"]);
+    let [with, without] = ["steps.csv", "without.csv"].map(|name| Table::parse(&workplace.text(name)));
+    for column in ["energy.elastic", "energy.input", "load.proxy_x", "load.proxy_y", "beam.px"] {
+        assert_eq!(with.column(column), without.column(column), "{column}");
+    }
+    // In a body that stays, the displacement is the way from the rest position, which is on the surface.
+    let places = with.vectors("tip", ["x", "y", "z"]);
+    let displacements = with.vectors("tip", ["ux", "uy", "uz"]);
+    let rest = places[0] - displacements[0];
+    assert!((rest - glam::DVec3::new(0.05, 0.05, 0.0)).length() < 1e-15, "{rest}");
+    for (place, displacement) in places.iter().zip(&displacements) {
+        assert!((*place - rest - *displacement).length() < 1e-16);
+    }
+    assert!(text.contains("\n  tip          displaced by ("), "{text}");
+    let summary = workplace.json(&["run", "scene.toml", "--json"]);
+    let last = &summary["probes"][0];
+    assert_eq!((&last["name"], &last["object"]), (&"tip".into(), &"beam".into()));
+    assert_eq!(last["displacement_m"][1], displacements[99].y);
+    assert!(displacements[99].y < -1e-5);
+    let fail = |from: &str, to: &str| {
+        workplace.write("scene.toml", format!("{SCENE}{}", probe.replace(from, to)));
+        workplace.fail(&["run", "scene.toml"])
+    };
+    assert_eq!(fail("beam", "bean"), "scene.toml: line 13: there is no object \"bean\"; the scene has beam");
+    assert_eq!(fail("tip", "load"), "scene.toml: line 12: the name \"load\" is taken already");
+    assert!(fail("0.05, 0.05", "0.05, 0.5").starts_with("scene.toml: line 14: the point "));
+}
+
+#[test]
 fn a_log_of_a_force_repeats_bit_for_bit() {
     let workplace = workplace();
     workplace.succeed(&["run", "scene.toml", "--realtime", "--log", "run.mcap", "--pictures", "0"]);

@@ -3,17 +3,14 @@
 use super::coupling;
 use super::drivers::{read_real, read_simulated};
 use super::keys::{AttachEntry, DeviceEntry};
+use super::places::surface_point;
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use crate::warning::{Warning, WarningKind};
-use glam::DVec3;
 use palpate::{AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
 use palpate_haptics::Columns;
 use toml::Spanned;
-
-/// Allowed distance of a held point from the surface, as a share of the object's diagonal.
-const OFF_SURFACE: f64 = 0.05;
 
 /// Distance of a device's start from its held point that gets a warning, as a share of the diagonal.
 const FAR_START: f64 = 0.01;
@@ -245,39 +242,13 @@ fn read_grasp(
     objects: &[ModelObject],
     object_names: &[String],
 ) -> Result<Grasp, SceneError> {
-    let name = device.name.get_ref();
-    let wanted = attach.object.get_ref();
-    let Some(object) = object_names.iter().position(|name| name == wanted) else {
-        let known = object_names.join(", ");
-        let message = format!("there is no object {wanted:?}; the scene has {known}");
-        return source.fail(attach.object.span(), SceneErrorKind::UnknownValue, "object", message);
-    };
-    let ModelObject { recording, response, .. } = &objects[object];
-    let point_span = attach.point.span();
-    let point = DVec3::from_array(attach.point.get_ref().0);
-    let allowed = OFF_SURFACE * recording.surface.diagonal();
-    let grasp = match recording.surface.nearest(point) {
-        Some((point, distance)) if distance <= allowed => Grasp { object, point },
-        Some((_, distance)) => {
-            return source.fail(
-                point_span,
-                SceneErrorKind::Grasp,
-                "point",
-                format!(
-                    "the point {point} is {distance:.4} m from the surface of {wanted:?}, at most {allowed:.4} m are \
-                     allowed; it is given in the body frame, whose origin is the centre of mass"
-                ),
-            );
-        }
-        None => {
-            let message = format!("the object {wanted:?} has no surface");
-            return source.fail(point_span, SceneErrorKind::Grasp, "point", message);
-        }
-    };
+    let (name, wanted) = (device.name.get_ref(), attach.object.get_ref());
+    let grasp = surface_point(source, (&attach.object, &attach.point), objects, object_names)?;
+    let ModelObject { recording, response, .. } = &objects[grasp.object];
     match response {
         ResponseForm::Modal if !recording.is_movable(&grasp.point) => {
             return source.fail(
-                point_span,
+                attach.point.span(),
                 SceneErrorKind::Grasp,
                 "point",
                 format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
@@ -287,7 +258,7 @@ fn read_grasp(
         ResponseForm::Fir(table) => {
             if let Err(error) = table.prepare(&recording.surface, &grasp.point) {
                 let message = format!("device {name:?} on {wanted:?}: {error}");
-                return source.fail(point_span, SceneErrorKind::Table, "point", message);
+                return source.fail(attach.point.span(), SceneErrorKind::Table, "point", message);
             }
         }
     }

@@ -33,6 +33,16 @@ pub(super) struct SceneFile {
     pub obstacle: Vec<Spanned<ObstacleEntry>>,
     #[serde(default)]
     pub device: Vec<DeviceEntry>,
+    #[serde(default)]
+    pub probe: Vec<ProbeEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProbeEntry {
+    pub name: Spanned<String>,
+    pub object: Spanned<String>,
+    pub point: Spanned<Numbers<3>>,
 }
 
 #[derive(Deserialize)]

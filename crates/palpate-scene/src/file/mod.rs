@@ -6,6 +6,7 @@ mod drivers;
 mod keys;
 mod objects;
 mod obstacles;
+mod places;
 mod source;
 
 use crate::error::{SceneError, SceneErrorKind};
@@ -160,6 +161,8 @@ fn assemble(
         devices.push(read?);
     }
     devices::check_grasps(source, &file.device, &devices)?;
+    let probe = |entry| places::read_probe(source, entry, &objects, &object_names);
+    let probes = file.probe.iter().map(probe).collect::<Result<_, _>>()?;
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
     let held_only: Vec<Warning> = objects::objects_with_tables(&objects, &object_names).collect();
     let inputs = inputs(source, file);
@@ -168,6 +171,7 @@ fn assemble(
         object_names,
         devices,
         obstacles,
+        probes,
         gravity,
         warnings,
         choices,
@@ -190,12 +194,13 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
     };
     let objects = file.object.iter().map(|entry| own(&entry.name));
     let devices = file.device.iter().map(|entry| own(&entry.name));
+    let probes = file.probe.iter().map(|entry| own(&entry.name));
     let planes = file.plane.iter().enumerate();
     let planes = planes.map(|(number, entry)| or(&entry.get_ref().name, "plane", number, entry.span()));
     let others = file.obstacle.iter().enumerate();
     let others = others.map(|(number, entry)| or(&entry.get_ref().name, "obstacle", number, entry.span()));
     let mut seen = HashSet::new();
-    for (name, span) in objects.chain(devices).chain(planes).chain(others) {
+    for (name, span) in objects.chain(devices).chain(probes).chain(planes).chain(others) {
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(plain) {
             return source.fail(

@@ -129,7 +129,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         outputs.take(scene, &input, &state, took)?;
     }
     bar.finish_and_clear();
-    outputs.finish(&state)
+    outputs.finish(scene, &state)
 }
 
 /// Failure for a pointer, which needs the viewer.

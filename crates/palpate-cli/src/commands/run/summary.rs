@@ -3,6 +3,7 @@
 use super::warnings;
 use glam::DVec3;
 use palpate::{Collider, Input, Output, State, StepStatus};
+use palpate_export::ProbeReading;
 use palpate_haptics::percentile_us;
 use palpate_scene::{Scene, Warning, WarningKind};
 use serde_json::{Value, json};
@@ -18,6 +19,8 @@ pub struct Summary {
     /// Force on the hand by device and step [N].
     pub forces: Vec<Vec<DVec3>>,
     last: Output,
+    /// Readings of the probes at the end.
+    probes: Vec<ProbeReading>,
     /// Maxima over all steps.
     status: StepStatus,
     /// Steps with unsolved islands, and steps with dropped contacts.
@@ -45,6 +48,7 @@ impl Summary {
             steps,
             forces: vec![Vec::with_capacity(steps); scene.devices.len()],
             last: start.clone(),
+            probes: Vec::new(),
             status: StepStatus::default(),
             unsolved_steps: 0,
             dropping_steps: 0,
@@ -86,9 +90,10 @@ impl Summary {
     }
 
     /// Completes the summary after the last step.
-    pub(super) fn finish(&mut self, last: &Output, index: Option<PathBuf>) {
+    pub(super) fn finish(&mut self, scene: &Scene, last: &State, index: Option<PathBuf>) {
         self.times_ns.sort_unstable();
-        self.last = last.clone();
+        self.last = last.output().clone();
+        self.probes = scene.probes.iter().map(|probe| probe.read(&scene.model, last)).collect();
         self.index = index;
     }
 
@@ -167,12 +172,26 @@ impl Summary {
                 })
             })
             .collect();
+        let probes: Vec<Value> = scene
+            .probes
+            .iter()
+            .zip(&self.probes)
+            .map(|(probe, ProbeReading { position, displacement })| {
+                json!({
+                    "name": probe.name,
+                    "object": scene.object_names[probe.at.object],
+                    "position_m": position.to_array(),
+                    "displacement_m": displacement.to_array(),
+                })
+            })
+            .collect();
         let energy = &self.last.energy;
         json!({
             "steps": self.steps,
             "step_s": scene.model.parameters().step_s,
             "devices": devices,
             "objects": objects,
+            "probes": probes,
             "contacts": { "count_max": self.max_contacts, "force_max_n": self.max_contact_force },
             "energy_j": {
                 "kinetic": energy.kinetic,
@@ -231,6 +250,13 @@ impl Summary {
                 v.y,
                 v.z,
                 1000.0 * deformation
+            );
+        }
+        for (probe, ProbeReading { displacement, .. }) in scene.probes.iter().zip(&self.probes) {
+            let u = 1000.0 * *displacement + DVec3::ZERO;
+            out += &format!(
+                "  {:<12} displaced by ({:.5}, {:.5}, {:.5}) mm at the end, body axes\n",
+                probe.name, u.x, u.y, u.z
             );
         }
         if self.max_contacts > 0 {
