@@ -78,7 +78,8 @@ impl ForceProcess {
         });
         let slots: Vec<DeviceSlot> = slots.collect();
         let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
-        let input = Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles, gravity: None };
+        let input =
+            Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles, ..Input::default() };
         Self { model, state, input, slots, obstacle_trajectories, gravity: None, steps: 0, device_timeout_s }
     }
 

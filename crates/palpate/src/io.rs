@@ -93,6 +93,8 @@ pub struct Input {
     pub devices: Vec<DeviceInput>,
     /// Obstacle poses at the end of the step, in the model's order. Missing entries stay.
     pub obstacles: Vec<Pose>,
+    /// Frames of the clamps at the end of the step [m, world], in the model's order. Missing entries stay.
+    pub clamps: Vec<Pose>,
     /// Gravity, held over the step [m/s², world]. None stays as it was, at the start the model's.
     pub gravity: Option<DVec3>,
 }
@@ -105,6 +107,7 @@ impl Input {
     pub fn copy_from(&mut self, other: &Self) {
         self.devices.copy_from_slice(&other.devices);
         self.obstacles.copy_from_slice(&other.obstacles);
+        self.clamps.copy_from_slice(&other.clamps);
         self.gravity = other.gravity;
     }
 }
@@ -117,6 +120,15 @@ pub struct DeviceOutput {
     /// Proxy at the end of the step [m, world]: the held point, the point that a prescribed force acts on, or the
     /// centre of the tip that stays outside the objects; without contact the device's position, but for the lag of a coupling's damper.
     pub proxy: DVec3,
+}
+
+/// One clamp's part of a step's output.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClampOutput {
+    /// Reaction force on the clamp, held over the step [N, world].
+    pub force: DVec3,
+    /// Reaction torque on the clamp about the origin of its frame, with arms at the end of the step [N·m, world].
+    pub torque: DVec3,
 }
 
 /// Contact that carries force.
@@ -160,7 +172,7 @@ pub struct StepStatus {
     /// Largest number of solver iterations of an island.
     pub iterations: u32,
     /// Devices and obstacles with a position or force that is not finite, or a grasp that does not exist: the device is inactive, the
-    /// obstacle stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
+    /// obstacle, or a clamp, stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
     pub rejected_inputs: u32,
     /// Held directions that depend linearly on others and got no force.
     pub dependent_rows: u32,
@@ -181,6 +193,8 @@ pub struct Output {
     pub devices: Vec<DeviceOutput>,
     /// Objects, in the model's order.
     pub objects: Vec<ObjectOutput>,
+    /// Clamps, in the model's order.
+    pub clamps: Vec<ClampOutput>,
     /// Contacts that carry force, without held points.
     pub contacts: Vec<ContactOutput>,
     /// Energy ledger of the scene.

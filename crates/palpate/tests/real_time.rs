@@ -120,7 +120,7 @@ fn touch(model: &Model, what: &str) {
     let mut input = Input {
         devices: vec![DeviceInput::touching(DVec3::ZERO); 2],
         obstacles: vec![Pose::IDENTITY; 2],
-        gravity: None,
+        ..Input::default()
     };
     let (before, mut most) = (allocations(), 0);
     for number in 0..600_u32 {

@@ -61,7 +61,7 @@ fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogSender, LogWriter<W
     let input = Input {
         devices: vec![palpate::DeviceInput::inactive(); 2],
         obstacles: vec![session.model.parameters().obstacles[0].pose],
-        gravity: None,
+        ..Input::default()
     };
     let start = (&*session.model, process.state(), &input);
     LogWriter::new(out, names, BTreeMap::new(), &[], start).expect("a log")

@@ -3,6 +3,7 @@
 mod adversarial;
 mod aligned_faces;
 mod bounce;
+mod clamped_bar;
 mod closed_loop;
 mod compliance;
 mod contact_samples;
@@ -96,6 +97,11 @@ pub const CASES: &[Case] = &[
         name: "prescribed-force",
         about: "bar with ν = 0, one end fixed, under a force F·sin ωt at the other against F·tan(kL)/(EAk)",
         compute: prescribed_force::prescribed_force,
+    },
+    Case {
+        name: "clamped-bar",
+        about: "square bar between two clamps against EA/L·u, GJ/L·θ and EI/L·θ",
+        compute: clamped_bar::clamped_bar,
     },
     Case {
         name: "bounce",

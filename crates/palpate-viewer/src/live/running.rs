@@ -40,7 +40,7 @@ pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
     let input = Input {
         devices: vec![DeviceInput::inactive(); scene.devices.len()],
         obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-        gravity: None,
+        ..Input::default()
     };
     Snapshot::new(&scene.model, state, &input)
 }

@@ -71,7 +71,7 @@ impl LoggedProvider {
         let input = Input {
             devices: vec![DeviceInput::inactive(); 2],
             obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-            gravity: None,
+            ..Input::default()
         };
         let open: LogOpener = Arc::new(move |state, pages| {
             let file = InMemory { bytes: Cursor::default(), capacity, logs: logs.clone(), pages };

@@ -94,7 +94,7 @@ impl ContactProblem<'_> {
     pub(super) fn apart(&self, contact: &Contact) -> DVec3 {
         let other = match contact.other {
             OtherSide::Device(device) => self.devices[device].proxy_under_force(),
-            OtherSide::Obstacle { end, .. } => end,
+            OtherSide::Obstacle { end, .. } | OtherSide::Clamp { end, .. } => end,
             OtherSide::Object { number, slot } => self.position(number, slot),
         };
         other - self.position(contact.object(), contact.slot)
@@ -106,7 +106,7 @@ impl ContactProblem<'_> {
         match contact.other {
             OtherSide::Device(device) => self.devices[device].force += change,
             OtherSide::Object { number, slot } => self.push(number, slot, -change),
-            OtherSide::Obstacle { .. } => {}
+            OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => {}
         }
     }
 
@@ -240,7 +240,7 @@ impl ContactProblem<'_> {
                 w += DMat3::from_diagonal(DVec3::splat(self.devices[device].compliance));
             }
             OtherSide::Object { number, slot } => w += self.compliance(number, slot, slot),
-            OtherSide::Obstacle { .. } => {}
+            OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => {}
         }
         let (t1, t2) = tangents(contact.normal);
         let axes = DMat3::from_cols(-contact.normal, t1, t2);

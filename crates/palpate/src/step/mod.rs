@@ -22,6 +22,7 @@
 //! Equations: docs/theory.md (C38), (C44), (C45), (C46), (C49).
 
 mod accounting;
+mod clamps;
 mod depenetration;
 mod output;
 mod prescribed_forces;
@@ -63,6 +64,7 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     prescribed_forces::place(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
+    clamps::move_frames(state, input);
     find_contacts(model, state, input);
     set_up_constraints(model, state);
     prescribed_forces::predict(model, state);
@@ -110,15 +112,19 @@ fn predict(model: &Model, state: &mut State) {
 fn move_obstacles(state: &mut State, input: &Input) {
     let State { obstacles, workspace, output, .. } = state;
     for (number, next) in workspace.next_obstacles.iter_mut().enumerate() {
-        *next = obstacles[number];
-        let Some(given) = input.obstacles.get(number) else { continue };
-        let length = given.orientation.length();
-        if given.position.is_finite() && (0.99..=1.01).contains(&length) {
-            *next = Pose { orientation: given.orientation.normalize(), ..*given };
-        } else {
-            output.status.rejected_inputs += 1;
-        }
+        *next = moved(obstacles[number], input.obstacles.get(number), &mut output.status);
     }
+}
+
+/// Given pose, if it can be used; otherwise, and without one, the present pose.
+fn moved(present: Pose, given: Option<&Pose>, status: &mut StepStatus) -> Pose {
+    let Some(given) = given else { return present };
+    let length = given.orientation.length();
+    if given.position.is_finite() && (0.99..=1.01).contains(&length) {
+        return Pose { orientation: given.orientation.normalize(), ..*given };
+    }
+    status.rejected_inputs += 1;
+    present
 }
 
 /// A device's input, if it can be used.
@@ -136,8 +142,8 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let (step, gravity) = (state.steps, state.gravity);
-    let State { objects, devices, obstacles, contacts, inside, levels, couplings, workspace, output, .. } =
-        state;
+    let State { objects, devices, obstacles, clamps, contacts, inside, levels, .. } = state;
+    let State { couplings, workspace, output, .. } = state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
     let scene = model.collision_scene();
@@ -189,6 +195,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             context.find_tip_contacts(TipPair { number, device, object, is_new }, inside);
         }
     }
+    clamps::find_contacts(model, clamps, context.workspace);
     for object in touchable() {
         for (number, (before, after)) in obstacles.iter().zip(&*next_obstacles).enumerate() {
             context.find_obstacle_contacts(object, number, *before, *after);
@@ -233,7 +240,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         };
         let other = match contact.other {
             OtherSide::Device(device) => devices[device].proxy,
-            OtherSide::Obstacle { start, .. } => start,
+            OtherSide::Obstacle { start, .. } | OtherSide::Clamp { start, .. } => start,
             OtherSide::Object { number, slot } => at(number, slot),
         };
         if let (true, OtherSide::Device(number)) = (contact.is_held(), contact.other) {
@@ -244,6 +251,10 @@ fn set_up_constraints(model: &Model, state: &mut State) {
                 device.active = false;
                 device.begin(parameters, h, device.target, at(contact.object(), contact.slot));
             }
+            workspace.constraints.push(Constraint::default());
+            continue;
+        }
+        if contact.is_held() {
             workspace.constraints.push(Constraint::default());
             continue;
         }

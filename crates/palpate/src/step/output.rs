@@ -2,14 +2,14 @@
 
 use crate::collision::OtherSide;
 use crate::device::PrescribedForce;
-use crate::io::{ContactOutput, Input};
+use crate::io::{ClampOutput, ContactOutput, Input};
 use crate::scene::Model;
 use crate::state::State;
 use glam::DVec3;
 
 /// Write the output of a step from the state at its end.
 pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, contacts, couplings, workspace, output, .. } = state;
+    let State { steps, objects, devices, clamps, contacts, couplings, workspace, output, .. } = state;
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;
     for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
@@ -35,14 +35,20 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         }
     }
     output.contacts.clear();
+    output.clamps.fill(ClampOutput::default());
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let own = &objects[contact.object()];
         let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
         let carries_force = contact.force != DVec3::ZERO;
+        if let OtherSide::Clamp { number, .. } = contact.other {
+            let out = &mut output.clamps[number];
+            out.force -= contact.force;
+            out.torque -= (point - clamps[number].end.position).cross(contact.force);
+        }
         if !contact.is_held() {
             let other = match contact.other {
                 OtherSide::Object { number, .. } => Some(number),
-                OtherSide::Device(_) | OtherSide::Obstacle { .. } => None,
+                OtherSide::Device(_) | OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => None,
             };
             let penetration = -contact.gap(constraint.end);
             for object in [Some(contact.object()), other].into_iter().flatten() {
