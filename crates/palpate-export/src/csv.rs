@@ -45,6 +45,10 @@ impl StepsCsv {
             let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
             columns.extend(parts.map(|c| format!("{name}.{c}")));
         }
+        for name in &labels.clamps {
+            let parts = ["x", "y", "z", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz"];
+            columns.extend(parts.map(|c| format!("{name}.{c}")));
+        }
         for probe in &labels.probes {
             columns.extend(["x", "y", "z", "ux", "uy", "uz"].map(|c| format!("{}.{c}", probe.name)));
         }
@@ -74,6 +78,14 @@ impl StepsCsv {
             numbers.extend([q.w, q.x, q.y, q.z]);
             numbers.extend(object.twist.linear.to_array());
             numbers.extend(object.twist.angular.to_array());
+        }
+        for (at, clamp) in output.clamps.iter().enumerate() {
+            let frame = input.clamps.get(at).copied().unwrap_or(model.parameters().clamps[at].frame);
+            let q = frame.orientation;
+            numbers.extend(frame.position.to_array());
+            numbers.extend([q.w, q.x, q.y, q.z]);
+            numbers.extend(clamp.force.to_array());
+            numbers.extend(clamp.torque.to_array());
         }
         for ProbeReading { position, displacement } in
             labels.probes.iter().map(|probe| probe.read(model, state))

@@ -13,6 +13,8 @@ pub struct SceneLabels {
     pub devices: Vec<DeviceLabel>,
     /// Names of planes and obstacles.
     pub obstacles: Vec<String>,
+    /// Names of the clamps.
+    pub clamps: Vec<String>,
     /// Displacement probes.
     pub probes: Vec<ProbeLabel>,
     /// Whether anything but held points can act on the objects: then frames have a file for contacts.

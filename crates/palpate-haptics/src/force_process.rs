@@ -37,6 +37,8 @@ pub struct ForceProcess {
     input: Input,
     slots: Vec<DeviceSlot>,
     obstacle_trajectories: Vec<ObstacleTrajectory>,
+    /// Paths of the clamps' frames.
+    clamps: Vec<Option<MotionPath>>,
     /// Gravity over simulated time [m/s²], if it changes.
     gravity: Option<MotionPath>,
     steps: u64,
@@ -78,9 +80,25 @@ impl ForceProcess {
         });
         let slots: Vec<DeviceSlot> = slots.collect();
         let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
-        let input =
-            Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles, ..Input::default() };
-        Self { model, state, input, slots, obstacle_trajectories, gravity: None, steps: 0, device_timeout_s }
+        let clamps: Vec<Pose> = model.parameters().clamps.iter().map(|clamp| clamp.frame).collect();
+        let no_paths = vec![None; clamps.len()];
+        let input = Input {
+            devices: vec![DeviceInput::inactive(); slots.len()],
+            obstacles,
+            clamps,
+            ..Input::default()
+        };
+        Self {
+            model,
+            state,
+            input,
+            slots,
+            obstacle_trajectories,
+            clamps: no_paths,
+            gravity: None,
+            steps: 0,
+            device_timeout_s,
+        }
     }
 
     /// Lets a device follow a path in simulated time, also where that runs slower than the clock; where a force is prescribed, it is the
@@ -90,6 +108,15 @@ impl ForceProcess {
     /// If the model has no such device.
     pub fn follow(&mut self, device: usize, path: MotionPath) {
         self.slots[device].path = Some(path);
+    }
+
+    /// Lets clamps follow paths in simulated time, in the model's order; those without one stay.
+    ///
+    /// # Panics
+    /// If their number is not the model's.
+    pub fn move_clamps(&mut self, paths: Vec<Option<MotionPath>>) {
+        assert_eq!(paths.len(), self.clamps.len(), "one path for each clamp");
+        self.clamps = paths;
     }
 
     /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
@@ -166,6 +193,9 @@ impl ForceProcess {
         }
         for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
             *pose = trajectory(time_s);
+        }
+        for (path, frame) in self.clamps.iter().zip(&mut self.input.clamps) {
+            path.iter().for_each(|path| *frame = path.at(time_s));
         }
         self.input.gravity = self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
 

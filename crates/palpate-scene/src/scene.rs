@@ -21,6 +21,8 @@ pub struct Scene {
     pub devices: Vec<SceneDevice>,
     /// Planes and obstacles, in the model's order.
     pub obstacles: Vec<SceneObstacle>,
+    /// Clamps, in the model's order.
+    pub clamps: Vec<SceneClamp>,
     /// Displacement probes.
     pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
@@ -61,6 +63,26 @@ pub struct SceneObstacle {
     pub path: Option<MotionPath>,
     /// Initial pose; its orientation also holds for a path of positions.
     pub start: Pose,
+}
+
+/// Clamp of a scene.
+#[derive(Clone)]
+pub struct SceneClamp {
+    /// Name.
+    pub name: String,
+    /// Number of its object.
+    pub object: usize,
+    /// Path of its frame, if it moves.
+    pub path: Option<MotionPath>,
+    /// Initial frame [m, world].
+    pub start: Pose,
+}
+
+impl SceneClamp {
+    /// Frame at a time [s].
+    pub fn frame_at(&self, time_s: f64) -> Pose {
+        self.path.as_ref().map_or(self.start, |path| path.at(time_s))
+    }
 }
 
 impl SceneDevice {
@@ -104,6 +126,7 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(|device| device.name.clone()).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.name.clone()).collect(),
         }
     }
 
@@ -115,6 +138,7 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(label).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.name.clone()).collect(),
             probes: self.probes.clone(),
             can_touch: self.can_touch(),
             inputs: self.inputs.clone(),
@@ -127,6 +151,7 @@ impl Scene {
         Input {
             devices: self.devices.iter().map(|device| device.input_at(time_s, step_s)).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.frame_at(time_s)).collect(),
             gravity: self.gravity_at(time_s),
         }
     }

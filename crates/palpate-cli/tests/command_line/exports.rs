@@ -52,6 +52,7 @@ fn surfaces(workplace: &Workplace) -> Vec<Vec<DVec3>> {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let bytes = workplace.read("run.mcap");
     let mut state = State::new(&model);
@@ -395,6 +396,7 @@ fn write_differing_log(workplace: &Workplace, version: &str) {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let scene = workplace.text("fingers.toml").replace("{ file = \"gravity.csv\" }", "[0.0, 0.0, -9.8]");
     workplace.write("fingers.toml", scene);

@@ -148,3 +148,88 @@ fn keys_that_do_not_fit_a_force_are_refused() {
         "scene.toml: line 9: path force.csv: line 1: the columns are t,x,y,z, expected t,fx,fy,fz"
     );
 }
+
+/// A damped bar of 0.1 × 0.03 × 0.03 m, and a scene that clamps its two ends.
+fn clamped() -> (Workplace, String) {
+    let workplace = Workplace::new();
+    let body = ["record", "box:0.1x0.03x0.03/6x2x2", "--young", "1e5", "--poisson", "0", "--density", "1000"];
+    workplace.succeed(&[&body[..], &["--rayleigh", "0,1e-2", "--modes", "40", "-o", "bar.palp"]].concat());
+    // The right end goes 0.1 mm outwards, then turns by 1 mrad about the bar.
+    workplace.write(
+        "jaw.csv",
+        "0,0.05,0,0,1,0,0,0\n0.2,0.0501,0,0,1,0,0,0\n0.5,0.0501,0,0,1,0,0,0\n0.6,0.0501,0,0,1,0.0005,0,0\n",
+    );
+    let scene = "[[object]]\nname = \"bar\"\nrecording = \"bar.palp\"\n[[clamp]]\nname = \"wall\"\nobject = \"bar\"\nbox = { min = \
+                 [-1, -1, -1], max = [-0.049, 1, 1] }\n[[clamp]]\nname = \"jaw\"\nobject = \"bar\"\nface = { point = [0.05, 0.0, 0.0] }\npath \
+                 = { file = \"jaw.csv\" }\n";
+    workplace.write("scene.toml", scene);
+    (workplace, scene.to_string())
+}
+
+#[test]
+fn clamps_stretch_and_twist_a_bar() {
+    let (workplace, _) = clamped();
+    let text = workplace.succeed(&["run", "scene.toml", "--duration", "1", "--csv", "steps.csv"]);
+    assert!(text.contains("\n  jaw          force on the clamp "), "{text}");
+    let table = Table::parse(&workplace.text("steps.csv"));
+    let at = |name: &str, row: usize| table.column(name)[row];
+    // EA/L·u, at rest after 0.5 s; and GJ/L·θ, within what short ends stiffen.
+    let stretch = 1e5 * 9e-4 / 0.1 * 1e-4;
+    assert!((at("jaw.fx", 499) / -stretch - 1.0).abs() < 1e-4, "{}", at("jaw.fx", 499));
+    assert!((at("wall.fx", 499) / stretch - 1.0).abs() < 1e-4, "{}", at("wall.fx", 499));
+    let twist = 0.5e5 * 0.1406 * 0.03_f64.powi(4) / 0.1 * 1e-3;
+    let ratio = at("jaw.tx", 999) / -twist;
+    assert!(ratio > 1.0 && ratio < 1.15, "{ratio}");
+    assert!((at("wall.tx", 999) + at("jaw.tx", 999)).abs() < 1e-4 * twist, "{}", at("wall.tx", 999));
+    // Without a path the frame is in the middle of the face.
+    assert_eq!(at("jaw.x", 999), 0.0501);
+    assert!((at("wall.x", 999) + 0.05).abs() < 1e-12, "{}", at("wall.x", 999));
+    assert!(at("energy.defect", 999).abs() < 1e-11 * at("energy.input", 999));
+    let summary = workplace.json(&["run", "scene.toml", "--json"]);
+    let jaw = &summary["clamps"][1];
+    assert_eq!((&summary["steps"], &jaw["name"], &jaw["cells"]), (&600.into(), &"jaw".into(), &16.into()));
+    assert!(jaw["torque_max_nm"].as_f64().expect("a number") > 0.9 * twist);
+}
+
+#[test]
+fn a_log_of_clamps_repeats_bit_for_bit() {
+    let (workplace, _) = clamped();
+    workplace.succeed(&["run", "scene.toml", "--realtime", "--log", "run.mcap", "--pictures", "0"]);
+    workplace.succeed(&["replay", "run.mcap", "--csv", "replayed.csv"]);
+    workplace.succeed(&["run", "scene.toml", "--csv", "steps.csv"]);
+    assert_eq!(workplace.text("replayed.csv"), workplace.text("steps.csv"));
+}
+
+#[test]
+fn clamps_that_hold_nothing_or_fixed_nodes_are_refused() {
+    let (workplace, scene) = clamped();
+    let fail = |from: &str, to: &str| {
+        assert!(scene.contains(from));
+        workplace.write("scene.toml", scene.replace(from, to));
+        workplace.fail(&["run", "scene.toml"])
+    };
+    assert_eq!(
+        fail("face = { point = [0.05, 0.0, 0.0] }\n", ""),
+        "scene.toml: line 9: a clamp needs one of face = { point = [x, y, z] }, the face around a point, and box = { min = [x, y, z], max = \
+         [x, y, z] }, all triangles in a box"
+    );
+    assert_eq!(
+        fail("-0.049, 1", "-0.06, 1"),
+        "scene.toml: line 7: there is no whole triangle of \"bar\" in it; it is given in the body frame [m]"
+    );
+    assert_eq!(
+        fail("face = {", "max_cells = 500\nface = {"),
+        "scene.toml: line 11: max_cells is 500, expected 1 to 256"
+    );
+    assert_eq!(
+        fail("object = \"bar\"\nface", "object = \"bat\"\nface"),
+        "scene.toml: line 10: there is no object \"bat\"; the scene has bar"
+    );
+    let body = ["record", "box:0.1x0.03x0.03/6x2x2", "--young", "1e5", "--poisson", "0", "--density", "1000"];
+    let fixed = ["--modes", "40", "--fix", "x<-0.049", "-o", "bar.palp"];
+    workplace.succeed(&[&body[..], &fixed].concat());
+    assert_eq!(
+        fail("name", "name"),
+        "scene.toml: line 7: the clamp \"wall\" holds fixed nodes of \"bar\": leave them out"
+    );
+}

@@ -19,6 +19,16 @@ pub struct SceneNames {
     pub devices: Vec<String>,
     /// Names of the planes and obstacles.
     pub obstacles: Vec<String>,
+    /// Names of the clamps.
+    pub clamps: Vec<String>,
+}
+
+/// Frame of a clamp [m, world], and reaction force [N] and torque [N·m] on it.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(super) struct ClampMessage {
+    pub frame: PoseMessage,
+    pub force: Xyz,
+    pub torque: Xyz,
 }
 
 /// Vector.
@@ -249,6 +259,9 @@ pub(super) struct StepMessage {
     pub step: u64,
     pub devices: HashMap<String, DeviceMessage>,
     pub obstacles: HashMap<String, PoseMessage>,
+    /// Clamps; logs before version 0.4 have none.
+    #[serde(default)]
+    pub clamps: HashMap<String, ClampMessage>,
     /// Gravity [m/s², world], where it changes in time.
     #[serde(default)]
     pub gravity: Option<Xyz>,
@@ -314,11 +327,20 @@ impl Serialize for StepMessageOf<'_> {
             late_us: microseconds(record.lateness),
             compute_us: microseconds(record.compute),
         };
-        let mut map = serializer.serialize_map(Some(7 + usize::from(record.input.gravity.is_some())))?;
+        let optional = usize::from(record.input.gravity.is_some()) + usize::from(!names.clamps.is_empty());
+        let mut map = serializer.serialize_map(Some(7 + optional))?;
         map.serialize_entry("step", &record.step)?;
         map.serialize_entry("devices", &Named(&names.devices, device))?;
         let obstacle = |at: usize| PoseMessage::from(record.input.obstacles[at]);
         map.serialize_entry("obstacles", &Named(&names.obstacles, obstacle))?;
+        if !names.clamps.is_empty() {
+            let clamp = |at: usize| ClampMessage {
+                frame: record.input.clamps[at].into(),
+                force: record.clamps[at].force.into(),
+                torque: record.clamps[at].torque.into(),
+            };
+            map.serialize_entry("clamps", &Named(&names.clamps, clamp))?;
+        }
         if let Some(gravity) = record.input.gravity {
             map.serialize_entry("gravity", &Xyz::from(gravity))?;
         }

@@ -164,6 +164,10 @@ impl LoggedStep {
         for name in &names.obstacles {
             input.obstacles.push((*self.message.obstacles.get(name).ok_or_else(|| missing(name))?).into());
         }
+        for name in &names.clamps {
+            let clamp = self.message.clamps.get(name).ok_or_else(|| missing(name))?;
+            input.clamps.push(clamp.frame.into());
+        }
         Ok(input)
     }
 
@@ -201,6 +205,14 @@ impl LoggedStep {
                 });
             if found.is_some() {
                 return found;
+            }
+        }
+        for (name, now) in names.clamps.iter().zip(&output.clamps) {
+            let Some(logged) = self.message.clamps.get(name) else { continue };
+            let force = vector(format!("{name}.force"), logged.force.into(), now.force);
+            let torque = || vector(format!("{name}.torque"), logged.torque.into(), now.torque);
+            if let Some(found) = force.or_else(torque) {
+                return Some(found);
             }
         }
         energy_difference(&self.message.energy, &output.energy)

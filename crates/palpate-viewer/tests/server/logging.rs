@@ -58,7 +58,12 @@ impl LogFile for InMemory {
 
 fn names() -> SceneNames {
     let own = |names: &[&str]| names.iter().map(|name| (*name).to_string()).collect();
-    SceneNames { objects: own(&["body"]), devices: own(&["left", "right"]), obstacles: own(&["floor"]) }
+    SceneNames {
+        objects: own(&["body"]),
+        devices: own(&["left", "right"]),
+        obstacles: own(&["floor"]),
+        ..SceneNames::default()
+    }
 }
 
 /// Provider of a logged scene: finished logs, capacity of a log [bytes].

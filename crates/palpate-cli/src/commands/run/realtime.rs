@@ -131,6 +131,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         start,
         devices,
         obstacle_trajectories: movers(scene),
+        clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
         gravity: scene.gravity.clone(),
         steps,
         frame_rate_hz: options.pictures,
