@@ -2,8 +2,8 @@
 
 use crate::atomic_file::AtomicFile;
 use crate::error::ExportError;
-use crate::labels::SceneLabels;
-use palpate::{Collider, Input, Output};
+use crate::labels::{ProbeReading, SceneLabels};
+use palpate::{Collider, Input, Model, Output, State};
 use std::path::{Path, PathBuf};
 
 /// Rows of numbers, written so that they parse to the same bits.
@@ -45,6 +45,13 @@ impl StepsCsv {
             let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
             columns.extend(parts.map(|c| format!("{name}.{c}")));
         }
+        for name in &labels.clamps {
+            let parts = ["x", "y", "z", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz"];
+            columns.extend(parts.map(|c| format!("{name}.{c}")));
+        }
+        for probe in &labels.probes {
+            columns.extend(["x", "y", "z", "ux", "uy", "uz"].map(|c| format!("{}.{c}", probe.name)));
+        }
         let stored = ["kinetic", "elastic", "residual", "potential", "coupling"];
         let passed = ["input", "dissipated", "friction", "impact", "defect"];
         columns.extend(stored.into_iter().chain(passed).map(|c| format!("energy.{c}")));
@@ -52,10 +59,16 @@ impl StepsCsv {
     }
 
     /// Writes the row of a step.
-    pub fn write(&mut self, input: &Input, output: &Output) -> Result<(), ExportError> {
+    pub fn write(
+        &mut self,
+        labels: &SceneLabels,
+        (model, state): (&Model, &State),
+        input: &Input,
+    ) -> Result<(), ExportError> {
+        let output = state.output();
         let mut numbers = vec![output.time_s];
         for (device, out) in input.devices.iter().zip(&output.devices) {
-            numbers.extend(device.position.to_array());
+            numbers.extend(device.hand(out).to_array());
             numbers.extend(out.force_on_hand.to_array());
             numbers.extend(out.proxy.to_array());
         }
@@ -65,6 +78,20 @@ impl StepsCsv {
             numbers.extend([q.w, q.x, q.y, q.z]);
             numbers.extend(object.twist.linear.to_array());
             numbers.extend(object.twist.angular.to_array());
+        }
+        for (at, clamp) in output.clamps.iter().enumerate() {
+            let frame = input.clamps.get(at).copied().unwrap_or(model.parameters().clamps[at].frame);
+            let q = frame.orientation;
+            numbers.extend(frame.position.to_array());
+            numbers.extend([q.w, q.x, q.y, q.z]);
+            numbers.extend(clamp.force.to_array());
+            numbers.extend(clamp.torque.to_array());
+        }
+        for ProbeReading { position, displacement } in
+            labels.probes.iter().map(|probe| probe.read(model, state))
+        {
+            numbers.extend(position.to_array());
+            numbers.extend(displacement.to_array());
         }
         let e = &output.energy;
         numbers.extend([e.kinetic, e.elastic, e.residual, e.potential, e.coupling]);

@@ -28,7 +28,7 @@ pub use frame::TimeWindow;
 pub use glb::{Content, Glb, check_glb_size};
 pub use glb_parts::{DeformingSurface, GlbAnimation, NodeTrack, root_node};
 pub use glb_scene::GlbWarning;
-pub use labels::{DeviceLabel, SceneLabels};
+pub use labels::{DeviceLabel, ProbeLabel, ProbeReading, SceneLabels};
 pub use scene_export::{ExportOptions, SceneExporter, WrittenFile};
 pub use vtu::{Cells, Field, Grid, VtuSeries};
 pub use vtu_scene::deformed_surface;

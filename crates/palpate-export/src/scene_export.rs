@@ -115,7 +115,7 @@ impl SceneExporter {
             return Ok(());
         }
         if let Some(csv) = &mut self.csv {
-            csv.write(input, output)?;
+            csv.write(&self.labels, (model, state), input)?;
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.write(&self.labels, output)?;

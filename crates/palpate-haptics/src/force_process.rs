@@ -3,7 +3,7 @@
 use crate::motion_path::MotionPath;
 use crate::port::{Effort, ForcePort, Motion};
 use glam::DVec3;
-use palpate::{DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
+use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
 
 /// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
@@ -37,6 +37,8 @@ pub struct ForceProcess {
     input: Input,
     slots: Vec<DeviceSlot>,
     obstacle_trajectories: Vec<ObstacleTrajectory>,
+    /// Paths of the clamps' frames.
+    clamps: Vec<Option<MotionPath>>,
     /// Gravity over simulated time [m/s²], if it changes.
     gravity: Option<MotionPath>,
     steps: u64,
@@ -78,16 +80,43 @@ impl ForceProcess {
         });
         let slots: Vec<DeviceSlot> = slots.collect();
         let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
-        let input = Input { devices: vec![DeviceInput::inactive(); slots.len()], obstacles, gravity: None };
-        Self { model, state, input, slots, obstacle_trajectories, gravity: None, steps: 0, device_timeout_s }
+        let clamps: Vec<Pose> = model.parameters().clamps.iter().map(|clamp| clamp.frame).collect();
+        let no_paths = vec![None; clamps.len()];
+        let input = Input {
+            devices: vec![DeviceInput::inactive(); slots.len()],
+            obstacles,
+            clamps,
+            ..Input::default()
+        };
+        Self {
+            model,
+            state,
+            input,
+            slots,
+            obstacle_trajectories,
+            clamps: no_paths,
+            gravity: None,
+            steps: 0,
+            device_timeout_s,
+        }
     }
 
-    /// Lets a device follow a path in simulated time, also where that runs slower than the clock.
+    /// Lets a device follow a path in simulated time, also where that runs slower than the clock; where a force is prescribed, it is the
+    /// course of the force.
     ///
     /// # Panics
     /// If the model has no such device.
     pub fn follow(&mut self, device: usize, path: MotionPath) {
         self.slots[device].path = Some(path);
+    }
+
+    /// Lets clamps follow paths in simulated time, in the model's order; those without one stay.
+    ///
+    /// # Panics
+    /// If their number is not the model's.
+    pub fn move_clamps(&mut self, paths: Vec<Option<MotionPath>>) {
+        assert_eq!(paths.len(), self.clamps.len(), "one path for each clamp");
+        self.clamps = paths;
     }
 
     /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
@@ -140,6 +169,11 @@ impl ForceProcess {
         // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent or
         // where their position is not finite.
         for (slot, input) in self.slots.iter_mut().zip(&mut self.input.devices) {
+            if let (Some(path), DeviceMode::Force(applied)) = (&slot.path, slot.mode) {
+                let force = path.mid_step(time_s, step_s);
+                *input = DeviceInput::exerting(AppliedForce { force, ..applied });
+                continue;
+            }
             let mut motion = slot.port.newest();
             if let Some(path) = &slot.path {
                 let position = path.at(time_s).position;
@@ -159,6 +193,9 @@ impl ForceProcess {
         }
         for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
             *pose = trajectory(time_s);
+        }
+        for (path, frame) in self.clamps.iter().zip(&mut self.input.clamps) {
+            path.iter().for_each(|path| *frame = path.at(time_s));
         }
         self.input.gravity = self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
 

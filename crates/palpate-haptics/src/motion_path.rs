@@ -1,4 +1,5 @@
-//! Path of a device or an obstacle: poses over time, linear between rows, constant before the first and after the last.
+//! Path of a device or an obstacle: poses over time, linear between rows, constant before the first and after the last; and the
+//! course of a force.
 
 use glam::{DQuat, DVec3};
 use palpate::Pose;
@@ -14,9 +15,11 @@ pub enum Columns {
     Position,
     /// t [s], x, y, z [m], optionally with the orientation qw, qx, qy, qz.
     Pose,
+    /// t [s], fx, fy, fz [N].
+    Force,
 }
 
-/// Path: rows of time [s] and pose [m, world], time ascending.
+/// Path: rows of time [s] and pose [m, world], time ascending. The position may stand for another vector, as a force [N].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionPath {
     rows: Vec<(f64, Pose)>,
@@ -25,6 +28,7 @@ pub struct MotionPath {
 }
 
 const POSITION: [&str; 4] = ["t", "x", "y", "z"];
+const FORCE: [&str; 4] = ["t", "fx", "fy", "fz"];
 const POSE: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
 
 impl MotionPath {
@@ -49,7 +53,12 @@ impl MotionPath {
             let numbers = match numbers {
                 Ok(numbers) => numbers,
                 Err(_) if header && cells.iter().all(|cell| cell.parse::<f64>().is_err()) => {
-                    if cells != POSITION && (columns == Columns::Position || cells != POSE) {
+                    let is_header = match columns {
+                        Columns::Position => cells == POSITION,
+                        Columns::Pose => cells == POSITION || cells == POSE,
+                        Columns::Force => cells == FORCE,
+                    };
+                    if !is_header {
                         let (found, expected) = (cells.join(","), columns.names());
                         return Err(PathError::Header { line: number, found, expected });
                     }
@@ -82,7 +91,7 @@ impl MotionPath {
             rows.push((t, Pose { position: DVec3::new(numbers[1], numbers[2], numbers[3]), orientation }));
         }
         if rows.is_empty() {
-            return Err(PathError::Empty { expected: columns.names() });
+            return Err(PathError::Empty { expected: columns.names(), unit: columns.unit() });
         }
         Ok(Self { rows, has_orientations: width == Some(POSE.len()), repeats: false })
     }
@@ -145,12 +154,23 @@ impl Columns {
         match self {
             Self::Position => "t,x,y,z",
             Self::Pose => "t,x,y,z or t,x,y,z,qw,qx,qy,qz",
+            Self::Force => "t,fx,fy,fz",
+        }
+    }
+
+    /// Unit of the vectors.
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Position | Self::Pose => "m",
+            Self::Force => "N",
         }
     }
 
     /// Description of a row with a known number of columns, or of all allowed rows.
     fn numbers(self, width: Option<usize>, numbers: &str) -> String {
-        let (four, eight) = (format!("four{numbers} t,x,y,z"), format!("eight{numbers} t,x,y,z,qw,qx,qy,qz"));
+        let vector = if self == Self::Force { "t,fx,fy,fz" } else { "t,x,y,z" };
+        let (four, eight) =
+            (format!("four{numbers} {vector}"), format!("eight{numbers} t,x,y,z,qw,qx,qy,qz"));
         match (self, width) {
             (Self::Pose, Some(8)) => eight,
             (Self::Pose, None) => format!("{four} or the {eight}"),
@@ -164,10 +184,12 @@ impl Columns {
 #[non_exhaustive]
 pub enum PathError {
     /// No rows.
-    #[error("no rows, expected lines {expected} in s and m")]
+    #[error("no rows, expected lines {expected} in s and {unit}")]
     Empty {
         /// Allowed columns.
         expected: &'static str,
+        /// Unit of the vectors.
+        unit: &'static str,
     },
     /// Header with other columns.
     #[error("line {line}: the columns are {found}, expected {expected}")]
@@ -307,6 +329,10 @@ mod tests {
         assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,x,y,z");
         assert_eq!(error("0,0,0,0,1,0,0,0\n"), "line 1: 8 numbers, expected the four t,x,y,z");
         assert_eq!(error("1,0,0,0\n1,0,0,0\n"), "line 2: time 1 s does not come after 1 s");
+        let error = |text: &str| MotionPath::parse(text, Columns::Force).expect_err("a bad path").to_string();
+        assert_eq!(error("# none\n"), "no rows, expected lines t,fx,fy,fz in s and N");
+        assert_eq!(error("t,x,y,z\n"), "line 1: the columns are t,x,y,z, expected t,fx,fy,fz");
+        assert_eq!(error("0,0,0\n"), "line 1: 3 numbers, expected the four t,fx,fy,fz");
         let error = |text: &str| MotionPath::parse(text, Columns::Pose).expect_err("a bad path").to_string();
         assert_eq!(error(""), "no rows, expected lines t,x,y,z or t,x,y,z,qw,qx,qy,qz in s and m");
         assert_eq!(

@@ -48,7 +48,7 @@ pub enum SessionDevice {
     Local(AttachedDevice),
     /// Device behind a link, or a pointer: its port.
     Remote(ForcePort, DeviceMode),
-    /// No device: a path in simulated time, without force feedback.
+    /// No device: a path in simulated time, without force feedback; with a prescribed force its course.
     Path(MotionPath, DeviceMode),
 }
 
@@ -64,6 +64,8 @@ pub struct Session {
     pub devices: Vec<SessionDevice>,
     /// Trajectories, one for each obstacle of the model.
     pub obstacle_trajectories: Vec<ObstacleTrajectory>,
+    /// Paths of the clamps' frames over simulated time, one for each clamp of the model; `None` stays.
+    pub clamp_paths: Vec<Option<MotionPath>>,
     /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
     pub gravity: Option<MotionPath>,
     /// Number of steps; `None` runs until it is stopped.
@@ -175,6 +177,7 @@ impl Session {
         for (device, path) in paths.into_iter().enumerate() {
             path.into_iter().for_each(|path| process.follow(device, path));
         }
+        process.move_clamps(self.clamp_paths);
         self.gravity.into_iter().for_each(|gravity| process.change_gravity(gravity));
         let (snapshot_writer, mut snapshots) =
             snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));

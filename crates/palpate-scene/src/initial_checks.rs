@@ -61,7 +61,7 @@ pub(crate) fn check_start(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning
             }
         }
     }
-    let devices = scene.devices.iter().filter_map(|device| Some((&*device.name, device.path.as_ref()?)));
+    let devices = scene.devices.iter().filter_map(|device| Some((&*device.name, device.motion()?)));
     let obstacles =
         scene.obstacles.iter().filter_map(|obstacle| Some((&*obstacle.name, obstacle.path.as_ref()?)));
     warnings.extend(devices.chain(obstacles).filter_map(|(name, path)| far_path(name, path, &placed)));

@@ -38,7 +38,7 @@ pub use progress::{ProgressFn, WithoutRemarks};
 pub use recipe::{RecordingRecipe, cache_folder};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
 pub use replay::{Difference, LogReplay, ReplayError, Replayed};
-pub use scene::{Scene, SceneDevice, SceneObstacle};
+pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 pub use scene_log::SceneLog;
 pub use warning::{Warning, WarningKind};
 

@@ -3,8 +3,8 @@
 use crate::devices::RealDevice;
 use crate::warning::Warning;
 use glam::DVec3;
-use palpate::{DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
-use palpate_export::{DeviceLabel, SceneLabels};
+use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
+use palpate_export::{DeviceLabel, ProbeLabel, SceneLabels};
 use palpate_haptics::MotionPath;
 use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::log::SceneNames;
@@ -21,6 +21,10 @@ pub struct Scene {
     pub devices: Vec<SceneDevice>,
     /// Planes and obstacles, in the model's order.
     pub obstacles: Vec<SceneObstacle>,
+    /// Clamps, in the model's order.
+    pub clamps: Vec<SceneClamp>,
+    /// Displacement probes.
+    pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
     pub gravity: Option<MotionPath>,
     /// Warnings for the author of the scene.
@@ -35,11 +39,12 @@ pub struct Scene {
 pub struct SceneDevice {
     /// Name.
     pub name: String,
-    /// Initial mode: held point or touch.
+    /// Initial mode: held point, touch or prescribed force.
     pub mode: DeviceMode,
     /// Parameters of the model.
     pub parameters: DeviceParameters,
-    /// Path of its position, or of the simulated hand; none for real and linked devices and for pointers.
+    /// Path of its position, of the simulated hand, or course of its prescribed force [N]; none for real and linked devices and
+    /// for pointers.
     pub path: Option<MotionPath>,
     /// Simulated device and hand, which follow the path as far as forces allow.
     pub simulated: Option<(DeviceSpec, Hand)>,
@@ -60,10 +65,46 @@ pub struct SceneObstacle {
     pub start: Pose,
 }
 
+/// Clamp of a scene.
+#[derive(Clone)]
+pub struct SceneClamp {
+    /// Name.
+    pub name: String,
+    /// Number of its object.
+    pub object: usize,
+    /// Path of its frame, if it moves.
+    pub path: Option<MotionPath>,
+    /// Initial frame [m, world].
+    pub start: Pose,
+}
+
+impl SceneClamp {
+    /// Frame at a time [s].
+    pub fn frame_at(&self, time_s: f64) -> Pose {
+        self.path.as_ref().map_or(self.start, |path| path.at(time_s))
+    }
+}
+
 impl SceneDevice {
     /// Position of its path at a time [s]; the origin without a path [m, world].
     pub fn position_at(&self, time_s: f64) -> DVec3 {
-        self.path.as_ref().map_or(DVec3::ZERO, |path| path.at(time_s).position)
+        self.motion().map_or(DVec3::ZERO, |path| path.at(time_s).position)
+    }
+
+    /// Path of its motion; none where it prescribes a force.
+    pub fn motion(&self) -> Option<&MotionPath> {
+        self.path.as_ref().filter(|_| !matches!(self.mode, DeviceMode::Force(_)))
+    }
+
+    /// Input of the step of `step_s` [s] that ends at a time [s].
+    fn input_at(&self, time_s: f64, step_s: f64) -> DeviceInput {
+        match (self.mode, &self.path) {
+            (DeviceMode::Force(applied), Some(path)) => {
+                let force = path.mid_step(time_s, step_s);
+                DeviceInput::exerting(AppliedForce { force, ..applied })
+            }
+            (mode, _) => DeviceInput { position: self.position_at(time_s), mode },
+        }
     }
 }
 
@@ -85,6 +126,7 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(|device| device.name.clone()).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.name.clone()).collect(),
         }
     }
 
@@ -96,6 +138,8 @@ impl Scene {
             objects: self.object_names.clone(),
             devices: self.devices.iter().map(label).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.name.clone()).collect(),
+            probes: self.probes.clone(),
             can_touch: self.can_touch(),
             inputs: self.inputs.clone(),
         }
@@ -103,11 +147,11 @@ impl Scene {
 
     /// Input at a time of all paths [s].
     pub fn input_at(&self, time_s: f64) -> Input {
-        let device =
-            |device: &SceneDevice| DeviceInput { position: device.position_at(time_s), mode: device.mode };
+        let step_s = self.model.parameters().step_s;
         Input {
-            devices: self.devices.iter().map(device).collect(),
+            devices: self.devices.iter().map(|device| device.input_at(time_s, step_s)).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.frame_at(time_s)).collect(),
             gravity: self.gravity_at(time_s),
         }
     }

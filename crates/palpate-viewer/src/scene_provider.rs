@@ -40,6 +40,8 @@ pub struct ViewerScene {
     pub devices: Vec<ViewerDevice>,
     /// Trajectory per obstacle of the model.
     pub obstacle_trajectories: Vec<SharedTrajectory>,
+    /// Paths of the clamps' frames, one for each clamp of the model; `None` stays.
+    pub clamp_paths: Vec<Option<MotionPath>>,
     /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
     pub gravity: Option<MotionPath>,
     /// Log opener, if the scene is logged.

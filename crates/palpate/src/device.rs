@@ -107,6 +107,16 @@ pub(crate) struct DeviceState {
     pub(crate) force: DVec3,
     /// Where its tip touched last, until it leaves the surface or the scene.
     pub(crate) last_touch: Option<LastTouch>,
+    /// Where its prescribed force acts.
+    pub(crate) prescribed: Option<PrescribedForce>,
+}
+
+/// Point of an object that a prescribed force acts on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PrescribedForce {
+    pub(crate) object: usize,
+    /// Slot of its contact point.
+    pub(crate) slot: usize,
 }
 
 /// Contact of a tip that carried force, the strongest of a step.
@@ -133,6 +143,7 @@ impl DeviceState {
             compliance: 0.0,
             force: zero,
             last_touch: None,
+            prescribed: None,
         }
     }
 

@@ -114,6 +114,14 @@ pub enum RecordingPart {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
+    /// Clamp that cannot be placed.
+    #[error("clamp {clamp}: {what}")]
+    Clamp {
+        /// Number of the clamp.
+        clamp: usize,
+        /// Finding and expectation.
+        what: String,
+    },
     /// Parameter out of its range.
     #[error("{what}")]
     Parameter {

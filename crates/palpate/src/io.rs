@@ -14,6 +14,8 @@ pub enum DeviceMode {
     Inactive,
     /// Holds a point in all directions (bilateral constraint).
     Held(Grasp),
+    /// Exerts a prescribed force on a point, or on the patch about it, wherever the point goes.
+    Force(AppliedForce),
     /// Its tip touches surfaces (unilateral contact).
     Touch,
     /// It is silent for now: no force, as [`Self::Inactive`]. A tip that comes back inside the object which it touched begins on the
@@ -22,16 +24,25 @@ pub enum DeviceMode {
 }
 
 impl DeviceMode {
-    /// Whether the device holds or touches.
+    /// Whether the device holds, touches or exerts a prescribed force.
     pub fn is_active(&self) -> bool {
-        matches!(self, Self::Held(_) | Self::Touch)
+        matches!(self, Self::Held(_) | Self::Touch | Self::Force(_))
     }
+}
+
+/// Prescribed force on a material point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AppliedForce {
+    /// Point that it acts on.
+    pub grasp: Grasp,
+    /// Force on the object, held over the step [N, world].
+    pub force: DVec3,
 }
 
 /// One device's part of a step's input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceInput {
-    /// Interface point at the end of the step [m, world].
+    /// Interface point at the end of the step [m, world]; without meaning where a force is prescribed.
     pub position: DVec3,
     /// Mode in the step.
     pub mode: DeviceMode,
@@ -58,6 +69,21 @@ impl DeviceInput {
     pub fn touching(position: DVec3) -> Self {
         Self { position, mode: DeviceMode::Touch }
     }
+
+    /// Device that exerts a prescribed force.
+    pub fn exerting(applied: AppliedForce) -> Self {
+        Self { position: DVec3::ZERO, mode: DeviceMode::Force(applied) }
+    }
+
+    /// Position of the hand at the end of the step [m, world]: the interface point, or the point that a prescribed force acts on.
+    pub fn hand(&self, output: &DeviceOutput) -> DVec3 {
+        match self.mode {
+            DeviceMode::Force(_) => output.proxy,
+            DeviceMode::Inactive | DeviceMode::Held(_) | DeviceMode::Touch | DeviceMode::Suspended => {
+                self.position
+            }
+        }
+    }
 }
 
 /// Input of a step.
@@ -67,6 +93,8 @@ pub struct Input {
     pub devices: Vec<DeviceInput>,
     /// Obstacle poses at the end of the step, in the model's order. Missing entries stay.
     pub obstacles: Vec<Pose>,
+    /// Frames of the clamps at the end of the step [m, world], in the model's order. Missing entries stay.
+    pub clamps: Vec<Pose>,
     /// Gravity, held over the step [m/s², world]. None stays as it was, at the start the model's.
     pub gravity: Option<DVec3>,
 }
@@ -79,6 +107,7 @@ impl Input {
     pub fn copy_from(&mut self, other: &Self) {
         self.devices.copy_from_slice(&other.devices);
         self.obstacles.copy_from_slice(&other.obstacles);
+        self.clamps.copy_from_slice(&other.clamps);
         self.gravity = other.gravity;
     }
 }
@@ -88,12 +117,21 @@ impl Input {
 pub struct DeviceOutput {
     /// Reaction force on the hand, held over the step [N, world].
     pub force_on_hand: DVec3,
-    /// Proxy at the end of the step [m, world]: the held point, or the centre of the tip that stays outside the objects;
-    /// without contact the device's position, but for the lag of a coupling's damper.
+    /// Proxy at the end of the step [m, world]: the held point, the point that a prescribed force acts on, or the
+    /// centre of the tip that stays outside the objects; without contact the device's position, but for the lag of a coupling's damper.
     pub proxy: DVec3,
     /// Offset of the interface point from the device's position at the start and at the end of the step [m, world], while a tip that
     /// was inside an object is let out; it decays within some tenths of a second.
     pub offset: [DVec3; 2],
+}
+
+/// One clamp's part of a step's output.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClampOutput {
+    /// Reaction force on the clamp, held over the step [N, world].
+    pub force: DVec3,
+    /// Reaction torque on the clamp about the origin of its frame, with arms at the end of the step [N·m, world].
+    pub torque: DVec3,
 }
 
 /// Contact that carries force.
@@ -136,8 +174,8 @@ pub struct StepStatus {
     pub solver_residual_m: f64,
     /// Largest number of solver iterations of an island.
     pub iterations: u32,
-    /// Devices and obstacles with a position that is not finite, or a grasp that does not exist: the device is inactive, the
-    /// obstacle stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
+    /// Devices and obstacles with a position or force that is not finite, or a grasp that does not exist: the device is inactive, the
+    /// obstacle, or a clamp, stays. Gravity that is not finite, or changes for a body with fixed nodes that uses a table, stays too.
     pub rejected_inputs: u32,
     /// Held directions that depend linearly on others and got no force.
     pub dependent_rows: u32,
@@ -158,6 +196,8 @@ pub struct Output {
     pub devices: Vec<DeviceOutput>,
     /// Objects, in the model's order.
     pub objects: Vec<ObjectOutput>,
+    /// Clamps, in the model's order.
+    pub clamps: Vec<ClampOutput>,
     /// Contacts that carry force, without held points.
     pub contacts: Vec<ContactOutput>,
     /// Energy ledger of the scene.

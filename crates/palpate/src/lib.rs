@@ -49,6 +49,7 @@ extern crate alloc;
 struct Readme;
 
 mod bounded_vec;
+mod clamp;
 mod collision;
 mod contact;
 mod device;
@@ -67,11 +68,15 @@ mod state;
 mod step;
 mod surface;
 
+pub use clamp::Clamp;
 pub use collision::{Collider, Grasp};
 pub use device::{Coupling, DeviceParameters};
 pub use energy::EnergyLedger;
 pub use error::{Error, ModelError, RecordingError, RecordingPart};
-pub use io::{ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput, Output, StepStatus};
+pub use io::{
+    AppliedForce, ClampOutput, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput,
+    Output, StepStatus,
+};
 pub use motion::RigidIntegrator;
 pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};

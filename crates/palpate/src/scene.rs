@@ -1,5 +1,6 @@
 //! The model: parameters, objects, devices and obstacles of a scene; immutable while it runs.
 
+use crate::clamp::{Clamp, ClampState, PlacedClamp};
 use crate::collision::{Grasp, MAX_TIP_CONTACTS};
 use crate::device::DeviceParameters;
 use crate::error::{Error, ModelError};
@@ -8,10 +9,11 @@ use crate::object::{InitialDeformation, Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
 use crate::recording::Recording;
 use crate::response::ResponseForm;
-use crate::surface::MIN_CONTACT_SAMPLES;
+use crate::surface::{Cell, MIN_CONTACT_SAMPLES};
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
@@ -40,6 +42,8 @@ pub struct ModelParameters {
     pub devices: Vec<DeviceParameters>,
     /// Planes and rigid obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Clamps: parts of surfaces that are held and moved by rigid frames.
+    pub clamps: Vec<Clamp>,
     /// Upper limit of contact points of one object; memory of 9·n² numbers. Contacts beyond it are dropped, and counted in the
     /// status.
     pub max_contact_points: usize,
@@ -58,6 +62,7 @@ impl Default for ModelParameters {
             rigid_compliance: RigidCompliance::default(),
             devices: Vec::new(),
             obstacles: Vec::new(),
+            clamps: Vec::new(),
             max_contact_points: 512,
             max_contact_samples: usize::MAX,
         }
@@ -100,6 +105,7 @@ impl ModelObject {
 pub struct Model {
     pub(crate) parameters: ModelParameters,
     pub(crate) objects: Vec<Object>,
+    pub(crate) clamps: Vec<PlacedClamp>,
 }
 
 impl Model {
@@ -129,16 +135,31 @@ impl Model {
         for (at, obstacle) in parameters.obstacles.iter().enumerate() {
             obstacle.check(at)?;
         }
+        let triangles: Vec<usize> =
+            objects.iter().map(|object| object.recording.surface.triangles.len()).collect();
+        for (at, clamp) in parameters.clamps.iter().enumerate() {
+            clamp.check(at, &triangles)?;
+        }
+        // Cells of each object, clamp after clamp.
+        let mut cells: Vec<Vec<Cell>> = vec![Vec::new(); objects.len()];
+        let mut first_cells = Vec::with_capacity(parameters.clamps.len());
+        for clamp in &parameters.clamps {
+            let of_object = &mut cells[clamp.object];
+            first_cells.push(of_object.len());
+            of_object.extend(clamp.cells(&objects[clamp.object].recording));
+        }
         let patch_radii: Vec<f64> = parameters.devices.iter().map(|device| device.patch_radius).collect();
         let uses_samples = parameters.uses_samples(objects.len());
         let rules = ObjectRules {
             step_s: h,
             gravity: parameters.gravity,
             patch_radii: &patch_radii,
+            cells: &[],
             max_contact_samples: if uses_samples { parameters.max_contact_samples } else { usize::MAX },
         };
         let make = |(number, object): (usize, ModelObject)| {
             let ModelObject { recording, response, start, deformation, friction } = object;
+            let rules = ObjectRules { cells: &cells[number], ..rules };
             Object::new(recording, response, (start, deformation), friction, rules)
                 .map_err(|error| ModelError::Object { object: number, error: Box::new(error) })
         };
@@ -151,7 +172,32 @@ impl Model {
                 own[0].response.precompute_nodal_compliance(&own[0].body, known);
             }
         }
-        Ok(Self { parameters, objects })
+        let place = |(clamp, &first_cell): (&Clamp, &usize)| {
+            let object = &objects[clamp.object];
+            let count = clamp.cells(&object.body.recording).len();
+            let frame = ClampState::new(clamp.frame).start;
+            let point = |cell: usize| {
+                let location = object.body.cell_location(cell);
+                frame.body_from_world(object.start.pose.world_from_body(object.body.rest_position(&location)))
+            };
+            let points = (first_cell..first_cell + count).map(point).collect();
+            PlacedClamp { object: clamp.object, first_cell, points }
+        };
+        let clamps = parameters.clamps.iter().zip(&first_cells).map(place).collect();
+        Ok(Self { parameters, objects, clamps })
+    }
+
+    /// Number of cells of a clamp: each is three held directions.
+    ///
+    /// # Panics
+    /// If the model has no such clamp.
+    pub fn clamp_cells(&self, clamp: usize) -> usize {
+        self.clamps[clamp].points.len()
+    }
+
+    /// Number of cells of all clamps.
+    pub(crate) fn all_clamp_cells(&self) -> usize {
+        self.clamps.iter().map(|clamp| clamp.points.len()).sum()
     }
 
     /// Parameters of the scene.
@@ -183,8 +229,8 @@ impl ModelParameters {
         !self.obstacles.is_empty() || objects > 1
     }
 
-    /// Capacity of contact points of an object, by the number of objects: one held point and the tip contacts of every device,
-    /// and the surface nodes where surfaces meet, within `max_contact_points`.
+    /// Capacity of contact points of an object, by the number of objects: one held point and the tip contacts of every device, the
+    /// cells of its clamps, and the surface nodes where surfaces meet, within `max_contact_points`.
     pub(crate) fn point_capacity(&self, object: &Object, objects: usize) -> usize {
         let devices = self.devices.len();
         if !object.is_touchable() {
@@ -195,6 +241,6 @@ impl ModelParameters {
         } else {
             0
         };
-        (1 + MAX_TIP_CONTACTS) * devices + surface
+        (1 + MAX_TIP_CONTACTS) * devices + object.body.cells() + surface
     }
 }

@@ -5,6 +5,7 @@ use crate::response::{DeformationData, ResidualFields};
 use crate::scene::Model;
 use crate::spatial::Pose;
 use crate::state::State;
+use crate::surface::SurfacePoint;
 use glam::DVec3;
 
 /// Pose and deformation of an object at the end of a step: modal coordinates and contact forces, a few hundred numbers, from
@@ -112,6 +113,19 @@ impl State {
     /// When `out` does not have one entry per surface node.
     pub fn surface_displacement(&self, model: &Model, object: usize, out: &mut [DVec3]) {
         self.deformation(object).surface_displacement(model, out);
+    }
+
+    /// Elastic displacement of a surface point of an object at the end of the last step [m, body].
+    ///
+    /// # Real time
+    /// No allocation. Costs modes and contacts; with a table the forces of the last T steps.
+    ///
+    /// # Panics
+    /// When the model has no such object, or the object no such point.
+    pub fn point_displacement(&self, model: &Model, object: usize, point: &SurfacePoint) -> DVec3 {
+        let (body, own) = (&model.objects[object], &self.objects[object]);
+        let gravity = body.gravity_in_body(self.gravity, &own.rigid.pose);
+        own.response.displacement_at((&body.response, &body.body), point, gravity)
     }
 
     /// Snapshot of an object's deformation at the end of the last step.

@@ -1,11 +1,12 @@
 //! State of a scene: what changes from step to step, and the buffers of a step.
 
 use crate::bounded_vec::BoundedVec;
+use crate::clamp::ClampState;
 use crate::collision::{CollisionScene, CollisionWorkspace, Contact, LevelOfDetail};
 use crate::contact::{Constraint, Solver};
 use crate::device::DeviceState;
 use crate::energy::EnergyLedger;
-use crate::io::{DeviceOutput, ObjectOutput, Output, StepStatus};
+use crate::io::{ClampOutput, DeviceOutput, ObjectOutput, Output, StepStatus};
 use crate::motion::{RigidState, RigidStep};
 use crate::object::ObjectState;
 use crate::response::OscillatorState;
@@ -37,6 +38,8 @@ pub struct State {
     pub(crate) devices: Vec<DeviceState>,
     /// Obstacle poses.
     pub(crate) obstacles: Vec<Pose>,
+    /// Frames of the clamps.
+    pub(crate) clamps: Vec<ClampState>,
     /// Gravity in the last step [m/s², world].
     pub(crate) gravity: DVec3,
     /// Contact cache, in the order of the ids.
@@ -81,6 +84,7 @@ impl State {
             time_s: 0.0,
             devices: vec![DeviceOutput::default(); devices],
             objects: object_outputs.collect(),
+            clamps: vec![ClampOutput::default(); parameters.clamps.len()],
             contacts: Vec::with_capacity(contacts),
             energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
             status: StepStatus::default(),
@@ -90,12 +94,18 @@ impl State {
             steps: 0,
             gravity: parameters.gravity,
             devices: vec![DeviceState::new(); devices],
+            clamps: parameters.clamps.iter().map(|clamp| ClampState::new(clamp.frame)).collect(),
             contacts: BoundedVec::new(contacts),
             levels: vec![LevelOfDetail::default(); count * (obstacles.len() + count)],
             couplings: EnergyLedger::default(),
             workspace: Workspace {
                 collision: CollisionWorkspace::new(model.collision_scene(), contacts),
-                solver: Solver::new(count, devices, contacts, parameters.uses_samples(count)),
+                solver: Solver::new(
+                    count,
+                    devices + model.all_clamp_cells(),
+                    contacts,
+                    parameters.uses_samples(count),
+                ),
                 spare: BoundedVec::new(contacts),
                 constraints: BoundedVec::new(contacts),
                 next_obstacles: obstacles.clone(),

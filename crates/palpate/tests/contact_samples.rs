@@ -139,7 +139,7 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
             Pose { position: centre + direction.normalize() * distance, orientation }
         });
         let device = DeviceInput::touching(centre + DVec3::new(0.1 * (7.0 * t).sin(), 0.11, 0.0));
-        let input = Input { obstacles: obstacles.collect(), devices: vec![device], gravity: None };
+        let input = Input { obstacles: obstacles.collect(), devices: vec![device], ..Input::default() };
         let output = step(&model, &mut state, &input);
         let energy = &output.energy;
         assert!(

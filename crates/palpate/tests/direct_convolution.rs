@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
-    ModelParameters, ObjectStart, OscillatorState, Recording, ResponseForm, SampledOscillator, Sampling,
-    State, SurfacePoint, Twist, step,
+    AppliedForce, ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model,
+    ModelObject, ModelParameters, ObjectStart, OscillatorState, Recording, ResponseForm, SampledOscillator,
+    Sampling, State, SurfacePoint, Twist, step,
 };
 use palpate_testkit::{
     GRAVITY_M_S2, fixed_block, free_block, holding, model_and_state, start_at, with_stiffness_damping,
@@ -155,6 +155,40 @@ fn forces_and_displacements_equal_those_of_the_modal_form() {
         let (force, shape) =
             differences(&recording, 300, 300, DVec3::ZERO, |_| [Some(held[3]), Some(held[held.len() / 2])]);
         assert!(force < ROUND_OFF && shape < ROUND_OFF, "{force:e} {shape:e}");
+    }
+}
+
+#[test]
+fn prescribed_forces_displace_as_in_modal_form() {
+    for recording in [free_block(), with_stiffness_damping(&free_block(), 10.0 * H)] {
+        let (held, fir) = (points(&recording), ResponseForm::Fir(Arc::new(table(&recording, 300, H))));
+        let devices = vec![DeviceParameters { patch_radius: 0.04, ..DeviceParameters::default() }; 2];
+        let of_points = vec![DeviceParameters::default(); 2];
+        let scene_of = |form, devices| {
+            scene(&recording, form, ModelParameters { devices, ..ModelParameters::default() })
+        };
+        // A table knows points only: there a patch is its point.
+        let mut scenes = [scene_of(ResponseForm::Modal, of_points), scene_of(fir, devices)];
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for number in 0..300 {
+            let t = f64::from(number) * H;
+            let force = DVec3::new((40.0 * t).sin(), (70.0 * t).cos(), (25.0 * t).sin());
+            let on = |at: usize, force| {
+                let grasp = Grasp { object: 0, point: held[at] };
+                DeviceInput::exerting(AppliedForce { grasp, force })
+            };
+            let devices = vec![on(3, force), on(held.len() / 2, -force)];
+            let input = Input { devices, ..Input::default() };
+            let [modal, fir] = scenes.each_mut().map(|(model, state)| step(model, state, &input).clone());
+            let probe = |(model, state): &(Model, State)| state.point_displacement(model, 0, &held[7]);
+            assert!((probe(&scenes[0]) - probe(&scenes[1])).length() < ROUND_OFF, "{number}");
+            for (a, b) in modal.devices.iter().zip(&fir.devices) {
+                worst = worst.max((a.proxy - b.proxy).length());
+                largest = largest.max(a.proxy.length());
+            }
+            assert!(fir.energy.defect.abs() < ROUND_OFF * fir.energy.stored(), "{:?}", fir.energy);
+        }
+        assert!(worst < ROUND_OFF * largest, "{worst} {largest}");
     }
 }
 

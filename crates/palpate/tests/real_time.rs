@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use palpate::{
-    ColumnsInMemory, Coupling, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model,
-    ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, ResponseForm, Sampling, Shape,
-    State, Twist, step,
+    AppliedForce, ColumnsInMemory, Coupling, DeviceInput, DeviceMode, DeviceParameters, Grasp,
+    ImpulseResponse, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording,
+    ResponseForm, Sampling, Shape, State, Twist, step,
 };
 use palpate_testkit::{
     CountingAllocator, GRAVITY_M_S2, allocations, finger, fixed_block, floor, free_block, start_at,
@@ -78,6 +78,9 @@ fn step_makes_no_allocation() {
                 _ => grasp(1, device),
             }
             .into();
+            if let (DeviceMode::Held(grasp), true) = (entry.mode, number % 3 == device % 3) {
+                entry.mode = DeviceMode::Force(AppliedForce { grasp, force: DVec3::splat(0.01) });
+            }
             let sway = f64::from((number * 31 + device * 17) % 101) / 101.0;
             entry.position = DVec3::new(f64::from(device), 0.1 * sway, 0.0);
             if number % 50 == 49 {
@@ -117,7 +120,7 @@ fn touch(model: &Model, what: &str) {
     let mut input = Input {
         devices: vec![DeviceInput::touching(DVec3::ZERO); 2],
         obstacles: vec![Pose::IDENTITY; 2],
-        gravity: None,
+        ..Input::default()
     };
     let (before, mut most) = (allocations(), 0);
     for number in 0..600_u32 {

@@ -28,6 +28,7 @@ pub const FLOORS: &[&str] = &[
     "motion",
     "obstacle",
     "device",
+    "clamp",
     "object",
     "collision",
     "contact",

@@ -63,7 +63,7 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
         outputs.take(scene, input, state, took)
     })?;
     drop(bar);
-    let summary = outputs.finish(&state)?;
+    let summary = outputs.finish(scene, &state)?;
     if arguments.outputs.json {
         let mut json = summary.json(scene);
         let difference = done.first_difference.as_ref().map(|first| {

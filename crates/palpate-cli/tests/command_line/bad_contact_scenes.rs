@@ -156,7 +156,11 @@ fn keys_that_exclude_each_other_are_refused() {
     let held = "mode = \"held\"\nattach = { object = \"cube\", point = [0.0, 0.05, 0.0] }";
     let without = "the obstacle \"ball\" needs one shape: sphere, box, capsule or mesh";
     for (old, new, error) in [
-        ("mode = \"touch\"", "mode = \"poke\"", "line 22: mode is \"poke\", expected \"held\" or \"touch\""),
+        (
+            "mode = \"touch\"",
+            "mode = \"poke\"",
+            "line 22: mode is \"poke\", expected \"held\", \"touch\" or \"force\"",
+        ),
         (
             "mode = \"touch\"",
             "mode = \"held\"",

@@ -19,7 +19,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "step = 0.001",
             "stepp = 0.001",
             1,
-            "`step`, `gravity`, `integrator`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `object`, `plane`, `obstacle`, `device`",
+            "`step`, `gravity`, `integrator`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `object`, `plane`, `obstacle`, `device`, `probe`, `clamp`",
         ),
         (
             "recording = \"cube.palp\"",
@@ -99,7 +99,7 @@ fn what_a_scene_file_gets_wrong_is_named_with_its_line() {
         (
             "mode = \"held\"",
             "mode = \"push\"",
-            "scene.toml: line 10: mode is \"push\", expected \"held\" or \"touch\"",
+            "scene.toml: line 10: mode is \"push\", expected \"held\", \"touch\" or \"force\"",
         ),
         (
             "point = [0.05, 0.0, 0.0]",

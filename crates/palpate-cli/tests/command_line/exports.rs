@@ -52,6 +52,7 @@ fn surfaces(workplace: &Workplace) -> Vec<Vec<DVec3>> {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let bytes = workplace.read("run.mcap");
     let mut state = State::new(&model);
@@ -385,13 +386,17 @@ fn a_log_of_this_version_that_differs_is_refused_and_one_of_another_version_is_c
 fn write_differing_log(workplace: &Workplace, version: &str) {
     let model = model(workplace);
     let mut state = State::new(&model);
-    let mut input =
-        Input { devices: vec![DeviceInput::inactive(); 2], obstacles: vec![Pose::IDENTITY], gravity: None };
+    let mut input = Input {
+        devices: vec![DeviceInput::inactive(); 2],
+        obstacles: vec![Pose::IDENTITY],
+        ..Input::default()
+    };
     input.devices[0].position = DVec3::new(-0.058, 0.0, 0.05);
     let names = SceneNames {
         objects: vec!["cube".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let scene = workplace.text("fingers.toml").replace("{ file = \"gravity.csv\" }", "[0.0, 0.0, -9.8]");
     workplace.write("fingers.toml", scene);

@@ -8,6 +8,7 @@ mod devices;
 mod experiments;
 mod exports;
 mod glb;
+mod loads;
 mod old_logs;
 mod realtime;
 mod reproduction;

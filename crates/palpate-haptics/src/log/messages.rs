@@ -3,7 +3,8 @@
 use super::records::{FrameRecord, StepRecord};
 use glam::{DQuat, DVec3};
 use palpate::{
-    Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose, SurfacePoint, Twist,
+    AppliedForce, Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose,
+    SurfacePoint, Twist,
 };
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
@@ -18,6 +19,16 @@ pub struct SceneNames {
     pub devices: Vec<String>,
     /// Names of the planes and obstacles.
     pub obstacles: Vec<String>,
+    /// Names of the clamps.
+    pub clamps: Vec<String>,
+}
+
+/// Frame of a clamp [m, world], and reaction force [N] and torque [N·m] on it.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(super) struct ClampMessage {
+    pub frame: PoseMessage,
+    pub force: Xyz,
+    pub torque: Xyz,
 }
 
 /// Vector.
@@ -89,6 +100,28 @@ pub(super) struct DeviceMessage {
     /// Held point; `None` for a device that touches, and in logs of the first form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub holds: Option<HeldPointMessage>,
+    /// Prescribed force; `None` in other modes, and in logs before version 0.4.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exerts: Option<AppliedForceMessage>,
+}
+
+/// Prescribed force [N, world] and the point that it acts on.
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(super) struct AppliedForceMessage {
+    on: HeldPointMessage,
+    force: Xyz,
+}
+
+impl From<AppliedForce> for AppliedForceMessage {
+    fn from(AppliedForce { grasp, force }: AppliedForce) -> Self {
+        Self { on: grasp.into(), force: force.into() }
+    }
+}
+
+impl From<AppliedForceMessage> for AppliedForce {
+    fn from(AppliedForceMessage { on, force }: AppliedForceMessage) -> Self {
+        Self { grasp: on.into(), force: force.into() }
+    }
 }
 
 /// Held point: object, triangle of its surface, barycentric weights.
@@ -226,6 +259,9 @@ pub(super) struct StepMessage {
     pub step: u64,
     pub devices: HashMap<String, DeviceMessage>,
     pub obstacles: HashMap<String, PoseMessage>,
+    /// Clamps; logs before version 0.4 have none.
+    #[serde(default)]
+    pub clamps: HashMap<String, ClampMessage>,
     /// Gravity [m/s², world], where it changes in time.
     #[serde(default)]
     pub gravity: Option<Xyz>,
@@ -262,7 +298,11 @@ impl Serialize for StepMessageOf<'_> {
                 proxy: output.proxy.into(),
                 holds: match input.mode {
                     DeviceMode::Held(grasp) => Some(grasp.into()),
-                    DeviceMode::Inactive | DeviceMode::Suspended | DeviceMode::Touch => None,
+                    _ => None,
+                },
+                exerts: match input.mode {
+                    DeviceMode::Force(applied) => Some(applied.into()),
+                    _ => None,
                 },
             }
         };
@@ -287,11 +327,20 @@ impl Serialize for StepMessageOf<'_> {
             late_us: microseconds(record.lateness),
             compute_us: microseconds(record.compute),
         };
-        let mut map = serializer.serialize_map(Some(7 + usize::from(record.input.gravity.is_some())))?;
+        let optional = usize::from(record.input.gravity.is_some()) + usize::from(!names.clamps.is_empty());
+        let mut map = serializer.serialize_map(Some(7 + optional))?;
         map.serialize_entry("step", &record.step)?;
         map.serialize_entry("devices", &Named(&names.devices, device))?;
         let obstacle = |at: usize| PoseMessage::from(record.input.obstacles[at]);
         map.serialize_entry("obstacles", &Named(&names.obstacles, obstacle))?;
+        if !names.clamps.is_empty() {
+            let clamp = |at: usize| ClampMessage {
+                frame: record.input.clamps[at].into(),
+                force: record.clamps[at].force.into(),
+                torque: record.clamps[at].torque.into(),
+            };
+            map.serialize_entry("clamps", &Named(&names.clamps, clamp))?;
+        }
         if let Some(gravity) = record.input.gravity {
             map.serialize_entry("gravity", &Xyz::from(gravity))?;
         }

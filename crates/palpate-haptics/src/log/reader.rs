@@ -152,16 +152,21 @@ impl LoggedStep {
         let mut input = Input { gravity, ..Input::default() };
         for (name, mode) in names.devices.iter().zip(modes) {
             let device = self.message.devices.get(name).ok_or_else(|| missing(name))?;
-            let mode = match device.holds {
+            let mode = match (device.holds, device.exerts) {
                 _ if device.suspended => DeviceMode::Suspended,
                 _ if !device.present => DeviceMode::Inactive,
-                Some(hold) => DeviceMode::Held(hold.into()),
-                None => *mode,
+                (Some(hold), _) => DeviceMode::Held(hold.into()),
+                (None, Some(applied)) => DeviceMode::Force(applied.into()),
+                (None, None) => *mode,
             };
             input.devices.push(DeviceInput { position: device.position.into(), mode });
         }
         for name in &names.obstacles {
             input.obstacles.push((*self.message.obstacles.get(name).ok_or_else(|| missing(name))?).into());
+        }
+        for name in &names.clamps {
+            let clamp = self.message.clamps.get(name).ok_or_else(|| missing(name))?;
+            input.clamps.push(clamp.frame.into());
         }
         Ok(input)
     }
@@ -200,6 +205,14 @@ impl LoggedStep {
                 });
             if found.is_some() {
                 return found;
+            }
+        }
+        for (name, now) in names.clamps.iter().zip(&output.clamps) {
+            let Some(logged) = self.message.clamps.get(name) else { continue };
+            let force = vector(format!("{name}.force"), logged.force.into(), now.force);
+            let torque = || vector(format!("{name}.torque"), logged.torque.into(), now.torque);
+            if let Some(found) = force.or_else(torque) {
+                return Some(found);
             }
         }
         energy_difference(&self.message.energy, &output.energy)

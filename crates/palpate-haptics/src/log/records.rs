@@ -1,7 +1,8 @@
 //! Records of steps and frames, in buffers that the force process fills and the log writer empties.
 
 use palpate::{
-    ContactOutput, DeviceOutput, EnergyLedger, Input, Model, ObjectOutput, Output, Pose, State, StepStatus,
+    ClampOutput, ContactOutput, DeviceOutput, EnergyLedger, Input, Model, ObjectOutput, Output, Pose, State,
+    StepStatus,
 };
 use std::time::Duration;
 
@@ -24,6 +25,8 @@ pub struct StepRecord {
     pub devices: Vec<DeviceOutput>,
     /// Output of every object.
     pub objects: Vec<ObjectOutput>,
+    /// Output of every clamp.
+    pub clamps: Vec<ClampOutput>,
     /// Energy ledger of the scene.
     pub energy: EnergyLedger,
     /// Status of the step.
@@ -60,6 +63,7 @@ impl StepRecord {
             input: input.clone(),
             devices: output.devices.clone(),
             objects: output.objects.clone(),
+            clamps: output.clamps.clone(),
             energy: output.energy,
             status: output.status,
         }
@@ -70,11 +74,12 @@ impl StepRecord {
     /// # Real time
     /// No allocation.
     pub fn capture(&mut self, input: &Input, state: &State) {
-        let Output { time_s, devices, objects, energy, status, .. } = state.output();
+        let Output { time_s, devices, objects, clamps, energy, status, .. } = state.output();
         (self.time_s, self.energy, self.status) = (*time_s, *energy, *status);
         self.input.copy_from(input);
         self.devices.copy_from_slice(devices);
         self.objects.copy_from_slice(objects);
+        self.clamps.copy_from_slice(clamps);
     }
 }
 

@@ -37,6 +37,7 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         start: Instant::now(),
         devices: vec![SessionDevice::Local(attached)],
         obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
+        clamp_paths: Vec::new(),
         gravity: None,
         steps: None,
         frame_rate_hz: 0.0,

@@ -39,6 +39,7 @@ fn the_cycles_of_force_process_and_haptic_update_make_no_allocation() {
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let start = (&*model, force.state(), force.input());
     let (mut sender, _writer) =

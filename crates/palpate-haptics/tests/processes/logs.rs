@@ -15,6 +15,7 @@ fn names() -> SceneNames {
         objects: vec!["body".into()],
         devices: vec!["finger".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     }
 }
 
@@ -157,6 +158,7 @@ fn logs_of_every_form_open_with_their_start_and_inputs() {
         objects: vec!["block".into()],
         devices: vec!["left".into(), "right".into()],
         obstacles: vec!["box".into(), "rail".into()],
+        ..SceneNames::default()
     };
     let forms = [
         // Form, bytes, whether it has initial states, whether it has held points.

@@ -38,6 +38,7 @@ fn session(steps: Option<u64>) -> Session {
         start: Instant::now(),
         devices: vec![attached(1.0), attached(-1.0)],
         obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
+        clamp_paths: Vec::new(),
         gravity: None,
         model,
         steps,
@@ -57,11 +58,12 @@ fn log_to<W: Write + Seek>(out: W, session: &Session) -> (LogSender, LogWriter<W
         objects: vec!["body".into()],
         devices: vec!["a".into(), "b".into()],
         obstacles: vec!["floor".into()],
+        ..SceneNames::default()
     };
     let input = Input {
         devices: vec![palpate::DeviceInput::inactive(); 2],
         obstacles: vec![session.model.parameters().obstacles[0].pose],
-        gravity: None,
+        ..Input::default()
     };
     let start = (&*session.model, process.state(), &input);
     LogWriter::new(out, names, BTreeMap::new(), &[], start).expect("a log")

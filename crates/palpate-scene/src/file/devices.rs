@@ -1,19 +1,16 @@
-//! `[[device]]`: devices that hold a point, and tips that touch.
+//! `[[device]]`: devices that hold a point or prescribe a force on it, and tips that touch.
 
 use super::coupling;
 use super::drivers::{read_real, read_simulated};
 use super::keys::{AttachEntry, DeviceEntry};
+use super::places::surface_point;
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use crate::warning::{Warning, WarningKind};
-use glam::DVec3;
-use palpate::{Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
+use palpate::{AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
 use palpate_haptics::Columns;
 use toml::Spanned;
-
-/// Allowed distance of a held point from the surface, as a share of the object's diagonal.
-const OFF_SURFACE: f64 = 0.05;
 
 /// Distance of a device's start from its held point that gets a warning, as a share of the diagonal.
 const FAR_START: f64 = 0.01;
@@ -40,6 +37,13 @@ pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<D
             "attach",
             "mode = \"held\" needs attach = { object = \"…\", point = [x, y, z] }, the point that the device holds",
         ),
+        ("force", Some(_)) => force_parameters(source, device),
+        ("force", None) => source.fail(
+            device.mode.span(),
+            SceneErrorKind::Missing,
+            "attach",
+            "mode = \"force\" needs attach = { object = \"…\", point = [x, y, z] }, the point that the force acts on",
+        ),
         ("touch", None) => touch_parameters(source, device, coupling),
         ("touch", Some(attach)) => source.fail(
             attach.span(),
@@ -48,7 +52,7 @@ pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<D
             "attach is of a device that holds a point; with mode = \"touch\" leave it out",
         ),
         (other, _) => {
-            let message = format!("mode is {other:?}, expected \"held\" or \"touch\"");
+            let message = format!("mode is {other:?}, expected \"held\", \"touch\" or \"force\"");
             source.fail(device.mode.span(), SceneErrorKind::UnknownValue, "mode", message)
         }
     }
@@ -65,7 +69,11 @@ pub(super) fn read_device(
 ) -> Result<SceneDevice, SceneError> {
     let mode = match &device.attach {
         Some(attach) => {
-            DeviceMode::Held(read_grasp(source, device, attach.get_ref(), objects, object_names)?)
+            let grasp = read_grasp(source, device, attach.get_ref(), objects, object_names)?;
+            if is_force(device) {
+                return read_force(source, device, (grasp, parameters), objects, object_names, warnings);
+            }
+            DeviceMode::Held(grasp)
         }
         None => DeviceMode::Touch,
     };
@@ -102,6 +110,69 @@ pub(super) fn read_device(
     warnings.extend(far_start(&device, objects));
     warnings.extend(small_patches(&device, objects, object_names));
     Ok(device)
+}
+
+/// Device that prescribes a force.
+fn read_force(
+    source: &Source,
+    device: &DeviceEntry,
+    (grasp, parameters): (Grasp, DeviceParameters),
+    objects: &[ModelObject],
+    object_names: &[String],
+    warnings: &mut Vec<Warning>,
+) -> Result<SceneDevice, SceneError> {
+    let Some(entry) = &device.path else {
+        return source.fail(
+            device.name.span(),
+            SceneErrorKind::Missing,
+            "path",
+            "mode = \"force\" needs path = { file = \"…\" } with the columns t,fx,fy,fz: the force on the object in world axes [N]",
+        );
+    };
+    if let (Some(radius), ResponseForm::Fir(_)) = (&device.patch_radius, &objects[grasp.object].response) {
+        let message = "patch_radius needs response = \"modal\": a table knows points only";
+        return source.fail(radius.span(), SceneErrorKind::Conflict, "patch_radius", message);
+    }
+    let path = source.motion_path(entry, Columns::Force)?;
+    let applied = AppliedForce { grasp, force: path.at(0.0).position };
+    let device = SceneDevice {
+        name: device.name.get_ref().clone(),
+        mode: DeviceMode::Force(applied),
+        parameters,
+        path: Some(path),
+        simulated: None,
+        real: None,
+        pointer: false,
+    };
+    let touched = grasp.object..grasp.object + 1;
+    warnings.extend(small_patches(&device, &objects[touched.clone()], &object_names[touched]));
+    Ok(device)
+}
+
+fn is_force(device: &DeviceEntry) -> bool {
+    device.mode.get_ref() == "force"
+}
+
+/// Parameters of a device that prescribes a force; other keys of devices are refused.
+fn force_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParameters, SceneError> {
+    let refused = [
+        ("tip_radius", device.tip_radius.as_ref().map(Spanned::span)),
+        ("friction", device.friction.as_ref().map(Spanned::span)),
+        ("coupling", device.coupling.as_ref().map(Spanned::span)),
+        ("linked", device.linked.as_ref().map(Spanned::span)),
+        ("pointer", device.pointer.as_ref().map(Spanned::span)),
+        ("simulated", device.simulated.as_ref().map(|simulated| simulated.device.span())),
+        ("driver", device.driver.as_ref().map(Spanned::span)),
+        ("mount", device.mount.as_ref().map(Spanned::span)),
+    ];
+    if let Some((key, span)) = refused.into_iter().find_map(|(key, span)| Some((key, span?))) {
+        let message =
+            format!("{key} is of a hand; with mode = \"force\" the path is the force: leave it out");
+        return source.fail(span, SceneErrorKind::Conflict, key, message);
+    }
+    let length = |number| source.not_negative(number, Quantity::length("patch_radius"));
+    let patch_radius = device.patch_radius.as_ref().map_or(Ok(0.0), length)?;
+    Ok(DeviceParameters { patch_radius, ..DeviceParameters::default() })
 }
 
 /// Checks that a pointer has no other source of motion and no held point.
@@ -171,39 +242,13 @@ fn read_grasp(
     objects: &[ModelObject],
     object_names: &[String],
 ) -> Result<Grasp, SceneError> {
-    let name = device.name.get_ref();
-    let wanted = attach.object.get_ref();
-    let Some(object) = object_names.iter().position(|name| name == wanted) else {
-        let known = object_names.join(", ");
-        let message = format!("there is no object {wanted:?}; the scene has {known}");
-        return source.fail(attach.object.span(), SceneErrorKind::UnknownValue, "object", message);
-    };
-    let ModelObject { recording, response, .. } = &objects[object];
-    let point_span = attach.point.span();
-    let point = DVec3::from_array(attach.point.get_ref().0);
-    let allowed = OFF_SURFACE * recording.surface.diagonal();
-    let grasp = match recording.surface.nearest(point) {
-        Some((point, distance)) if distance <= allowed => Grasp { object, point },
-        Some((_, distance)) => {
-            return source.fail(
-                point_span,
-                SceneErrorKind::Grasp,
-                "point",
-                format!(
-                    "the point {point} is {distance:.4} m from the surface of {wanted:?}, at most {allowed:.4} m are \
-                     allowed; it is given in the body frame, whose origin is the centre of mass"
-                ),
-            );
-        }
-        None => {
-            let message = format!("the object {wanted:?} has no surface");
-            return source.fail(point_span, SceneErrorKind::Grasp, "point", message);
-        }
-    };
+    let (name, wanted) = (device.name.get_ref(), attach.object.get_ref());
+    let grasp = surface_point(source, (&attach.object, &attach.point), objects, object_names)?;
+    let ModelObject { recording, response, .. } = &objects[grasp.object];
     match response {
         ResponseForm::Modal if !recording.is_movable(&grasp.point) => {
             return source.fail(
-                point_span,
+                attach.point.span(),
                 SceneErrorKind::Grasp,
                 "point",
                 format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
@@ -213,7 +258,7 @@ fn read_grasp(
         ResponseForm::Fir(table) => {
             if let Err(error) = table.prepare(&recording.surface, &grasp.point) {
                 let message = format!("device {name:?} on {wanted:?}: {error}");
-                return source.fail(point_span, SceneErrorKind::Table, "point", message);
+                return source.fail(attach.point.span(), SceneErrorKind::Table, "point", message);
             }
         }
     }
@@ -227,7 +272,8 @@ pub(super) fn check_grasps(
     devices: &[SceneDevice],
 ) -> Result<(), SceneError> {
     for (at, (device, entry)) in devices.iter().zip(entries).enumerate() {
-        let holds = |other: &&SceneDevice| other.mode == device.mode && device.mode != DeviceMode::Touch;
+        let is_held = matches!(device.mode, DeviceMode::Held(_));
+        let holds = |other: &&SceneDevice| other.mode == device.mode && is_held;
         if let (Some(other), Some(attach)) = (devices[..at].iter().find(holds), &entry.attach) {
             return source.fail(
                 attach.get_ref().point.span(),

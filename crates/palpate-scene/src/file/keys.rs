@@ -33,6 +33,44 @@ pub(super) struct SceneFile {
     pub obstacle: Vec<Spanned<ObstacleEntry>>,
     #[serde(default)]
     pub device: Vec<DeviceEntry>,
+    #[serde(default)]
+    pub probe: Vec<ProbeEntry>,
+    #[serde(default)]
+    pub clamp: Vec<ClampEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ClampEntry {
+    pub name: Spanned<String>,
+    pub object: Spanned<String>,
+    pub face: Option<Spanned<FaceEntry>>,
+    #[serde(rename = "box")]
+    pub region: Option<Spanned<RegionEntry>>,
+    pub max_cells: Option<Spanned<i64>>,
+    pub path: Option<PathEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FaceEntry {
+    pub point: Spanned<Numbers<3>>,
+    pub radius: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RegionEntry {
+    pub min: Spanned<Numbers<3>>,
+    pub max: Spanned<Numbers<3>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProbeEntry {
+    pub name: Spanned<String>,
+    pub object: Spanned<String>,
+    pub point: Spanned<Numbers<3>>,
 }
 
 #[derive(Deserialize)]

@@ -1,11 +1,13 @@
 //! Scene files: TOML in, model, devices and obstacles out. Every error has the file and the line.
 
+mod clamps;
 mod coupling;
 mod devices;
 mod drivers;
 mod keys;
 mod objects;
 mod obstacles;
+mod places;
 mod source;
 
 use crate::error::{SceneError, SceneErrorKind};
@@ -153,6 +155,12 @@ fn assemble(
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
+    let mut placed_clamps = Vec::new();
+    for entry in &file.clamp {
+        let (clamp, placed) = clamps::read_clamp(source, entry, &objects, &object_names)?;
+        parameters.clamps.push(clamp);
+        placed_clamps.push(placed);
+    }
     let model = build(source, file, parameters, objects.clone())?;
     let mut devices = Vec::new();
     for (entry, parameters) in file.device.iter().zip(&model.parameters().devices) {
@@ -160,6 +168,8 @@ fn assemble(
         devices.push(read?);
     }
     devices::check_grasps(source, &file.device, &devices)?;
+    let probe = |entry| places::read_probe(source, entry, &objects, &object_names);
+    let probes = file.probe.iter().map(probe).collect::<Result<_, _>>()?;
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
     let held_only: Vec<Warning> = objects::objects_with_tables(&objects, &object_names).collect();
     let inputs = inputs(source, file);
@@ -168,6 +178,8 @@ fn assemble(
         object_names,
         devices,
         obstacles,
+        clamps: placed_clamps,
+        probes,
         gravity,
         warnings,
         choices,
@@ -190,12 +202,14 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
     };
     let objects = file.object.iter().map(|entry| own(&entry.name));
     let devices = file.device.iter().map(|entry| own(&entry.name));
+    let probes = file.probe.iter().map(|entry| own(&entry.name));
+    let clamps = file.clamp.iter().map(|entry| own(&entry.name));
     let planes = file.plane.iter().enumerate();
     let planes = planes.map(|(number, entry)| or(&entry.get_ref().name, "plane", number, entry.span()));
     let others = file.obstacle.iter().enumerate();
     let others = others.map(|(number, entry)| or(&entry.get_ref().name, "obstacle", number, entry.span()));
     let mut seen = HashSet::new();
-    for (name, span) in objects.chain(devices).chain(planes).chain(others) {
+    for (name, span) in objects.chain(devices).chain(probes).chain(clamps).chain(planes).chain(others) {
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(plain) {
             return source.fail(
@@ -315,11 +329,12 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let meshes = obstacles.clone().filter_map(|obstacle| Some(&obstacle.mesh.as_ref()?.file));
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
     let planes = file.plane.iter().filter_map(|plane| Some(&plane.get_ref().path.as_ref()?.file));
+    let clamps = file.clamp.iter().filter_map(|clamp| Some(&clamp.path.as_ref()?.file));
     let gravity = match &file.gravity {
         Gravity::Changing(entry) => Some(&entry.file),
         Gravity::Constant(_) => None,
     };
-    let files = recordings.chain(paths).chain(planes).chain(meshes).chain(moves).chain(gravity);
+    let files = recordings.chain(paths).chain(planes).chain(clamps).chain(meshes).chain(moves).chain(gravity);
     let mut inputs = vec![source.path.to_path_buf()];
     inputs.extend(files.map(|file| source.named_path(file.get_ref())));
     inputs

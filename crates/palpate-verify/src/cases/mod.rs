@@ -2,13 +2,14 @@
 
 mod adversarial;
 mod aligned_faces;
-mod bodies;
 mod ball_between_planes;
 mod block_impact;
+mod bodies;
 mod bounce;
 mod boussinesq;
-mod cantilever;
 mod built_in_scenes;
+mod cantilever;
+mod clamped_bar;
 mod closed_loop;
 mod compliance;
 mod contact_samples;
@@ -22,6 +23,7 @@ mod let_out;
 mod peak_force;
 mod pinch;
 mod pinch_lift;
+mod prescribed_force;
 mod press;
 mod residual_relaxation;
 mod rigid_motion;
@@ -109,6 +111,16 @@ pub const CASES: &[Case] = &[
         name: "shaken-block",
         about: "block with ν = 0 shaken at both ends against 2EAk·tan(kL/2)·u₀",
         compute: shaken_block::shaken_block,
+    },
+    Case {
+        name: "prescribed-force",
+        about: "bar with ν = 0, one end fixed, under a force F·sin ωt at the other against F·tan(kL)/(EAk)",
+        compute: prescribed_force::prescribed_force,
+    },
+    Case {
+        name: "clamped-bar",
+        about: "square bar between two clamps against EA/L·u, GJ/L·θ and EI/L·θ",
+        compute: clamped_bar::clamped_bar,
     },
     Case {
         name: "bounce",

@@ -27,12 +27,13 @@ const DEVICE_TIMEOUT_S: f64 = 0.1;
 /// Capacity of the channel of cycle records: some seconds at 4 kHz.
 const CYCLES: usize = 16_384;
 
-/// Whether a scene may resume from another state: no device follows a path, no obstacle moves, and gravity does not change.
+/// Whether a scene may resume from another state: no device follows a path, no obstacle moves, there is no clamp, and gravity does not
+/// change.
 pub(super) fn is_resumable(scene: &ViewerScene) -> bool {
     let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Path(..));
     let moves = |pose: &SharedTrajectory| pose(0.0) != pose(1.0) || pose(0.0) != pose(0.37);
     let moves = scene.devices.iter().any(follows_path) || scene.obstacle_trajectories.iter().any(moves);
-    !moves && scene.gravity.is_none()
+    !moves && scene.gravity.is_none() && scene.model.parameters().clamps.is_empty()
 }
 
 /// Snapshot before the first step.
@@ -40,7 +41,8 @@ pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
     let input = Input {
         devices: vec![DeviceInput::inactive(); scene.devices.len()],
         obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-        gravity: None,
+        clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
+        ..Input::default()
     };
     Snapshot::new(&scene.model, state, &input)
 }
@@ -103,6 +105,7 @@ impl RunningScene {
             start,
             devices: inputs.devices,
             obstacle_trajectories: movers.collect(),
+            clamp_paths: scene.clamp_paths.clone(),
             gravity: scene.gravity.clone(),
             steps: None,
             frame_rate_hz: FRAME_RATE_HZ,

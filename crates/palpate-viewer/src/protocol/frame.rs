@@ -105,9 +105,9 @@ impl FrameEncoder {
             out.u32(match input.mode {
                 DeviceMode::Inactive | DeviceMode::Suspended => 0,
                 DeviceMode::Touch => 1,
-                DeviceMode::Held(_) => 2,
+                DeviceMode::Held(_) | DeviceMode::Force(_) => 2,
             });
-            [input.position, output.proxy, output.force_on_hand].into_iter().for_each(|v| out.vector(v));
+            [input.hand(output), output.proxy, output.force_on_hand].into_iter().for_each(|v| out.vector(v));
         }
         for contact in &self.strongest {
             out.u32(sides(contact.object, contact.against));

@@ -45,6 +45,7 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
         model,
         devices: vec![ViewerDevice::Pointer; 2],
         obstacle_trajectories: vec![Arc::new(move |_: f64| below)],
+        clamp_paths: Vec::new(),
         gravity: None,
         log: None,
     }

@@ -58,7 +58,12 @@ impl LogFile for InMemory {
 
 fn names() -> SceneNames {
     let own = |names: &[&str]| names.iter().map(|name| (*name).to_string()).collect();
-    SceneNames { objects: own(&["body"]), devices: own(&["left", "right"]), obstacles: own(&["floor"]) }
+    SceneNames {
+        objects: own(&["body"]),
+        devices: own(&["left", "right"]),
+        obstacles: own(&["floor"]),
+        ..SceneNames::default()
+    }
 }
 
 /// Provider of a logged scene: finished logs, capacity of a log [bytes].
@@ -71,7 +76,7 @@ impl LoggedProvider {
         let input = Input {
             devices: vec![DeviceInput::inactive(); 2],
             obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-            gravity: None,
+            ..Input::default()
         };
         let open: LogOpener = Arc::new(move |state, pages| {
             let file = InMemory { bytes: Cursor::default(), capacity, logs: logs.clone(), pages };

@@ -22,7 +22,7 @@ fn log(number: usize, frames: u64) -> Arc<LogFrames> {
     let input = Input {
         devices: vec![DeviceInput::inactive(); 2],
         obstacles: vec![model.parameters().obstacles[0].pose],
-        gravity: None,
+        ..Input::default()
     };
     let mut snapshot = Snapshot::new(&model, &state, &input);
     for number in 1..=20 * frames {

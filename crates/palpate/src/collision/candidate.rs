@@ -26,6 +26,8 @@ pub(crate) enum CandidateSide {
     Device(usize),
     /// Point of an obstacle at the start and at the end of the step [m, world].
     Obstacle { number: usize, start: DVec3, end: DVec3 },
+    /// Point of a clamp's frame at the start and at the end of the step [m, world].
+    Clamp { number: usize, start: DVec3, end: DVec3 },
     /// Location on another object.
     Object { number: usize, location: ContactLocation },
 }

@@ -42,6 +42,8 @@ pub(crate) enum FeatureId {
     Tip(u8),
     /// Held point.
     HeldPoint,
+    /// Cell of a clamp, by its number among those of the object; its collider is the object itself.
+    ClampedCell(u32),
 }
 
 impl FeatureId {
@@ -87,6 +89,8 @@ pub(crate) enum OtherSide {
     Device(usize),
     /// Point of an obstacle at the start and at the end of the step [m, world].
     Obstacle { number: usize, start: DVec3, end: DVec3 },
+    /// Point of a clamp's frame at the start and at the end of the step [m, world].
+    Clamp { number: usize, start: DVec3, end: DVec3 },
     /// Contact point of another object, by its slot.
     Object { number: usize, slot: usize },
 }

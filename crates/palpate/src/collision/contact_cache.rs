@@ -177,6 +177,7 @@ fn instantiate(
     let other = match candidate.other {
         CandidateSide::Device(device) => OtherSide::Device(device),
         CandidateSide::Obstacle { number, start, end } => OtherSide::Obstacle { number, start, end },
+        CandidateSide::Clamp { number, start, end } => OtherSide::Clamp { number, start, end },
         CandidateSide::Object { number, location } => {
             let known = before.and_then(|contact| match contact.other {
                 OtherSide::Object { slot, .. } => Some(slot),

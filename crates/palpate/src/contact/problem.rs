@@ -11,7 +11,7 @@
 
 use super::constraint::Constraint;
 use super::coulomb::{solve_contact, tangents};
-use super::parameters::ROUND_OFF;
+use super::parameters::{ROUND_OFF, SOLVER, UNSOLVED};
 use crate::collision::{Contact, ContactLaw, OtherSide};
 use crate::device::DeviceState;
 use crate::motion::{RigidIncrement, RigidIntegrator, RigidStep};
@@ -61,10 +61,10 @@ impl ContactProblem<'_> {
             None => RigidIncrement::default(),
         };
         for point in &mut own.points.points {
-            point.force = DVec3::ZERO;
             point.displacement = point.free;
             point.end_arm = orientation * (point.rest + point.free);
         }
+        own.restore_prescribed_forces();
     }
 
     /// Block of W between two contact points of an object [m/N, world], linearised about the last evaluation.
@@ -94,7 +94,7 @@ impl ContactProblem<'_> {
     pub(super) fn apart(&self, contact: &Contact) -> DVec3 {
         let other = match contact.other {
             OtherSide::Device(device) => self.devices[device].proxy_under_force(),
-            OtherSide::Obstacle { end, .. } => end,
+            OtherSide::Obstacle { end, .. } | OtherSide::Clamp { end, .. } => end,
             OtherSide::Object { number, slot } => self.position(number, slot),
         };
         other - self.position(contact.object(), contact.slot)
@@ -106,7 +106,7 @@ impl ContactProblem<'_> {
         match contact.other {
             OtherSide::Device(device) => self.devices[device].force += change,
             OtherSide::Object { number, slot } => self.push(number, slot, -change),
-            OtherSide::Obstacle { .. } => {}
+            OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => {}
         }
     }
 
@@ -150,6 +150,7 @@ impl ContactProblem<'_> {
             let own = &mut self.states[body as usize];
             own.points.release_forces();
             own.end = own.free;
+            own.restore_prescribed_forces();
         }
     }
 
@@ -239,7 +240,7 @@ impl ContactProblem<'_> {
                 w += DMat3::from_diagonal(DVec3::splat(self.devices[device].compliance));
             }
             OtherSide::Object { number, slot } => w += self.compliance(number, slot, slot),
-            OtherSide::Obstacle { .. } => {}
+            OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => {}
         }
         let (t1, t2) = tangents(contact.normal);
         let axes = DMat3::from_cols(-contact.normal, t1, t2);
@@ -271,6 +272,38 @@ impl ContactProblem<'_> {
     /// Evaluate an object exactly under its present forces, with the rotation of the last evaluation: displacements, arms
     /// and rigid step. Gives the residual of the rotation, times the size of the body [m].
     pub(super) fn evaluate(&mut self, at: usize) -> f64 {
+        let moves = self.states[at].increment.mobility > 0.0;
+        self.evaluate_motion(at, moves)
+    }
+
+    /// Motion of an object without contact force: under its weight and the prescribed forces, which are part of it, so that no
+    /// contact and no fallback scales them. Gives whether the equations of motion hold.
+    ///
+    /// # Real time
+    pub(crate) fn predict_under_prescribed_forces(&mut self, at: usize) -> bool {
+        let object = &self.objects[at];
+        let own = &mut self.states[at];
+        own.points.least_move = 0.0;
+        own.points.release_forces();
+        own.end = own.free;
+        own.restore_prescribed_forces();
+        let allowed = ROUND_OFF * own.reach(object);
+        let mut last = f64::INFINITY;
+        for _ in 0..SOLVER.max_evaluations {
+            let residual = self.evaluate_motion(at, object.inertia.is_some());
+            if residual <= allowed || residual >= last {
+                last = residual.min(last);
+                break;
+            }
+            last = residual;
+        }
+        let own = &mut self.states[at];
+        own.free = own.end;
+        last <= UNSOLVED * own.reach(object)
+    }
+
+    /// Evaluation of an object, whose rigid motion follows the forces if it `moves`.
+    fn evaluate_motion(&mut self, at: usize, moves: bool) -> f64 {
         let radius = self.objects[at].radius;
         let own = &mut self.states[at];
         let orientation = own.end.end.pose.orientation;
@@ -285,7 +318,7 @@ impl ContactProblem<'_> {
             point.end_arm = orientation * (point.rest + displacement);
         }
         let mut residual = 0.0;
-        if own.increment.mobility > 0.0 {
+        if moves {
             let next = advance_rigid(&self.objects[at], &self.rules, own);
             residual = (next.turn - own.end.turn).length() * radius;
             own.end = next;

@@ -47,13 +47,13 @@ pub(crate) struct Solver {
 }
 
 impl Solver {
-    /// Solver for so many objects, devices and contacts; `uses_samples` says whether contact samples stand for nodes.
-    pub(crate) fn new(objects: usize, devices: usize, contacts: usize, uses_samples: bool) -> Self {
+    /// Solver for so many objects, held points and contacts; `uses_samples` says whether contact samples stand for nodes.
+    pub(crate) fn new(objects: usize, held: usize, contacts: usize, uses_samples: bool) -> Self {
         Self {
             visits_until_loose: if uses_samples { SOLVER.visits_with_samples } else { SOLVER.visits },
             islands: Islands::new(objects),
-            system: BilateralSystem::new(devices),
-            held: Vec::with_capacity(devices),
+            system: BilateralSystem::new(held),
+            held: Vec::with_capacity(held),
             bodies: Vec::with_capacity(objects),
             members: Vec::with_capacity(contacts),
         }

@@ -9,6 +9,7 @@ use crate::motion::{Inertia, RigidIntegrator, RigidState, RigidStep};
 use crate::recording::{Recording, Support};
 use crate::response::{Body, Response, ResponseForm, ResponseState, ResponseView};
 use crate::spatial::{Pose, Twist};
+use crate::surface::Cell;
 use alloc::format;
 use alloc::sync::Arc;
 use glam::{DMat3, DVec3};
@@ -42,6 +43,8 @@ pub(crate) struct ObjectRules<'a> {
     pub(crate) gravity: DVec3,
     /// Contact patch radii of the devices [m].
     pub(crate) patch_radii: &'a [f64],
+    /// Cells of the object's clamps.
+    pub(crate) cells: &'a [Cell],
     /// Upper limit of contact samples of a face; `usize::MAX` for all nodes.
     pub(crate) max_contact_samples: usize,
 }
@@ -117,7 +120,13 @@ impl Object {
         radii.dedup();
         let is_modal = matches!(response, Response::Modal(_));
         let max_samples = if is_modal { rules.max_contact_samples } else { usize::MAX };
-        let body = Body::new(recording, &radii, max_samples);
+        if !is_modal && !rules.cells.is_empty() {
+            return fail(
+                "clamps",
+                "uses a table, which knows points only: a clamp needs the modal form".into(),
+            );
+        }
+        let body = Body::new(recording, &radii, max_samples, rules.cells);
         Ok(Self {
             body,
             response,

@@ -92,6 +92,37 @@ impl ObjectState {
         potential
     }
 
+    /// Prescribed forces [N, world] and their torque about the centre of mass with the arms at the start of the step [N·m].
+    pub(crate) fn prescribed_wrench(&self) -> (DVec3, DVec3) {
+        let orientation = self.rigid.pose.orientation;
+        let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+        for point in &self.points.points {
+            let Some(prescribed) = point.prescribed else { continue };
+            force += prescribed;
+            torque += (orientation * (point.rest + point.state.displacement)).cross(prescribed);
+        }
+        (force, torque)
+    }
+
+    /// Whether prescribed forces act.
+    pub(crate) fn has_prescribed_forces(&self) -> bool {
+        self.points.points.iter().any(|point| point.prescribed.is_some())
+    }
+
+    /// Set all forces to the prescribed ones.
+    ///
+    /// # Real time
+    pub(crate) fn restore_prescribed_forces(&mut self) {
+        for index in 0..self.points.points.len() {
+            let point = &mut self.points.points[index];
+            point.force = point.prescribed.unwrap_or_default();
+            if let Some(force) = point.prescribed {
+                let in_body = self.body_force(force);
+                self.points.push(index, in_body);
+            }
+        }
+    }
+
     /// Force in body axes whose work on the deformation is exact, Rᵀ·(1 − v̂/2)·f [N] (see `step`).
     pub(crate) fn body_force(&self, force: DVec3) -> DVec3 {
         self.end.end.pose.orientation.inverse() * (force + self.end.turn.cross(force) * 0.5)

@@ -162,6 +162,12 @@ impl ImpulseResponse {
         surface.source_nodes.iter().map(of_node).collect()
     }
 
+    /// Whether the displacement of a surface point is held.
+    pub fn observes(&self, surface: &Surface, point: &SurfacePoint) -> bool {
+        let observed = Self::dof_indices(surface, &self.observed_dofs);
+        surface.corners(point).into_iter().all(|(node, weight)| weight == 0.0 || observed[node].is_some())
+    }
+
     /// Check the columns of a surface point and load them into memory, before the point is held in a scene.
     ///
     /// # Errors

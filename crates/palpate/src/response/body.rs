@@ -9,8 +9,8 @@ use super::residual_kernel::{FactoredForce, ResidualKernel};
 use super::sample_surface::SampleSurface;
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals, smooth_heights,
-    triangles_around,
+    Bands, Bounds, Cell, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals,
+    smooth_heights, triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -74,10 +74,11 @@ impl SpringForce {
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) recording: Arc<Recording>,
-    /// Patches of the devices' radii, then those of the contact samples of each level, finest first.
+    /// Patches of the devices' radii, those of the contact samples of each level, finest first, and the cells of clamps.
     pub(crate) patches: Vec<PatchField>,
-    /// Number of patches of devices.
+    /// Number of patches of devices, and of levels.
     device_patches: usize,
+    levels: usize,
     tree: SphereTree,
     bounds: Bounds,
     /// Mean edge length of the triangles at rest [m].
@@ -96,8 +97,13 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Body with patches of the given radii [m], and levels of contact samples down to `max_contact_samples`.
-    pub(crate) fn new(recording: Arc<Recording>, radii: &[f64], max_contact_samples: usize) -> Self {
+    /// Body with patches of the given radii [m], levels of contact samples down to `max_contact_samples`, and the cells of its clamps.
+    pub(crate) fn new(
+        recording: Arc<Recording>,
+        radii: &[f64],
+        max_contact_samples: usize,
+        cells: &[Cell],
+    ) -> Self {
         let tree = SphereTree::new(&recording.surface.positions, &recording.surface.triangles);
         let shapes = &recording.modes.mode_shapes;
         let distances = ModalDistances::new(&recording, shapes);
@@ -112,6 +118,10 @@ impl Body {
         for level in &*recording.levels_down_to(max_contact_samples) {
             patches.push(PatchField::at_samples(&recording, level, &normals, &heights));
         }
+        let levels = patches.len() - radii.len();
+        if !cells.is_empty() {
+            patches.push(PatchField::at_cells(&recording, cells));
+        }
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {
             around.extend(triangles);
@@ -123,6 +133,7 @@ impl Body {
             recording,
             patches,
             device_patches,
+            levels,
             tree,
             bounds,
             edge,
@@ -198,13 +209,30 @@ impl Body {
 
     /// Coarsest level of detail.
     pub(crate) fn coarsest_level(&self) -> usize {
-        self.patches.len() - self.device_patches
+        self.levels
+    }
+
+    /// Number of cells of its clamps.
+    pub(crate) fn cells(&self) -> usize {
+        let of_clamps = self.patches.get(self.device_patches + self.levels);
+        of_clamps.map_or(0, |patches| patches.weights.len())
+    }
+
+    /// Contact location of a cell of the clamps.
+    pub(crate) fn cell_location(&self, cell: usize) -> ContactLocation {
+        let footprint = Footprint::Patch((self.device_patches + self.levels) as u32);
+        // A degenerate triangle per cell.
+        let point = SurfacePoint { triangle: cell as u32, weights: [1.0, 0.0, 0.0] };
+        ContactLocation { point, footprint }
     }
 
     /// Coarsest level up to which every level has a decimated surface, for contact with other objects.
     pub(crate) fn coarsest_surface_level(&self) -> usize {
         let is_surface = |patch: &&PatchField| patch.samples().is_some_and(|samples| samples.is_surface);
-        self.patches[self.device_patches..].iter().take_while(is_surface).count()
+        self.patches[self.device_patches..self.device_patches + self.levels]
+            .iter()
+            .take_while(is_surface)
+            .count()
     }
 
     /// Surface of a footprint: all triangles, or the decimated surface between contact samples.

@@ -28,6 +28,8 @@ pub(crate) struct ContactPoint {
     pub(crate) free: DVec3,
     /// Displacement at the end of the step [m, body].
     pub(crate) displacement: DVec3,
+    /// Prescribed force [N, world]; none at contacts.
+    pub(crate) prescribed: Option<DVec3>,
     /// Force on the object, held over the step [N, world], and in body axes.
     pub(crate) force: DVec3,
     pub(crate) force_in_body: DVec3,
@@ -89,6 +91,11 @@ impl ContactPoints {
         &self.points[self.at[slot]]
     }
 
+    /// Set the prescribed force of a slot's point [N, world].
+    pub(crate) fn prescribe(&mut self, slot: usize, force: DVec3) {
+        self.points[self.at[slot]].prescribed = Some(force);
+    }
+
     /// Add a point at a location. Gives its slot, or none at capacity.
     ///
     /// # Real time
@@ -108,6 +115,7 @@ impl ContactPoints {
             state: LocationState::default(),
             free: DVec3::ZERO,
             displacement: DVec3::ZERO,
+            prescribed: None,
             force: DVec3::ZERO,
             force_in_body: DVec3::ZERO,
             start_arm: DVec3::ZERO,

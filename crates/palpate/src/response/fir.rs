@@ -100,7 +100,7 @@ impl Fir {
     /// J_a·R[sample]·J_bᵀ between two surface points, row by row [m/N]; R_cc[0] of equation (9) for sample 0.
     ///
     /// # Real time
-    fn block(&self, sample: usize, a: &SurfacePoint, b: &SurfacePoint) -> [f64; 9] {
+    pub(super) fn block(&self, sample: usize, a: &SurfacePoint, b: &SurfacePoint) -> [f64; 9] {
         let base = sample * self.table.observed_dofs.len();
         let mut sum = [0.0; 9];
         for (source, wb) in self.recording.surface.corners(b).into_iter().filter(|(_, w)| *w != 0.0) {
@@ -124,7 +124,7 @@ impl Fir {
     }
 
     /// Displacement of a point under an acceleration that has acted for `steps` steps [m, body].
-    fn sag_of_point(&self, point: &SurfacePoint, acceleration: DVec3, steps: u64) -> DVec3 {
+    pub(super) fn sag_of_point(&self, point: &SurfacePoint, acceleration: DVec3, steps: u64) -> DVec3 {
         let corners = self.recording.surface.corners(point);
         corners.iter().map(|&(node, weight)| self.sag(node, acceleration, steps) * weight).sum()
     }

@@ -12,6 +12,7 @@ mod nodal_compliance;
 mod nodal_forces;
 mod oscillator;
 mod patch_field;
+mod point_displacement;
 mod residual_fields;
 mod residual_kernel;
 mod sample_surface;

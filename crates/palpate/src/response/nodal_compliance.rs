@@ -88,7 +88,7 @@ mod tests {
     fn precomputed_compliance_is_that_of_modes_and_residual_compliance() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let body = Body::new(recording.clone(), &[], usize::MAX);
+        let body = Body::new(recording.clone(), &[], usize::MAX, &[]);
         let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
         let mut precomputed = computed.clone();
         precomputed.precompute_nodal_compliance(&body, core::iter::empty());

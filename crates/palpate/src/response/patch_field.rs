@@ -13,7 +13,7 @@ use super::modal_distances::ModalDistances;
 use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
 use crate::recording::Recording;
-use crate::surface::{Bounds, PatchWeights, SampleLevel, SphereTree, Surface};
+use crate::surface::{Bounds, Cell, PatchWeights, SampleLevel, SphereTree, Surface};
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -37,7 +37,7 @@ pub(crate) struct PatchField {
 pub(super) enum PatchCentres {
     /// All surface nodes: a patch may lie at any surface point.
     Nodes(ResidualKernel),
-    /// Contact samples.
+    /// Contact samples, or cells of clamps.
     Samples(Box<SampleSurface>),
 }
 
@@ -67,6 +67,24 @@ impl PatchField {
         let order = recording.metadata.mesh.order;
         let weights = PatchWeights::new(&recording.surface, order, radius, &level.nodes);
         let samples = SampleSurface::new(recording, level, &weights, (normals, heights));
+        Self::averaged_at(recording, samples, weights, radius)
+    }
+
+    /// Cells of the body's clamps.
+    pub(crate) fn at_cells(recording: &Recording, cells: &[Cell]) -> Self {
+        let weights = PatchWeights::of_cells(cells);
+        let samples = SampleSurface::of_cells(recording, &weights);
+        // No patch radius asks for them.
+        Self::averaged_at(recording, samples, weights, f64::NAN)
+    }
+
+    /// Patches with given weights about the nodes of a sample surface.
+    fn averaged_at(
+        recording: &Recording,
+        samples: SampleSurface,
+        weights: PatchWeights,
+        radius: f64,
+    ) -> Self {
         let rows = averaged_rows(recording, &weights);
         let distances = ModalDistances::new(recording, &rows);
         let index = |node: usize| samples.index(node);

@@ -87,6 +87,31 @@ impl SampleSurface {
         }
     }
 
+    /// Cells with these weights: each has the node next to its centroid that no other cell has, as its name, and its position at rest
+    /// is the centroid.
+    pub(super) fn of_cells(recording: &Recording, weights: &PatchWeights) -> Self {
+        let rest = &recording.surface.positions;
+        let (mut indices, mut nodes) = (vec![NONE; rest.len()], Vec::with_capacity(weights.len()));
+        let mut positions = rest.clone();
+        for c in 0..weights.len() {
+            let centroid: DVec3 = weights.of(c).map(|(node, w)| rest[node] * w).sum();
+            let distance = |node: &usize| (rest[*node] - centroid).length_squared();
+            let unused = (0..rest.len()).filter(|node| indices[*node] == NONE);
+            let Some(node) = unused.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
+            indices[node] = c as u32;
+            positions[node] = centroid;
+            nodes.push(node as u32);
+        }
+        let triangles: Vec<[u32; 3]> = nodes.iter().map(|&node| [node; 3]).collect();
+        let triangle = (0..nodes.len() as u32).collect();
+        let surface = Surface { triangles, positions, ..recording.surface.clone() };
+        let tree = SphereTree::new(&surface.positions, &surface.triangles);
+        let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, rest.len());
+        let residual = averaged(&recording.residual, &to_nodes, weights);
+        let nearest = vec![NONE; rest.len()];
+        Self { indices, nodes, surface, is_surface: false, triangle, tree, residual, to_nodes, nearest }
+    }
+
     /// Surface nodes of the samples.
     pub(super) fn nodes(&self) -> &[u32] {
         &self.nodes

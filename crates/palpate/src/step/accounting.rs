@@ -4,16 +4,26 @@
 
 use crate::collision::{Contact, OtherSide};
 use crate::contact::Constraint;
-use crate::device::{DeviceParameters, DeviceState};
+use crate::device::{DeviceParameters, DeviceState, PrescribedForce};
 use crate::energy::EnergyLedger;
 use crate::object::ObjectState;
+use glam::DVec3;
+
+/// Travel of a contact point over the step [m, world].
+fn travel(objects: &[ObjectState], object: usize, slot: usize) -> DVec3 {
+    let (own, point) = (&objects[object], objects[object].points.of(slot));
+    (own.end.end.pose.position - own.rigid.pose.position) + (point.end_arm - point.start_arm)
+}
+
+/// Add the work of a device's prescribed force over the step to the ledger of its object.
+pub(super) fn prescribed_force(device: &DeviceState, objects: &mut [ObjectState]) {
+    let Some(PrescribedForce { object, slot }) = device.prescribed else { return };
+    let force = objects[object].points.of(slot).force;
+    objects[object].ledger.input += force.dot(travel(objects, object, slot));
+}
 
 /// Add a contact's work over the step to the ledgers of its objects: the input by the other side, and the losses between.
 pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut [ObjectState]) {
-    let travel = |objects: &[ObjectState], object: usize, slot: usize| {
-        let (own, point) = (&objects[object], objects[object].points.of(slot));
-        (own.end.end.pose.position - own.rigid.pose.position) + (point.end_arm - point.start_arm)
-    };
     let work = contact.force.dot(travel(objects, contact.object(), contact.slot));
     let (impact, friction) = if contact.is_held() { (0.0, 0.0) } else { constraint.losses(contact) };
     let ledger = &mut objects[contact.object()].ledger;

@@ -51,7 +51,7 @@ pub(super) fn depenetrate(
         let constraints = &constraints[first..first + group.len()];
         first += group.len();
         let (object, other) = match (group[0].object(), group[0].other) {
-            (_, OtherSide::Device(_)) => continue,
+            (_, OtherSide::Device(_) | OtherSide::Clamp { .. }) => continue,
             (object, OtherSide::Obstacle { .. }) => (object, None),
             (object, OtherSide::Object { number, .. }) => (object, Some(number)),
         };

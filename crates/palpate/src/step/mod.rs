@@ -22,8 +22,10 @@
 //! Equations: docs/theory.md (C38), (C44), (C45), (C46), (C49).
 
 mod accounting;
+mod clamps;
 mod depenetration;
 mod output;
+mod prescribed_forces;
 
 use crate::collision::{
     CandidateSide, Collider, CollisionContext, Contact, ContactCandidate, ContactId, ContactLaw, FeatureId,
@@ -31,7 +33,7 @@ use crate::collision::{
 };
 use crate::contact::{Constraint, ContactProblem, SOLVER, SolverReport, StepRules, UNSOLVED};
 use crate::device::{DeviceState, LastTouch};
-use crate::io::{DeviceInput, DeviceMode, Input, Output, StepStatus};
+use crate::io::{AppliedForce, DeviceInput, DeviceMode, Input, Output, StepStatus};
 use crate::object::{Object, ObjectState};
 use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
@@ -59,10 +61,13 @@ impl Model {
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
     state.output.status = StepStatus::default();
     change_gravity(model, state, input);
+    prescribed_forces::place(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
+    clamps::move_frames(state, input);
     find_contacts(model, state, input);
     set_up_constraints(model, state);
+    prescribed_forces::predict(model, state);
     solve(model, state);
     integrate(model, state);
     state.steps += 1;
@@ -87,7 +92,7 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
-/// Predict every object at the end of the step without contact force.
+/// Predict every object at the end of the step without contact force; prescribed forces act with the arms at its start.
 fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
@@ -97,7 +102,7 @@ fn predict(model: &Model, state: &mut State) {
             own.points.predict(&mut view);
         }
         let motion = (rules.integrator, rules.step_s, rules.gravity);
-        own.free = object.advance_rigid(motion, &own.rigid, (DVec3::ZERO, DVec3::ZERO), None);
+        own.free = object.advance_rigid(motion, &own.rigid, own.prescribed_wrench(), None);
         own.surface_motion =
             object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
     }
@@ -107,15 +112,19 @@ fn predict(model: &Model, state: &mut State) {
 fn move_obstacles(state: &mut State, input: &Input) {
     let State { obstacles, workspace, output, .. } = state;
     for (number, next) in workspace.next_obstacles.iter_mut().enumerate() {
-        *next = obstacles[number];
-        let Some(given) = input.obstacles.get(number) else { continue };
-        let length = given.orientation.length();
-        if given.position.is_finite() && (0.99..=1.01).contains(&length) {
-            *next = Pose { orientation: given.orientation.normalize(), ..*given };
-        } else {
-            output.status.rejected_inputs += 1;
-        }
+        *next = moved(obstacles[number], input.obstacles.get(number), &mut output.status);
     }
+}
+
+/// Given pose, if it can be used; otherwise, and without one, the present pose.
+fn moved(present: Pose, given: Option<&Pose>, status: &mut StepStatus) -> Pose {
+    let Some(given) = given else { return present };
+    let length = given.orientation.length();
+    if given.position.is_finite() && (0.99..=1.01).contains(&length) {
+        return Pose { orientation: given.orientation.normalize(), ..*given };
+    }
+    status.rejected_inputs += 1;
+    present
 }
 
 /// A device's input, if it can be used.
@@ -125,6 +134,7 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
         DeviceMode::Inactive | DeviceMode::Suspended => false,
         DeviceMode::Held(grasp) => model.accepts(grasp),
         DeviceMode::Touch => true,
+        DeviceMode::Force(AppliedForce { grasp, force }) => model.accepts(grasp) && force.is_finite(),
     };
     (is_allowed && device_input.position.is_finite()).then_some(device_input)
 }
@@ -132,7 +142,8 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 /// Collision detection: all contacts of the step.
 fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let (step, gravity) = (state.steps, state.gravity);
-    let State { objects, devices, obstacles, contacts, levels, workspace, output, .. } = state;
+    let State { objects, devices, obstacles, clamps, contacts, levels, .. } = state;
+    let State { workspace, output, .. } = state;
     let Workspace { collision, spare, next_obstacles, .. } = workspace;
     collision.candidates.clear();
     let scene = model.collision_scene();
@@ -148,6 +159,10 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             device.last_touch = device.last_touch.filter(|_| is_suspended);
             continue;
         };
+        if let DeviceMode::Force(_) = device_input.mode {
+            (device.active, device.last_touch) = (false, None);
+            continue;
+        }
         // A device that was inactive, or held a point, starts where it is.
         let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
         let touches = device_input.mode == DeviceMode::Touch;
@@ -185,6 +200,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             }
         }
     }
+    clamps::find_contacts(model, clamps, context.workspace);
     for object in touchable() {
         for (number, (before, after)) in obstacles.iter().zip(&*next_obstacles).enumerate() {
             context.find_obstacle_contacts(object, number, *before, *after);
@@ -229,7 +245,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         };
         let other = match contact.other {
             OtherSide::Device(device) => devices[device].proxy,
-            OtherSide::Obstacle { start, .. } => start,
+            OtherSide::Obstacle { start, .. } | OtherSide::Clamp { start, .. } => start,
             OtherSide::Object { number, slot } => at(number, slot),
         };
         if let (true, OtherSide::Device(number)) = (contact.is_held(), contact.other) {
@@ -240,6 +256,10 @@ fn set_up_constraints(model: &Model, state: &mut State) {
                 device.activate(at(contact.object(), contact.slot));
                 device.begin(parameters, h, device.target);
             }
+            workspace.constraints.push(Constraint::default());
+            continue;
+        }
+        if contact.is_held() {
             workspace.constraints.push(Constraint::default());
             continue;
         }
@@ -273,7 +293,8 @@ fn solve(model: &Model, state: &mut State) {
         if problem.dissipated() + paid >= -problem.rounding() || attempt == 2 {
             let status = &mut output.status;
             (status.solver_residual_m, status.iterations) = (residual_m, iterations);
-            (status.dependent_rows, status.unsolved_islands) = (dependent_rows, unsolved_islands);
+            status.dependent_rows = dependent_rows;
+            status.unsolved_islands += unsolved_islands;
             return;
         }
         let pairs = problem.contacts.iter_mut().zip(&mut *problem.constraints);
@@ -297,6 +318,9 @@ fn integrate(model: &Model, state: &mut State) {
     for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
         accounting::contact(contact, constraint, objects);
         contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
+    }
+    for device in devices.iter() {
+        accounting::prescribed_force(device, objects);
     }
     remember_touches(objects, devices, contacts, &workspace.constraints);
     for (object, own) in model.objects.iter().zip(&mut *objects) {

@@ -1,14 +1,15 @@
 //! Output of a step.
 
 use crate::collision::OtherSide;
-use crate::io::{ContactOutput, Input};
+use crate::device::PrescribedForce;
+use crate::io::{ClampOutput, ContactOutput, Input};
 use crate::scene::Model;
 use crate::state::State;
 use glam::DVec3;
 
 /// Write the output of a step from the state at its end.
 pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, contacts, couplings, workspace, output, .. } = state;
+    let State { steps, objects, devices, clamps, contacts, couplings, workspace, output, .. } = state;
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;
     for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
@@ -24,21 +25,31 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         let device = &devices[number];
         out.force_on_hand = if device.active { -device.force } else { DVec3::ZERO };
         out.offset = if device.active { device.offset } else { [DVec3::ZERO; 2] };
-        if device.active {
+        if let Some(PrescribedForce { object, slot }) = device.prescribed {
+            let (own, point) = (&objects[object], objects[object].points.of(slot));
+            out.force_on_hand = -point.force;
+            out.proxy = own.rigid.pose.position + point.end_arm;
+        } else if device.active {
             out.proxy = device.proxy;
         } else if let Some(given) = input.devices.get(number).filter(|given| given.position.is_finite()) {
             out.proxy = given.position;
         }
     }
     output.contacts.clear();
+    output.clamps.fill(ClampOutput::default());
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let own = &objects[contact.object()];
         let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
         let carries_force = contact.force != DVec3::ZERO;
+        if let OtherSide::Clamp { number, .. } = contact.other {
+            let out = &mut output.clamps[number];
+            out.force -= contact.force;
+            out.torque -= (point - clamps[number].end.position).cross(contact.force);
+        }
         if !contact.is_held() {
             let other = match contact.other {
                 OtherSide::Object { number, .. } => Some(number),
-                OtherSide::Device(_) | OtherSide::Obstacle { .. } => None,
+                OtherSide::Device(_) | OtherSide::Obstacle { .. } | OtherSide::Clamp { .. } => None,
             };
             let penetration = -contact.gap(constraint.end);
             for object in [Some(contact.object()), other].into_iter().flatten() {

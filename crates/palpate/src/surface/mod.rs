@@ -3,6 +3,7 @@
 //! A point on a triangle with corners i, j, k and barycentric weights w has the displacement Σ w·u of its corners. A force at
 //! the point is distributed to the corners with the same weights, so that work is preserved and reciprocity holds.
 
+mod cells;
 mod decimation;
 mod patch_weights;
 mod poisson_disk;
@@ -13,6 +14,7 @@ mod sphere_tree;
 mod test_surfaces;
 mod triangle;
 
+pub(crate) use cells::{Cell, cells};
 pub(crate) use decimation::decimate;
 pub(crate) use patch_weights::{PatchWeights, patch_kernel, triangles_around};
 pub(crate) use poisson_disk::{EDGE_COSINE, node_normals, poisson_disk_sample};

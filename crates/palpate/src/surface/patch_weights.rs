@@ -11,6 +11,7 @@
 //!
 //! Equations: docs/theory.md (C26).
 
+use super::cells::Cell;
 use super::quadratic_face::QuadraticFaces;
 use super::{Surface, area_normal, at_weights};
 use alloc::vec;
@@ -96,6 +97,17 @@ impl PatchWeights {
                 patches.weights.push(1.0);
             }
             touched.iter().for_each(|&node| weight[node as usize] = 0.0);
+            patches.offsets.push(patches.nodes.len() as u32);
+        }
+        patches
+    }
+
+    /// Patches with given nodes and weights.
+    pub(crate) fn of_cells(cells: &[Cell]) -> Self {
+        let mut patches = Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() };
+        for cell in cells {
+            patches.nodes.extend(cell.iter().map(|(node, _)| *node));
+            patches.weights.extend(cell.iter().map(|(_, weight)| *weight));
             patches.offsets.push(patches.nodes.len() as u32);
         }
         patches

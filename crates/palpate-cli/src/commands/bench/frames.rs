@@ -49,7 +49,7 @@ fn frame_times(
     let mut state = State::new(&model);
     let mut encoder = FrameEncoder::new(model.clone(), 1);
     let obstacles: Vec<Pose> = model.parameters().obstacles.iter().map(|obstacle| obstacle.pose).collect();
-    let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles, gravity: None };
+    let mut input = Input { devices: vec![DeviceInput::inactive(); 2], obstacles, ..Input::default() };
     let mut snapshot = Snapshot::new(&model, &state, &input);
     let (mut times, mut bytes) = (Vec::new(), 0);
     for number in 1..=steps.max(STEPS_PER_FRAME * MIN_FRAMES) {

@@ -129,7 +129,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         outputs.take(scene, &input, &state, took)?;
     }
     bar.finish_and_clear();
-    outputs.finish(&state)
+    outputs.finish(scene, &state)
 }
 
 /// Failure for a pointer, which needs the viewer.
@@ -142,6 +142,7 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let step_s = scene.model.parameters().step_s;
     let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
     let paths = devices.chain(scene.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
+    let paths = paths.chain(scene.clamps.iter().filter_map(|clamp| clamp.path.as_ref()));
     let paths = paths.chain(&scene.gravity);
     let longest = paths.map(|path| path.end()).fold(0.0, f64::max);
     let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });

@@ -90,10 +90,10 @@ impl Outputs {
     }
 
     /// Completes all files.
-    pub fn finish(mut self, state: &State) -> Result<Summary, Failure> {
+    pub fn finish(mut self, scene: &Scene, state: &State) -> Result<Summary, Failure> {
         let written = self.files.finish()?;
         let index = written.into_iter().find(|file| file.kind == "vtu").map(|file| file.path);
-        self.summary.finish(state.output(), index);
+        self.summary.finish(scene, state, index);
         Ok(self.summary)
     }
 }

@@ -9,7 +9,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate::{Pose, State};
+use palpate::{DeviceMode, Pose, State};
 use palpate_export::AtomicFile;
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogSender, LogWriter};
@@ -110,6 +110,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
             notify(&line);
             Ok(SessionDevice::Local(attached))
         }
+        (None, Some(path)) if matches!(device.mode, DeviceMode::Force(_)) => {
+            Ok(SessionDevice::Path(path.clone(), device.mode))
+        }
         (None, Some(path)) => {
             let attached = attach_path(path.clone(), device.simulated, device.mode, rate, passivity);
             Ok(SessionDevice::Local(attached))
@@ -128,6 +131,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         start,
         devices,
         obstacle_trajectories: movers(scene),
+        clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
         gravity: scene.gravity.clone(),
         steps,
         frame_rate_hz: options.pictures,

@@ -2,9 +2,10 @@
 
 use super::warnings;
 use glam::DVec3;
-use palpate::{Collider, Input, Output, State, StepStatus};
+use palpate::{ClampOutput, Collider, Input, Output, State, StepStatus};
+use palpate_export::ProbeReading;
 use palpate_haptics::percentile_us;
-use palpate_scene::{Scene, Warning, WarningKind};
+use palpate_scene::{Scene, SceneClamp, Warning, WarningKind};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,6 +19,10 @@ pub struct Summary {
     /// Force on the hand by device and step [N].
     pub forces: Vec<Vec<DVec3>>,
     last: Output,
+    /// Largest force [N] and torque [N·m] on each clamp.
+    clamp_maxima: Vec<[f64; 2]>,
+    /// Readings of the probes at the end.
+    probes: Vec<ProbeReading>,
     /// Maxima over all steps.
     status: StepStatus,
     /// Steps with unsolved islands, and steps with dropped contacts.
@@ -45,6 +50,8 @@ impl Summary {
             steps,
             forces: vec![Vec::with_capacity(steps); scene.devices.len()],
             last: start.clone(),
+            clamp_maxima: vec![[0.0; 2]; scene.clamps.len()],
+            probes: Vec::new(),
             status: StepStatus::default(),
             unsolved_steps: 0,
             dropping_steps: 0,
@@ -68,6 +75,10 @@ impl Summary {
         for (largest, object) in self.penetration.iter_mut().zip(&output.objects) {
             *largest = largest.max(object.penetration_m);
         }
+        for (largest, clamp) in self.clamp_maxima.iter_mut().zip(&output.clamps) {
+            let now = [clamp.force.length(), clamp.torque.length()];
+            *largest = [0, 1].map(|at| largest[at].max(now[at]));
+        }
         for contact in &output.contacts {
             if let Collider::Device(number) = contact.against {
                 self.touched[number].0 = true;
@@ -86,9 +97,10 @@ impl Summary {
     }
 
     /// Completes the summary after the last step.
-    pub(super) fn finish(&mut self, last: &Output, index: Option<PathBuf>) {
+    pub(super) fn finish(&mut self, scene: &Scene, last: &State, index: Option<PathBuf>) {
         self.times_ns.sort_unstable();
-        self.last = last.clone();
+        self.last = last.output().clone();
+        self.probes = scene.probes.iter().map(|probe| probe.read(&scene.model, last)).collect();
         self.index = index;
     }
 
@@ -138,9 +150,11 @@ impl Summary {
             .devices
             .iter()
             .zip(&self.forces)
-            .map(|(device, forces)| {
+            .zip(&self.last.devices)
+            .map(|((device, forces), last)| {
                 json!({
                     "name": device.name,
+                    "proxy_last_m": last.proxy.to_array(),
                     "force_last_n": last_force(forces).length(),
                     "force_max_n": largest(forces),
                     "force_last_xyz_n": last_force(forces).to_array(),
@@ -165,12 +179,42 @@ impl Summary {
                 })
             })
             .collect();
+        let clamps = scene.clamps.iter().enumerate().zip(&self.last.clamps).zip(&self.clamp_maxima);
+        let clamp = |(((at, clamp), last), [force_max, torque_max]): (
+            ((usize, &SceneClamp), &ClampOutput),
+            &[f64; 2],
+        )| {
+            json!({
+                "name": clamp.name,
+                "cells": scene.model.clamp_cells(at),
+                "force_last_xyz_n": last.force.to_array(),
+                "torque_last_xyz_nm": last.torque.to_array(),
+                "force_max_n": force_max,
+                "torque_max_nm": torque_max,
+            })
+        };
+        let clamps: Vec<Value> = clamps.map(clamp).collect();
+        let probes: Vec<Value> = scene
+            .probes
+            .iter()
+            .zip(&self.probes)
+            .map(|(probe, ProbeReading { position, displacement })| {
+                json!({
+                    "name": probe.name,
+                    "object": scene.object_names[probe.at.object],
+                    "position_m": position.to_array(),
+                    "displacement_m": displacement.to_array(),
+                })
+            })
+            .collect();
         let energy = &self.last.energy;
         json!({
             "steps": self.steps,
             "step_s": scene.model.parameters().step_s,
             "devices": devices,
             "objects": objects,
+            "clamps": clamps,
+            "probes": probes,
             "contacts": { "count_max": self.max_contacts, "force_max_n": self.max_contact_force },
             "energy_j": {
                 "kinetic": energy.kinetic,
@@ -229,6 +273,21 @@ impl Summary {
                 v.y,
                 v.z,
                 1000.0 * deformation
+            );
+        }
+        for (clamp, last) in scene.clamps.iter().zip(&self.last.clamps) {
+            out += &format!(
+                "  {:<12} force on the clamp {:.5} N, torque {:.3e} N·m at the end\n",
+                clamp.name,
+                last.force.length(),
+                last.torque.length()
+            );
+        }
+        for (probe, ProbeReading { displacement, .. }) in scene.probes.iter().zip(&self.probes) {
+            let u = 1000.0 * *displacement + DVec3::ZERO;
+            out += &format!(
+                "  {:<12} displaced by ({:.5}, {:.5}, {:.5}) mm at the end, body axes\n",
+                probe.name, u.x, u.y, u.z
             );
         }
         if self.max_contacts > 0 {

@@ -55,6 +55,7 @@ impl LibraryProvider {
             model: scene.model.clone(),
             devices: scene.devices.iter().map(viewer_device).collect(),
             obstacle_trajectories: movers.collect(),
+            clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
             gravity: scene.gravity.clone(),
             log,
         })
