@@ -212,6 +212,8 @@ pub const CASES: &[Case] = &[
         name: "bodies",
         about: "a set of bodies that rest, slide, roll, land, are punched, pinched and stacked: nothing sinks",
         compute: bodies::bodies,
+    },
+    Case {
         name: "built-in-scenes",
         about: "built-in scenes for ten minutes alone, and for minutes with random pointers: in reach, in shape, energies in order",
         compute: built_in_scenes::built_in_scenes,
