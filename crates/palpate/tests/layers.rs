@@ -50,7 +50,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-haptics", &["palpate"]),
     ("palpate-viewer", &["palpate", "palpate-haptics"]),
     ("palpate-testkit", &["palpate", "palpate-fem"]),
-    ("palpate-verify", &["palpate", "palpate-fem", "palpate-haptics", "palpate-testkit"]),
+    ("palpate-verify", &["palpate", "palpate-fem", "palpate-haptics", "palpate-scene", "palpate-testkit"]),
     ("palpate-export", &["palpate", "palpate-fem"]),
     ("palpate-scene", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-export"]),
     ("palpate-render", &["palpate", "palpate-haptics", "palpate-viewer", "palpate-export", "palpate-scene"]),

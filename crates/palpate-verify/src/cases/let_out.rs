@@ -88,13 +88,18 @@ fn inner_point(body: &Recording, random: &mut Random) -> DVec3 {
 fn observe(body: &Arc<Recording>, device: DeviceParameters, hand: DVec3, findings: &mut Findings) {
     let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
     let (model, mut state) = model_and_state(parameters, vec![object_at(body, DVec3::ZERO, DVec3::ZERO)]);
-    let (mut last, mut rise, mut offset, mut work) = (DVec3::ZERO, 0.0_f64, 0.0, 0.0);
+    let (mut last, mut rise, mut has_left) = (DVec3::ZERO, 0.0_f64, false);
+    let (mut offset, mut work) = (0.0, 0.0);
     findings.tips += 1;
     for number in 0..STEPS {
         let output = step(&model, &mut state, &touching(&[hand]));
         let out = &output.devices[0];
         let force = out.force_on_hand;
-        rise = rise.max(force.length() - last.length());
+        // Until the body has left the tip: it may strike it again as it swings.
+        has_left |= last != DVec3::ZERO && force == DVec3::ZERO;
+        if !has_left {
+            rise = rise.max(force.length() - last.length());
+        }
         last = force;
         if number == 0 {
             offset = out.offset[0].length();
