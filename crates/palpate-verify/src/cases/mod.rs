@@ -20,6 +20,7 @@ mod prescribed_force;
 mod press;
 mod residual_relaxation;
 mod rigid_motion;
+mod shaken_base;
 mod shaken_block;
 mod sphere;
 mod stack;
@@ -102,6 +103,11 @@ pub const CASES: &[Case] = &[
         name: "clamped-bar",
         about: "square bar between two clamps against EA/L·u, GJ/L·θ and EI/L·θ",
         compute: clamped_bar::clamped_bar,
+    },
+    Case {
+        name: "shaken-base",
+        about: "bar with ν = 0 whose base is shaken along it against the transmissibility 1/cos(kL)",
+        compute: shaken_base::shaken_base,
     },
     Case {
         name: "bounce",
