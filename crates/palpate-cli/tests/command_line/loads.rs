@@ -187,7 +187,7 @@ fn clamps_stretch_and_twist_a_bar() {
     assert!(at("energy.defect", 999).abs() < 1e-11 * at("energy.input", 999));
     let summary = workplace.json(&["run", "scene.toml", "--json"]);
     let jaw = &summary["clamps"][1];
-    assert_eq!((&summary["steps"], &jaw["name"], &jaw["cells"]), (&600.into(), &"jaw".into(), &16.into()));
+    assert_eq!((&summary["steps"], &jaw["name"], &jaw["cells"]), (&600.into(), &"jaw".into(), &12.into()));
     assert!(jaw["torque_max_nm"].as_f64().expect("a number") > 0.9 * twist);
 }
 
@@ -258,8 +258,9 @@ fn a_base_moves_its_body_and_a_log_repeats_it() {
     assert!(text.starts_with("400 steps") && text.contains("from hands, obstacles and bases"), "{text}");
     let table = Table::parse(&workplace.text("steps.csv"));
     let (t, base, speed) = (table.column("t"), table.column("beam.py"), table.column("beam.vy"));
-    for (row, t) in t.iter().enumerate().take(399) {
-        // The mean of the path half a step before and after: off by h²/8 of its acceleration.
+    // From rest; in the first step it catches up on half a step.
+    for (row, t) in t.iter().enumerate().take(399).skip(1) {
+        // The mean of the path half a step before and after, linear between rows: off by h²/4 of its acceleration.
         assert!((base[row] - 0.002 * (1.0 - (40.0 * t).cos())).abs() < 1e-6, "{row}");
         assert!((speed[row] - 0.08 * (40.0 * t).sin()).abs() < 2e-4, "{row}");
     }
@@ -289,8 +290,8 @@ fn a_base_that_turns_and_one_of_a_free_body_are_refused() {
         workplace.fail(&["run", "scene.toml"]),
         "scene.toml: line 5: the position is in the path: leave one of the two out"
     );
-    let free = ["record", "box:0.1x0.1x0.1/2x2x2", "--order", "1", "--modes", "10", "-o", "beam.palp"];
-    workplace.succeed(&free);
+    let body = ["record", "box:0.1x0.1x0.1/2x2x2", "--order", "1", "--young", "2000", "--poisson", "0.3"];
+    workplace.succeed(&[&body[..], &["--density", "110", "--modes", "10", "-o", "beam.palp"]].concat());
     workplace.write("scene.toml", SHAKEN);
     assert_eq!(
         workplace.fail(&["run", "scene.toml"]),
