@@ -28,7 +28,7 @@ const TORSION: f64 = 0.1406;
 const WAY: f64 = 1e-4;
 const ANGLE: f64 = 1e-3;
 
-/// What is left of the motion when forces are read [1]: e^(−t/β) with t = 1 s.
+/// Remaining motion when forces are read [1]: e^(−t/β) with t = 1 s.
 const SETTLED: f64 = 1e-6;
 
 /// Excess of the torsional stiffness with 2 × 2 and 4 × 4 quadratic elements on the section: they follow its warping, which is of fourth
