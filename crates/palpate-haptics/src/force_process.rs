@@ -39,6 +39,8 @@ pub struct ForceProcess {
     obstacle_trajectories: Vec<ObstacleTrajectory>,
     /// Paths of the clamps' frames.
     clamps: Vec<Option<MotionPath>>,
+    /// Paths of the bases of the objects.
+    bases: Vec<Option<MotionPath>>,
     /// Gravity over simulated time [m/s²], if it changes.
     gravity: Option<MotionPath>,
     steps: u64,
@@ -82,10 +84,12 @@ impl ForceProcess {
         let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
         let clamps: Vec<Pose> = model.parameters().clamps.iter().map(|clamp| clamp.frame).collect();
         let no_paths = vec![None; clamps.len()];
+        let objects = model.recordings().count();
         let input = Input {
             devices: vec![DeviceInput::inactive(); slots.len()],
             obstacles,
             clamps,
+            bases: vec![None; objects],
             ..Input::default()
         };
         Self {
@@ -95,6 +99,7 @@ impl ForceProcess {
             slots,
             obstacle_trajectories,
             clamps: no_paths,
+            bases: vec![None; objects],
             gravity: None,
             steps: 0,
             device_timeout_s,
@@ -117,6 +122,15 @@ impl ForceProcess {
     pub fn move_clamps(&mut self, paths: Vec<Option<MotionPath>>) {
         assert_eq!(paths.len(), self.clamps.len(), "one path for each clamp");
         self.clamps = paths;
+    }
+
+    /// Lets the bases of objects with fixed nodes follow paths in simulated time, in the order of the objects; those without one stay.
+    ///
+    /// # Panics
+    /// If their number is not that of the objects.
+    pub fn move_bases(&mut self, paths: Vec<Option<MotionPath>>) {
+        assert_eq!(paths.len(), self.bases.len(), "one path for each object");
+        self.bases = paths;
     }
 
     /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
@@ -196,6 +210,9 @@ impl ForceProcess {
         }
         for (path, frame) in self.clamps.iter().zip(&mut self.input.clamps) {
             path.iter().for_each(|path| *frame = path.at(time_s));
+        }
+        for (path, base) in self.bases.iter().zip(&mut self.input.bases) {
+            *base = path.as_ref().map(|path| path.of_base(time_s, step_s));
         }
         self.input.gravity = self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
 

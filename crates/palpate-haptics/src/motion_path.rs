@@ -113,6 +113,12 @@ impl MotionPath {
         self.at(end_s - 0.5 * step_s).position
     }
 
+    /// Position that a base goes to in the step of `step_s` [s] that ends at a time [s], see `palpate::Input::bases`: that of the path half
+    /// a step later, so that the base is not behind it.
+    pub fn of_base(&self, end_s: f64, step_s: f64) -> DVec3 {
+        self.at(end_s + 0.5 * step_s).position
+    }
+
     /// Pose [m, world] at a time [s]; the orientation is the identity if the rows have none.
     pub fn at(&self, t: f64) -> Pose {
         let (first, end) = (self.rows.first().map_or(0.0, |(time, _)| *time), self.end());

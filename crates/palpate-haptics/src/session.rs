@@ -66,6 +66,8 @@ pub struct Session {
     pub obstacle_trajectories: Vec<ObstacleTrajectory>,
     /// Paths of the clamps' frames over simulated time, one for each clamp of the model; `None` stays.
     pub clamp_paths: Vec<Option<MotionPath>>,
+    /// Paths of the bases of the objects with fixed nodes over simulated time, one for each object; `None` stays. None at all is the same.
+    pub base_paths: Vec<Option<MotionPath>>,
     /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
     pub gravity: Option<MotionPath>,
     /// Number of steps; `None` runs until it is stopped.
@@ -178,6 +180,9 @@ impl Session {
             path.into_iter().for_each(|path| process.follow(device, path));
         }
         process.move_clamps(self.clamp_paths);
+        if !self.base_paths.is_empty() {
+            process.move_bases(self.base_paths);
+        }
         self.gravity.into_iter().for_each(|gravity| process.change_gravity(gravity));
         let (snapshot_writer, mut snapshots) =
             snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));

@@ -64,7 +64,11 @@ pub(crate) fn check_start(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning
     let devices = scene.devices.iter().filter_map(|device| Some((&*device.name, device.motion()?)));
     let obstacles =
         scene.obstacles.iter().filter_map(|obstacle| Some((&*obstacle.name, obstacle.path.as_ref()?)));
-    warnings.extend(devices.chain(obstacles).filter_map(|(name, path)| far_path(name, path, &placed)));
+    let bases = scene.object_names.iter().zip(&scene.bases);
+    let bases = bases.filter_map(|(name, path)| Some((&**name, path.as_ref()?)));
+    warnings.extend(
+        devices.chain(obstacles).chain(bases).filter_map(|(name, path)| far_path(name, path, &placed)),
+    );
     warnings
 }
 

@@ -23,6 +23,8 @@ pub struct Scene {
     pub obstacles: Vec<SceneObstacle>,
     /// Clamps, in the model's order.
     pub clamps: Vec<SceneClamp>,
+    /// Paths of the bases of objects with fixed nodes, in the order of the objects.
+    pub bases: Vec<Option<MotionPath>>,
     /// Displacement probes.
     pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
@@ -152,6 +154,11 @@ impl Scene {
             devices: self.devices.iter().map(|device| device.input_at(time_s, step_s)).collect(),
             obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
             clamps: self.clamps.iter().map(|clamp| clamp.frame_at(time_s)).collect(),
+            bases: self
+                .bases
+                .iter()
+                .map(|path| path.as_ref().map(|path| path.of_base(time_s, step_s)))
+                .collect(),
             gravity: self.gravity_at(time_s),
         }
     }

@@ -42,6 +42,8 @@ pub struct ViewerScene {
     pub obstacle_trajectories: Vec<SharedTrajectory>,
     /// Paths of the clamps' frames, one for each clamp of the model; `None` stays.
     pub clamp_paths: Vec<Option<MotionPath>>,
+    /// Paths of the bases of the objects with fixed nodes, one for each object; `None` stays.
+    pub base_paths: Vec<Option<MotionPath>>,
     /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
     pub gravity: Option<MotionPath>,
     /// Log opener, if the scene is logged.

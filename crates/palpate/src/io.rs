@@ -95,6 +95,10 @@ pub struct Input {
     pub obstacles: Vec<Pose>,
     /// Frames of the clamps at the end of the step [m, world], in the model's order. Missing entries stay.
     pub clamps: Vec<Pose>,
+    /// Positions that the bases of bodies with fixed nodes go to [m, world], in the order of the objects: of the centre of mass at rest. At
+    /// the end of the step a base is midway between the last position and this one, half a step behind, and moves with their difference
+    /// over the step. None, or a missing entry, is the last position.
+    pub bases: Vec<Option<DVec3>>,
     /// Gravity, held over the step [m/s², world]. None stays as it was, at the start the model's.
     pub gravity: Option<DVec3>,
 }
@@ -108,6 +112,7 @@ impl Input {
         self.devices.copy_from_slice(&other.devices);
         self.obstacles.copy_from_slice(&other.obstacles);
         self.clamps.copy_from_slice(&other.clamps);
+        self.bases.copy_from_slice(&other.bases);
         self.gravity = other.gravity;
     }
 }

@@ -27,7 +27,7 @@ use glam::DVec3;
 pub struct DeformationSnapshot {
     pub(crate) object: usize,
     pub(crate) pose: Pose,
-    /// Gravity [m/s², world].
+    /// Gravity that it feels [m/s², world].
     pub(crate) gravity: DVec3,
     pub(crate) data: DeformationData,
 }
@@ -54,7 +54,7 @@ impl DeformationSnapshot {
     /// No allocation. Costs modes and contacts; with a table the forces of the last T steps.
     pub fn copy_from(&mut self, state: &State) {
         let own = &state.objects[self.object];
-        (self.pose, self.gravity) = (own.rigid.pose, state.gravity);
+        (self.pose, self.gravity) = (own.rigid.pose, own.felt_gravity(state.gravity));
         self.data.copy_from(&own.response);
     }
 
@@ -124,7 +124,7 @@ impl State {
     /// When the model has no such object, or the object no such point.
     pub fn point_displacement(&self, model: &Model, object: usize, point: &SurfacePoint) -> DVec3 {
         let (body, own) = (&model.objects[object], &self.objects[object]);
-        let gravity = body.gravity_in_body(self.gravity, &own.rigid.pose);
+        let gravity = body.gravity_in_body(own.felt_gravity(self.gravity), &own.rigid.pose);
         own.response.displacement_at((&body.response, &body.body), point, gravity)
     }
 
@@ -134,7 +134,7 @@ impl State {
         DeformationSnapshot {
             object,
             pose: own.rigid.pose,
-            gravity: self.gravity,
+            gravity: own.felt_gravity(self.gravity),
             data: own.response.deformation(),
         }
     }

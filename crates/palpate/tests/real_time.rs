@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate::{
-    AppliedForce, ColumnsInMemory, Coupling, DeviceInput, DeviceMode, DeviceParameters, Grasp,
+    AppliedForce, Clamp, ColumnsInMemory, Coupling, DeviceInput, DeviceMode, DeviceParameters, Grasp,
     ImpulseResponse, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording,
     ResponseForm, Sampling, Shape, State, Twist, step,
 };
@@ -90,6 +90,39 @@ fn step_makes_no_allocation() {
         step(&model, &mut state, &input);
     }
     assert_eq!(allocations() - before, 0, "allocations in 200 steps");
+
+    // Prescribed forces, clamps that move and a base that moves.
+    let end = (0..free.surface.triangles.len() as u32).filter(|t| {
+        free.surface.triangles[*t as usize].iter().all(|n| free.surface.positions[*n as usize].x > 0.099)
+    });
+    let parameters = ModelParameters {
+        devices: vec![DeviceParameters { patch_radius: 0.03, ..DeviceParameters::default() }],
+        clamps: vec![Clamp::new(0, end.collect(), Pose::IDENTITY)],
+        ..ModelParameters::default()
+    };
+    let objects =
+        vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed_block(), start(1.0))];
+    let model = Model::new(parameters, objects).expect("a good model");
+    let mut state = State::new(&model);
+    let point = palpate::SurfacePoint { triangle: 3, weights: [0.2, 0.3, 0.5] };
+    let mut input = Input {
+        devices: vec![DeviceInput::inactive()],
+        clamps: vec![Pose::IDENTITY],
+        bases: vec![None; 2],
+        ..Input::default()
+    };
+    let before = allocations();
+    for number in 0..200_u32 {
+        let t = f64::from(number) * 1e-3;
+        let applied = AppliedForce { grasp: Grasp { object: 0, point }, force: DVec3::Y * t };
+        input.devices[0] =
+            if number % 40 < 30 { DeviceInput::exerting(applied) } else { DeviceInput::inactive() };
+        input.clamps[0].position = DVec3::X * 0.01 * t;
+        input.bases[1] = (number > 50).then_some(DVec3::X * (1.0 + t * t));
+        step(&model, &mut state, &input);
+        assert!(state.point_displacement(&model, 0, &point).is_finite());
+    }
+    assert_eq!(allocations() - before, 0, "allocations in 200 steps of loads");
 
     // Tips, a floor, a moving ball, two objects on one another.
     let coupling = Some(Coupling { stiffness: 200.0, damping: 0.1 });

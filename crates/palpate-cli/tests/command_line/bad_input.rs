@@ -25,7 +25,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "recording = \"cube.palp\"",
             "recording = \"cube.palp\"\nspeed = 1",
             7,
-            "`name`, `recording`, `response`, `table`, `position`, `orientation`, `velocity`, `angular_velocity`, `start`, `friction`",
+            "`name`, `recording`, `response`, `table`, `position`, `path`, `orientation`, `velocity`, `angular_velocity`, `start`, `friction`",
         ),
         (
             "mode = \"held\"",

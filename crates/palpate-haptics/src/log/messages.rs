@@ -8,7 +8,7 @@ use palpate::{
 };
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Names of a scene's parts, in the model's order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -262,6 +262,9 @@ pub(super) struct StepMessage {
     /// Clamps; logs before version 0.4 have none.
     #[serde(default)]
     pub clamps: HashMap<String, ClampMessage>,
+    /// Positions that bases go to [m, world], by the names of their objects.
+    #[serde(default)]
+    pub bases: HashMap<String, Xyz>,
     /// Gravity [m/s², world], where it changes in time.
     #[serde(default)]
     pub gravity: Option<Xyz>,
@@ -328,6 +331,9 @@ impl Serialize for StepMessageOf<'_> {
             compute_us: microseconds(record.compute),
         };
         let optional = usize::from(record.input.gravity.is_some()) + usize::from(!names.clamps.is_empty());
+        let bases: Vec<usize> =
+            (0..record.input.bases.len()).filter(|at| record.input.bases[*at].is_some()).collect();
+        let optional = optional + usize::from(!bases.is_empty());
         let mut map = serializer.serialize_map(Some(7 + optional))?;
         map.serialize_entry("step", &record.step)?;
         map.serialize_entry("devices", &Named(&names.devices, device))?;
@@ -340,6 +346,12 @@ impl Serialize for StepMessageOf<'_> {
                 torque: record.clamps[at].torque.into(),
             };
             map.serialize_entry("clamps", &Named(&names.clamps, clamp))?;
+        }
+        if !bases.is_empty() {
+            let moving = bases.iter().filter_map(|&at| Some((&names.objects[at], record.input.bases[at]?)));
+            let message: BTreeMap<&String, Xyz> =
+                moving.map(|(name, position)| (name, position.into())).collect();
+            map.serialize_entry("bases", &message)?;
         }
         if let Some(gravity) = record.input.gravity {
             map.serialize_entry("gravity", &Xyz::from(gravity))?;

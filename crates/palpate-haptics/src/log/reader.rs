@@ -164,6 +164,8 @@ impl LoggedStep {
         for name in &names.obstacles {
             input.obstacles.push((*self.message.obstacles.get(name).ok_or_else(|| missing(name))?).into());
         }
+        let base = |name: &String| self.message.bases.get(name).map(|position| DVec3::from(*position));
+        input.bases = names.objects.iter().map(base).collect();
         for name in &names.clamps {
             let clamp = self.message.clamps.get(name).ok_or_else(|| missing(name))?;
             input.clamps.push(clamp.frame.into());

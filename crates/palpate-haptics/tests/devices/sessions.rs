@@ -38,6 +38,7 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         devices: vec![SessionDevice::Local(attached)],
         obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
         clamp_paths: Vec::new(),
+        base_paths: Vec::new(),
         gravity: None,
         steps: None,
         frame_rate_hz: 0.0,

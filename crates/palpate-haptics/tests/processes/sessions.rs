@@ -39,6 +39,7 @@ fn session(steps: Option<u64>) -> Session {
         devices: vec![attached(1.0), attached(-1.0)],
         obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
         clamp_paths: Vec::new(),
+        base_paths: Vec::new(),
         gravity: None,
         model,
         steps,

@@ -80,8 +80,8 @@ pub(super) struct ObjectEntry {
     pub recording: Spanned<PathBuf>,
     pub response: Option<Spanned<String>>,
     pub table: Option<Spanned<PathBuf>>,
-    #[serde(default)]
-    pub position: Numbers<3>,
+    pub position: Option<Spanned<Numbers<3>>>,
+    pub path: Option<PathEntry>,
     #[serde(default = "identity")]
     pub orientation: Numbers<4>,
     #[serde(default)]

@@ -155,6 +155,10 @@ fn assemble(
         parameters.obstacles.push(obstacle);
         obstacles.push(placed);
     }
+    let base = |(entry, object): (_, &ModelObject)| {
+        objects::read_base_path(source, entry, (&object.recording, &object.response))
+    };
+    let bases = file.object.iter().zip(&objects).map(base).collect::<Result<_, _>>()?;
     let mut placed_clamps = Vec::new();
     for entry in &file.clamp {
         let (clamp, placed) = clamps::read_clamp(source, entry, &objects, &object_names)?;
@@ -179,6 +183,7 @@ fn assemble(
         devices,
         obstacles,
         clamps: placed_clamps,
+        bases,
         probes,
         gravity,
         warnings,
@@ -330,11 +335,19 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let moves = obstacles.filter_map(|obstacle| Some(&obstacle.path.as_ref()?.file));
     let planes = file.plane.iter().filter_map(|plane| Some(&plane.get_ref().path.as_ref()?.file));
     let clamps = file.clamp.iter().filter_map(|clamp| Some(&clamp.path.as_ref()?.file));
+    let bases = file.object.iter().filter_map(|object| Some(&object.path.as_ref()?.file));
     let gravity = match &file.gravity {
         Gravity::Changing(entry) => Some(&entry.file),
         Gravity::Constant(_) => None,
     };
-    let files = recordings.chain(paths).chain(planes).chain(clamps).chain(meshes).chain(moves).chain(gravity);
+    let files = recordings
+        .chain(paths)
+        .chain(planes)
+        .chain(clamps)
+        .chain(bases)
+        .chain(meshes)
+        .chain(moves)
+        .chain(gravity);
     let mut inputs = vec![source.path.to_path_buf()];
     inputs.extend(files.map(|file| source.named_path(file.get_ref())));
     inputs

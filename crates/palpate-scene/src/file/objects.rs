@@ -6,19 +6,21 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::recording_file::read_recording;
 use crate::warning::{Warning, WarningKind};
 use glam::{DQuat, DVec3};
-use palpate::{InitialDeformation, ModelObject, ObjectStart, Pose, Recording, ResponseForm, Twist};
+use palpate::{InitialDeformation, ModelObject, ObjectStart, Pose, Recording, ResponseForm, Support, Twist};
 use palpate_fem::FORCE_ERROR_WARNING;
+use palpate_haptics::{Columns, MotionPath};
 use palpate_store::{Location, TableStore};
 use std::sync::Arc;
 
 pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<ModelObject, SceneError> {
     let (recording, response) = read_responses(source, object)?;
+    let path = read_base_path(source, object, (&recording, &response))?;
+    let given =
+        object.position.as_ref().map_or(DVec3::ZERO, |position| DVec3::from_array(position.get_ref().0));
+    let position = path.map_or(given, |path| path.at(0.0).position);
     let [w, x, y, z] = object.orientation.0;
     let start = ObjectStart {
-        pose: Pose {
-            position: DVec3::from_array(object.position.0),
-            orientation: DQuat::from_xyzw(x, y, z, w),
-        },
+        pose: Pose { position, orientation: DQuat::from_xyzw(x, y, z, w) },
         twist: Twist {
             linear: DVec3::from_array(object.velocity.0),
             angular: DVec3::from_array(object.angular_velocity.0),
@@ -29,6 +31,42 @@ pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<Model
     let deformation = source.word("start", object.start.as_ref(), deformations)?;
     let friction = source.friction(object.friction.as_ref())?;
     Ok(ModelObject { recording, response, start, deformation, friction })
+}
+
+/// Path of the base of an object with fixed nodes, if it moves.
+pub(super) fn read_base_path(
+    source: &Source,
+    object: &ObjectEntry,
+    (recording, response): (&Recording, &ResponseForm),
+) -> Result<Option<MotionPath>, SceneError> {
+    let Some(entry) = &object.path else { return Ok(None) };
+    let fail = |message: &str| {
+        source.fail(
+            entry.file.span(),
+            SceneErrorKind::Conflict,
+            "path",
+            format!("object {:?}: {message}", object.name.get_ref()),
+        )
+    };
+    if let Some(position) = &object.position {
+        let message = "the position is in the path: leave one of the two out";
+        return source.fail(position.span(), SceneErrorKind::Conflict, "position", message);
+    }
+    if recording.metadata.support != Support::Fixed {
+        return fail(
+            "only a body with fixed nodes has a base that follows a path: record it with --fix, or drive a free one by a clamp",
+        );
+    }
+    if !matches!(response, ResponseForm::Modal) {
+        return fail("a base that moves needs response = \"modal\"");
+    }
+    let path = source.motion_path(entry, Columns::Pose)?;
+    if path.has_orientations() {
+        return fail(
+            "a base follows a path without rotation: give the columns t,x,y,z, or drive a free body by a clamp, which may turn",
+        );
+    }
+    Ok(Some(path))
 }
 
 /// Recording and form of the response: from a recording file, a store of impulse responses, or both.

@@ -28,7 +28,7 @@ const TORSION: f64 = 0.1406;
 const WAY: f64 = 1e-4;
 const ANGLE: f64 = 1e-3;
 
-/// What is left of the motion when forces are read [1]: e^(−t/β) with t = 1 s.
+/// Remaining motion when forces are read [1]: e^(−t/β) with t = 1 s.
 const SETTLED: f64 = 1e-6;
 
 /// Excess of the torsional stiffness with 2 × 2 and 4 × 4 quadratic elements on the section: they follow its warping, which is of fourth
@@ -54,7 +54,7 @@ pub fn clamped_bar() -> Result<Vec<Check>, VerifyError> {
     let mut checks = Vec::new();
     let mut invariants = RunInvariants::default();
     for (max_cells, stretch, bend) in CELLS {
-        let of = |what: &str| format!("{max_cells} cells: {what}");
+        let of = |what: &str| format!("at most {max_cells} cells: {what}");
         let force = stretched(&body, max_cells, &mut invariants)?;
         let exact = YOUNG * area / LENGTH * WAY;
         checks.push(Check::new(of("stretch against EA/L·u [N]"), force, exact, stretch));
@@ -138,7 +138,6 @@ fn held(
         (before, last) = (last, output.clamps[1].force.length() + output.clamps[1].torque.length() / WIDTH);
     }
     if (last / before - 1.0).abs() > SETTLED {
-        eprintln!("{before} {last}");
         return Err(VerifyError::NotReached("rest of the clamped bar"));
     }
     let clamp = state.output().clamps[1];

@@ -33,6 +33,7 @@ pub(super) fn is_resumable(scene: &ViewerScene) -> bool {
     let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Path(..));
     let moves = |pose: &SharedTrajectory| pose(0.0) != pose(1.0) || pose(0.0) != pose(0.37);
     let moves = scene.devices.iter().any(follows_path) || scene.obstacle_trajectories.iter().any(moves);
+    let moves = moves || scene.base_paths.iter().any(Option::is_some);
     !moves && scene.gravity.is_none() && scene.model.parameters().clamps.is_empty()
 }
 
@@ -41,6 +42,7 @@ pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
     let input = Input {
         devices: vec![DeviceInput::inactive(); scene.devices.len()],
         obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
+        bases: vec![None; scene.model.recordings().count()],
         clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
         ..Input::default()
     };
@@ -106,6 +108,7 @@ impl RunningScene {
             devices: inputs.devices,
             obstacle_trajectories: movers.collect(),
             clamp_paths: scene.clamp_paths.clone(),
+            base_paths: scene.base_paths.clone(),
             gravity: scene.gravity.clone(),
             steps: None,
             frame_rate_hz: FRAME_RATE_HZ,

@@ -46,6 +46,7 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
         devices: vec![ViewerDevice::Pointer; 2],
         obstacle_trajectories: vec![Arc::new(move |_: f64| below)],
         clamp_paths: Vec::new(),
+        base_paths: Vec::new(),
         gravity: None,
         log: None,
     }

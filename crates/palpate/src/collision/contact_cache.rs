@@ -25,7 +25,8 @@ impl Bodies<'_> {
         to: impl Iterator<Item = ContactLocation> + Clone,
     ) {
         let own = &mut self.states[object];
-        let view = &mut self.objects[object].view(self.gravity, &own.rigid, &mut own.response);
+        let view =
+            &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
         own.ledger.dissipated += view.move_spring_forces(from, to);
         own.points.read_state(view);
     }
@@ -33,14 +34,16 @@ impl Bodies<'_> {
     /// Free a contact point.
     fn release(&mut self, object: usize, slot: usize) {
         let own = &mut self.states[object];
-        let view = &mut self.objects[object].view(self.gravity, &own.rigid, &mut own.response);
+        let view =
+            &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
         own.points.remove(view, slot);
     }
 
     /// Put a contact point at a location: the known one, or a new one; none when the object has no room.
     fn settle(&mut self, object: usize, known: Option<usize>, location: ContactLocation) -> Option<usize> {
         let own = &mut self.states[object];
-        let view = &mut self.objects[object].view(self.gravity, &own.rigid, &mut own.response);
+        let view =
+            &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
         match known {
             Some(slot) => {
                 if own.points.of(slot).location != location {

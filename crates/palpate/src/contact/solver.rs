@@ -93,8 +93,9 @@ impl Solver {
 
     fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
-        let is_small = self.members.len() <= SOLVER.few_contacts;
-        let min_change = if is_small { 0.0 } else { SOLVER.min_change };
+        // Held points alone are solved to round-off, and their stiff rows would turn what is not propagated into forces.
+        let is_exact = self.members.len() <= SOLVER.few_contacts || !touches;
+        let min_change = if is_exact { 0.0 } else { SOLVER.min_change };
         let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;

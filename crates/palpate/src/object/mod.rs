@@ -1,5 +1,6 @@
 //! One elastic body of a scene: its recording with all that contacts need of it, its inertia, and its state.
 
+mod base;
 mod state;
 
 pub(crate) use state::ObjectState;
@@ -146,6 +147,11 @@ impl Object {
     /// Whether gravity may change: a table of a body with fixed nodes tells how it sags under a constant one.
     pub(crate) fn allows_gravity_change(&self) -> bool {
         self.inertia.is_some() || self.is_touchable()
+    }
+
+    /// Whether its base may move: that of a body with fixed nodes, in modal form.
+    pub(crate) fn has_movable_base(&self) -> bool {
+        self.inertia.is_none() && self.is_touchable()
     }
 
     /// Rigid motion over a step of h [s] under contact force [N], torque [N·m] and weight; a fixed body stays.

@@ -1,5 +1,6 @@
 //! State of one object: rigid motion, response, contact points and energy ledger.
 
+use super::base::Base;
 use super::{InitialDeformation, Object};
 use crate::energy::EnergyLedger;
 use crate::motion::{RigidIncrement, RigidState, RigidStep};
@@ -23,6 +24,8 @@ pub(crate) struct ObjectState {
     pub(crate) contact_displacement: f64,
     /// Whether a device held a point of it in the last step.
     pub(crate) is_held: bool,
+    /// Motion of the base of a body with fixed nodes.
+    pub(crate) base: Base,
     pub(crate) ledger: EnergyLedger,
     pub(crate) stored_at_start: f64,
 }
@@ -48,6 +51,7 @@ impl ObjectState {
             surface_motion: 0.0,
             contact_displacement: 0.0,
             is_held: false,
+            base: Base::default(),
             ledger: EnergyLedger::default(),
             stored_at_start: 0.0,
         };
@@ -71,7 +75,7 @@ impl ObjectState {
     pub(crate) fn update_ledger(&mut self, object: &Object, gravity: DVec3) {
         let elastic = self.response.energy(&object.response);
         let rigid = object.inertia.map_or(0.0, |inertia| inertia.kinetic_energy(&self.rigid));
-        self.ledger.kinetic = elastic.kinetic + rigid;
+        self.ledger.kinetic = elastic.kinetic + rigid + self.base_energy(object);
         self.ledger.elastic = elastic.elastic;
         self.ledger.residual = elastic.residual;
         self.ledger.potential = self.potential(object, gravity);

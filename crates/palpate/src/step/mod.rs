@@ -61,6 +61,7 @@ impl Model {
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
     state.output.status = StepStatus::default();
     change_gravity(model, state, input);
+    move_bases(model, state, input);
     prescribed_forces::place(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
@@ -85,10 +86,29 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     }
     state.gravity = gravity;
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
-        own.points.change_gravity(&mut object.view(gravity, &own.rigid, &mut own.response));
+        let felt = own.felt_gravity(gravity);
+        own.points.change_gravity(&mut object.view(felt, &own.rigid, &mut own.response));
         let potential = own.potential(object, gravity);
         own.ledger.input += potential - own.ledger.potential;
         own.ledger.potential = potential;
+    }
+}
+
+/// Begin the motion of bases. Bodies with fixed nodes feel their acceleration as gravity.
+fn move_bases(model: &Model, state: &mut State, input: &Input) {
+    let (gravity, h) = (state.gravity, model.parameters.step_s);
+    for (number, (object, own)) in model.objects.iter().zip(&mut state.objects).enumerate() {
+        let given = input.bases.get(number).copied().flatten();
+        let usable = given.filter(|position| position.is_finite() && object.has_movable_base());
+        state.output.status.rejected_inputs += u32::from(usable != given);
+        if object.has_movable_base() && (usable.is_some() || own.base.moves()) {
+            let before = own.felt_gravity(gravity);
+            own.begin_base_motion(object, usable, h);
+            let felt = own.felt_gravity(gravity);
+            if felt != before {
+                own.points.change_gravity(&mut object.view(felt, &own.rigid, &mut own.response));
+            }
+        }
     }
 }
 
@@ -96,13 +116,14 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
 fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
     for (object, own) in model.objects.iter().zip(&mut state.objects) {
-        let mut view = object.view(rules.gravity, &own.rigid, &mut own.response);
+        let mut view = object.view(own.felt_gravity(rules.gravity), &own.rigid, &mut own.response);
         // A step predicts the next one, if gravity and step size stay.
         if !view.predict() {
             own.points.predict(&mut view);
         }
         let motion = (rules.integrator, rules.step_s, rules.gravity);
         own.free = object.advance_rigid(motion, &own.rigid, own.prescribed_wrench(), None);
+        own.carry_with_base();
         own.surface_motion =
             object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
     }
@@ -228,7 +249,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
     let State { steps, objects, devices, contacts, workspace, output, .. } = state;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let orientation = own.rigid.pose.orientation;
-        let mut view = object.view(gravity, &own.rigid, &mut own.response);
+        let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
         own.points.predict_new(&mut view);
         own.points.resum_next(*steps);
         for point in &mut own.points.points {
@@ -329,12 +350,13 @@ fn integrate(model: &Model, state: &mut State) {
         let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
         own.contact_displacement = displaced.fold(0.0, f64::max);
         own.rigid = own.end.end;
-        let mut view = object.view(gravity, &own.rigid, &mut own.response);
+        let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
         own.ledger.dissipated += view.advance(&mut own.points.points);
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
     }
     depenetration::depenetrate((model, gravity), objects, contacts, &workspace.constraints);
     for (object, own) in model.objects.iter().zip(objects) {
+        own.ledger.input += own.base_work(object, gravity);
         own.update_ledger(object, gravity);
         own.ledger.defect =
             own.ledger.stored() - own.stored_at_start - (own.ledger.input - own.ledger.lost());

@@ -16,6 +16,8 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         out.pose = own.rigid.pose;
         if let Some(inertia) = &object.inertia {
             out.twist = inertia.twist(&own.rigid);
+        } else if own.base.moves() {
+            out.twist.linear = own.base.end_velocity;
         }
         out.energy = own.ledger;
         out.penetration_m = 0.0;

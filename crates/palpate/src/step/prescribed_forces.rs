@@ -33,13 +33,14 @@ pub(super) fn place(model: &Model, state: &mut State, input: &Input) {
             && applied.is_none_or(|applied| applied.grasp.object != object)
         {
             let (object, own) = (&model.objects[object], &mut objects[object]);
-            own.points.remove(&mut object.view(gravity, &own.rigid, &mut own.response), slot);
+            let felt = own.felt_gravity(gravity);
+            own.points.remove(&mut object.view(felt, &own.rigid, &mut own.response), slot);
             device.prescribed = None;
         }
         let Some(AppliedForce { grasp, force }) = applied else { continue };
         let (object, own) = (&model.objects[grasp.object], &mut objects[grasp.object]);
         let location = location(object, grasp.point, model.parameters.devices[number].patch_radius);
-        let view = &mut object.view(gravity, &own.rigid, &mut own.response);
+        let view = &mut object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
         let slot = match device.prescribed {
             Some(PrescribedForce { slot, .. }) => {
                 if own.points.of(slot).location != location {

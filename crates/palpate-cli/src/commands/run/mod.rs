@@ -143,6 +143,7 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
     let paths = devices.chain(scene.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
     let paths = paths.chain(scene.clamps.iter().filter_map(|clamp| clamp.path.as_ref()));
+    let paths = paths.chain(scene.bases.iter().flatten());
     let paths = paths.chain(&scene.gravity);
     let longest = paths.map(|path| path.end()).fold(0.0, f64::max);
     let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });

@@ -132,6 +132,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         devices,
         obstacle_trajectories: movers(scene),
         clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
+        base_paths: scene.bases.clone(),
         gravity: scene.gravity.clone(),
         steps,
         frame_rate_hz: options.pictures,

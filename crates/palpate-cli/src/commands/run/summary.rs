@@ -366,7 +366,14 @@ impl Summary {
     fn energy_line(&self, scene: &Scene) -> String {
         let energy = &self.last.energy;
         let moving = scene.obstacles.iter().any(|obstacle| obstacle.path.is_some());
-        let movers = if moving { "hands and obstacles" } else { "the hands" };
+        let bases = scene.bases.iter().any(Option::is_some);
+        let movers = if bases {
+            "hands, obstacles and bases"
+        } else if moving {
+            "hands and obstacles"
+        } else {
+            "the hands"
+        };
         let mut lost = format!("{:.3e} J dissipated", energy.dissipated);
         if energy.friction != 0.0 || energy.impact != 0.0 {
             // Pushing out what penetrates gives energy back.

@@ -56,6 +56,7 @@ impl LibraryProvider {
             devices: scene.devices.iter().map(viewer_device).collect(),
             obstacle_trajectories: movers.collect(),
             clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
+            base_paths: scene.bases.clone(),
             gravity: scene.gravity.clone(),
             log,
         })
