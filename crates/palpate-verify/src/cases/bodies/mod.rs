@@ -27,21 +27,21 @@ const FORCE: f64 = 1e-3;
 const LATERAL: f64 = 1e-3;
 const FLICKER: f64 = 2e-3;
 
-/// Energy that contacts take within half a second at rest, as a share of weight times diagonal.
-const LOST: f64 = 1e-4;
+/// Energy that is lost within half a second at rest, as a share of weight times diagonal: finer samples come and go.
+const LOST: f64 = 2e-4;
 
 /// Force of a punch by samples against all nodes: 2.8 % at most, and 7 % of a sheet that is thinner than the samples are apart.
 const BY_SAMPLES: f64 = 0.03;
 const BY_SAMPLES_ON_SHEET: f64 = 0.08;
 
 /// Kinetic energy, as a share of weight times diagonal, below which a body is at rest: it falls by so much of its size.
-const AT_REST: f64 = 1e-6;
+const AT_REST: f64 = 1e-8;
 
-/// Motions by all nodes, by samples on coarse meshes, and on fine ones. Stacks by all nodes take minutes: `faces` has them.
+/// Motions by all nodes, by samples on coarse meshes, and on the fine cube and ball. Stacks by all nodes take minutes: `faces` has them.
 const BY_NODES: &[Motion] = &[Motion::Rest, Motion::Slide, Motion::Land, Motion::Punch];
 const ON_COARSE: &[Motion] =
     &[Motion::Rest, Motion::Slide, Motion::Roll, Motion::Land, Motion::Punch, Motion::Pinch, Motion::Stack];
-const ON_FINE: &[Motion] = &[Motion::Rest, Motion::Roll, Motion::Punch];
+const ON_FINE: &[Motion] = &[Motion::Rest, Motion::Punch];
 
 /// Bodies of the set in all motions.
 pub fn bodies() -> Result<Vec<Check>, VerifyError> {
@@ -70,7 +70,7 @@ pub fn bodies() -> Result<Vec<Check>, VerifyError> {
                 ));
             }
         }
-        if shape != BodyShape::Sheet {
+        if matches!(shape, BodyShape::Cube | BodyShape::Ball) {
             let body = shape.recording(Fineness::Fine)?;
             for &motion in ON_FINE {
                 let outcome = motion.run(&body, &block, SAMPLES)?;
@@ -99,6 +99,8 @@ impl Outcome {
             checks.push(Check::new(format!("{of}: force of all contacts [N]"), self.force.y, weight, FORCE));
             let lateral = self.force.x.hypot(self.force.z) / weight;
             checks.push(share("lateral force, share of the weight", lateral, LATERAL));
+        }
+        if matches!(motion, Motion::Rest | Motion::Punch) {
             checks.push(share("energy that is lost at rest", self.lost_at_rest / (weight * size), LOST));
         }
         if is_held {
