@@ -10,7 +10,7 @@ const UNEXPLAINED: f64 = 1e-9;
 /// Energy below which nothing is counted [J].
 const NEGLIGIBLE_J: f64 = 1e-12;
 
-/// Share of the losses that contacts give back: a tip that drags a dent about jumps over its walls, and is pushed out of them.
+/// Share of the losses that contacts give back: the contact of a tip that drags its indentation about jumps from wall to wall (docs/measured.md).
 const GIVEN_BACK: f64 = 0.25;
 
 /// Largest displacement of the surface, as a share of the radius: while four pointers press by up to a radius each, and in the end.
@@ -25,7 +25,7 @@ const STILL_M_S: f64 = 5e-3;
 /// Steps between two looks at the surfaces.
 const LOOK: u64 = 100;
 
-/// What a run has shown.
+/// Extremes over a run, and the latest energies.
 pub struct Observer {
     stored_at_start: f64,
     last: EnergyLedger,
