@@ -107,12 +107,12 @@ impl Input {
     /// Copy another input of the same scene.
     ///
     /// # Real time
-    /// No allocation.
+    /// No allocation, if there is room for its clamps and bases.
     pub fn copy_from(&mut self, other: &Self) {
         self.devices.copy_from_slice(&other.devices);
         self.obstacles.copy_from_slice(&other.obstacles);
-        self.clamps.copy_from_slice(&other.clamps);
-        self.bases.copy_from_slice(&other.bases);
+        self.clamps.clone_from(&other.clamps);
+        self.bases.clone_from(&other.bases);
         self.gravity = other.gravity;
     }
 }

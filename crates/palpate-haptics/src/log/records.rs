@@ -54,13 +54,16 @@ impl StepRecord {
     /// Record with the capacity of any step of a scene.
     pub fn new(state: &State, input: &Input) -> Self {
         let output = state.output();
+        let mut input = input.clone();
+        input.clamps.resize(output.clamps.len(), Pose::IDENTITY);
+        input.bases.resize(output.objects.len(), None);
         Self {
             step: 0,
             tick: 0,
             time_s: 0.0,
             lateness: Duration::ZERO,
             compute: Duration::ZERO,
-            input: input.clone(),
+            input,
             devices: output.devices.clone(),
             objects: output.objects.clone(),
             clamps: output.clamps.clone(),
