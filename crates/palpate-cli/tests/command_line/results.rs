@@ -226,7 +226,19 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
     // The summary says the same.
     assert_eq!(
         names(&summary),
-        ["contacts", "devices", "energy_j", "objects", "solver", "step_s", "steps", "timing_us", "warnings"]
+        [
+            "clamps",
+            "contacts",
+            "devices",
+            "energy_j",
+            "objects",
+            "probes",
+            "solver",
+            "step_s",
+            "steps",
+            "timing_us",
+            "warnings"
+        ]
     );
     assert_eq!((&summary["steps"], &summary["step_s"]), (&Value::from(50), &Value::from(1e-3)));
     for (at, name) in ["left", "right"].into_iter().enumerate() {

@@ -29,6 +29,10 @@ const STACKED_SAG: [(usize, f64); 2] = [(USUAL, 0.04), (24, 0.08)];
 /// Tolerance of the floor's mean force: the body still oscillates a little.
 const FLOOR_FORCE: f64 = 1e-4;
 
+/// Steps, of 3000, in which the stack is solved to 10⁻⁵ to 10⁻⁴ of the size only, where 24 samples and up to twice as many nodes among them
+/// share the load: their footprints overlap, and sweeps converge slowly.
+const LOOSE_STEPS: u32 = 360;
+
 /// Tolerance of the mean force between two cubes, which sway longer.
 const PAIR_FORCE: f64 = 5e-3;
 
@@ -255,7 +259,7 @@ fn stacked() -> Result<Vec<Check>, VerifyError> {
         }
         let of = format!("two cubes, {most} places");
         checks.push(Check::new(format!("{of}: force between them [N]"), carried, weight, PAIR_FORCE));
-        checks.extend(invariants.checks(&of));
+        checks.extend(invariants.checks_with(&of, if most < USUAL { LOOSE_STEPS } else { 0 }));
     }
     Ok(checks)
 }

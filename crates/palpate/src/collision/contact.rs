@@ -54,15 +54,6 @@ impl FeatureId {
             level => Self::Sample { level: level as u8, node: node as u32 },
         }
     }
-
-    /// Level of detail, of a node against an obstacle.
-    pub(super) fn level(&self) -> Option<usize> {
-        match self {
-            Self::Node(_) => Some(0),
-            Self::Sample { level, .. } => Some(usize::from(*level)),
-            _ => None,
-        }
-    }
 }
 
 /// Identity of a contact: the two sides and the feature between them.

@@ -1,7 +1,7 @@
 //! Level of detail of an object against one collider: all surface nodes, or ever fewer contact samples.
 //!
-//! A level is coarsened as soon as too many samples come near; the next finer one is tried every now and then. Where nodes between
-//! the samples penetrate, samples of finer levels, in the end nodes, are added (`narrow_phase/refinement`).
+//! A level is coarsened as soon as too many samples come near; the next finer one is tried every now and then. Nodes between
+//! the samples that penetrate are added (`narrow_phase/refinement`).
 //!
 //! Equations: docs/theory.md (C30).
 
@@ -9,7 +9,7 @@ use super::parameters::COLLISION;
 use crate::surface::Traversal;
 
 /// Upper limit of the steps until a finer level is tried.
-const MAX_PATIENCE: u64 = 64 * COLLISION.refine_after_steps;
+const MAX_TRIAL_INTERVAL: u64 = 64 * COLLISION.refine_after_steps;
 
 /// Level of detail of an object against one obstacle or object.
 #[derive(Debug, Clone)]
@@ -19,7 +19,7 @@ pub(crate) struct LevelOfDetail {
     /// Step in which the level changed, or a finer one was tried.
     since: u64,
     /// Steps until the next finer level is tried: twice as many each time that one has not lasted as long.
-    patience: u64,
+    trial_interval: u64,
     /// Whether the level is tried in this step.
     is_trial: bool,
     /// Search for nodes that penetrate, a part of it in each step.
@@ -31,7 +31,7 @@ impl Default for LevelOfDetail {
         Self {
             level: 0,
             since: 0,
-            patience: COLLISION.refine_after_steps,
+            trial_interval: COLLISION.refine_after_steps,
             is_trial: false,
             search: Traversal::FINISHED,
         }
@@ -41,7 +41,7 @@ impl Default for LevelOfDetail {
 impl LevelOfDetail {
     /// Begin a step, with the next finer level if it is time to try it.
     pub(super) fn begin(&mut self, step: u64) {
-        self.is_trial = self.level > 0 && step - self.since >= self.patience;
+        self.is_trial = self.level > 0 && step - self.since >= self.trial_interval;
         if self.is_trial {
             (self.level, self.since) = (self.level - 1, step);
         }
@@ -52,11 +52,44 @@ impl LevelOfDetail {
         if self.is_trial { (COLLISION.refine_below * max as f64) as usize } else { max }
     }
 
+    /// Put off the trial of a finer level, in a step in which enough samples are near.
+    pub(super) fn put_off(&mut self, step: u64) {
+        self.since = step;
+    }
+
     /// Go to the next coarser level, in a step in which too many samples are near.
     pub(super) fn coarsen(&mut self, step: u64) {
-        let lasted = step - self.since >= self.patience;
-        self.patience =
-            if lasted { COLLISION.refine_after_steps } else { (2 * self.patience).min(MAX_PATIENCE) };
+        let lasted = step - self.since >= self.trial_interval;
+        self.trial_interval = if lasted {
+            COLLISION.refine_after_steps
+        } else {
+            (2 * self.trial_interval).min(MAX_TRIAL_INTERVAL)
+        };
         (self.level, self.since, self.is_trial) = (self.level + 1, step, false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    /// Steps, of so many, in which a finer level is tried, and given up at once.
+    fn trials(steps: u64) -> Vec<u64> {
+        let (mut detail, mut tried) = (LevelOfDetail { level: 2, ..LevelOfDetail::default() }, Vec::new());
+        for step in 1..=steps {
+            detail.begin(step);
+            if detail.is_trial {
+                assert!(detail.allowed(100) < 100);
+                tried.push(step);
+                detail.coarsen(step);
+            }
+        }
+        tried
+    }
+
+    #[test]
+    fn a_finer_level_is_tried_half_as_often_each_time_that_it_does_not_last() {
+        assert_eq!(trials(800), [50, 150, 350, 750]);
     }
 }

@@ -409,13 +409,6 @@ impl Body {
         }
     }
 
-    /// Nearest contact sample of a level of detail to a surface node, by its node; the node itself at level 0.
-    ///
-    /// # Real time
-    pub(crate) fn nearest_sample(&self, level: usize, node: usize) -> Option<usize> {
-        self.samples(self.footprint_at_level(level)).map_or(Some(node), |samples| samples.nearest(node))
-    }
-
     /// Spring force [N, body] at a location.
     ///
     /// # Real time

@@ -39,8 +39,6 @@ pub(crate) struct SampleSurface {
     pub(super) residual: ResidualCompliance,
     /// Residual compliance between samples and surface nodes [m/N].
     pub(super) to_nodes: PatchNodeCompliance,
-    /// Nearest sample of each surface node whose patch holds it, by its node; [`NONE`] without one.
-    nearest: Vec<u32>,
 }
 
 /// Sample index of a surface node without sample.
@@ -73,18 +71,7 @@ impl SampleSurface {
         let tree = SphereTree::new(&surface.positions, &surface.triangles);
         let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, surface.positions.len());
         let residual = averaged(&recording.residual, &to_nodes, weights);
-        let nearest = nearest_samples(&recording.surface, nodes, weights);
-        Self {
-            indices,
-            nodes: nodes.clone(),
-            surface,
-            is_surface,
-            triangle,
-            tree,
-            residual,
-            to_nodes,
-            nearest,
-        }
+        Self { indices, nodes: nodes.clone(), surface, is_surface, triangle, tree, residual, to_nodes }
     }
 
     /// Cells with these weights: each has the node next to its centroid that no other cell has, as its name, and its position at rest
@@ -108,8 +95,7 @@ impl SampleSurface {
         let tree = SphereTree::new(&surface.positions, &surface.triangles);
         let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, rest.len());
         let residual = averaged(&recording.residual, &to_nodes, weights);
-        let nearest = vec![NONE; rest.len()];
-        Self { indices, nodes, surface, is_surface: false, triangle, tree, residual, to_nodes, nearest }
+        Self { indices, nodes, surface, is_surface: false, triangle, tree, residual, to_nodes }
     }
 
     /// Surface nodes of the samples.
@@ -122,13 +108,6 @@ impl SampleSurface {
     /// # Real time
     pub(super) fn index(&self, node: usize) -> usize {
         self.indices[node] as usize
-    }
-
-    /// Node of the sample that is nearest to a surface node, of those whose patches hold it.
-    ///
-    /// # Real time
-    pub(super) fn nearest(&self, node: usize) -> Option<usize> {
-        Some(self.nearest[node]).filter(|&sample| sample != NONE).map(|sample| sample as usize)
     }
 
     /// Sample as a point of the decimated surface.
@@ -150,20 +129,6 @@ impl SampleSurface {
     fn used_corners(&self, point: &SurfacePoint) -> impl Iterator<Item = (usize, f64)> {
         self.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0)
     }
-}
-
-/// Nearest sample of each node, of those whose patches hold it.
-fn nearest_samples(surface: &Surface, samples: &[u32], weights: &PatchWeights) -> Vec<u32> {
-    let mut nearest = vec![(f64::INFINITY, NONE); surface.positions.len()];
-    for (c, &sample) in samples.iter().enumerate() {
-        for (node, _) in weights.of(c) {
-            let distance = (surface.positions[node] - surface.positions[sample as usize]).length();
-            if distance < nearest[node].0 {
-                nearest[node] = (distance, sample);
-            }
-        }
-    }
-    nearest.into_iter().map(|(_, sample)| sample).collect()
 }
 
 /// Node positions [m] with those of the samples on the smooth surface, averaged along their normals.

@@ -27,7 +27,7 @@ const FORCE: f64 = 1e-3;
 const LATERAL: f64 = 1e-3;
 const FLICKER: f64 = 2e-3;
 
-/// Energy that is lost within half a second at rest, as a share of weight times diagonal: finer samples come and go.
+/// Energy that is lost within half a second at rest, as a share of weight times diagonal: nodes come and go.
 const LOST: f64 = 2e-4;
 
 /// Force of a punch by samples against all nodes: 2.8 % at most, and 7 % of a sheet that is thinner than the samples are apart.

@@ -51,6 +51,10 @@ impl CollisionContext<'_> {
                 near[side] > allowed[side] || is_too_much && is_larger
             });
             if !coarsens.contains(&true) {
+                let enough = COLLISION.refine_pairs_below * max_samples as f64;
+                for (at, _) in details.into_iter().zip(found).filter(|(_, found)| *found as f64 >= enough) {
+                    self.levels[at].put_off(self.step);
+                }
                 return;
             }
             for (at, _) in details.into_iter().zip(coarsens).filter(|(_, coarsens)| *coarsens) {

@@ -1,25 +1,23 @@
-//! Refinement of contact samples: where a node between them penetrates, a finer sample is added there, in the end the node.
+//! Refinement of contact samples: a node between them that penetrates is added.
 //!
-//! An active set: a search passes over the nodes in the obstacle, a part of them in each step. A node that is deeper than the
-//! tolerance gets the nearest sample of the next finer level that is not in contact yet. What was added stays while it carries
-//! force.
+//! An active set: a search passes over the nodes in the obstacle, a part of them in each step, and adds those that are deeper than
+//! the tolerance. They stay while they carry force or are within the tolerance.
 
 use super::obstacle::ObstacleQuery;
 use crate::collision::contact::{Contact, FeatureId};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
-use crate::collision::node_cache::NodePositionCache;
 use crate::collision::parameters::COLLISION;
 use crate::response::{ContactLocation, Footprint};
 use crate::surface::Traversal;
 use glam::DVec3;
 
 impl ObstacleQuery<'_> {
-    /// Keep the finer samples among the known contacts, and search on; `detail` is the index of the level of detail, `first` that of
+    /// Keep the nodes among the known contacts, and search on; `detail` is the index of the level of detail, `first` that of
     /// the first candidate against the obstacle.
     ///
     /// # Real time
-    /// Costs the finer samples, and a limited number of visits.
+    /// Costs the nodes that were added, and a limited number of visits.
     pub(super) fn refine(
         &self,
         context: &mut CollisionContext,
@@ -29,29 +27,30 @@ impl ObstacleQuery<'_> {
     ) {
         let max_added = context.scene.max_contact_samples.saturating_mul(2);
         let CollisionWorkspace { positions, near_nodes, candidates, .. } = &mut *context.workspace;
+        let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
         let mut added = 0;
         for contact in known {
-            let Some(level) = contact.id.feature.level().filter(|level| *level < self.level) else {
+            if !matches!(contact.id.feature, FeatureId::Node(_)) {
                 continue;
-            };
+            }
             let point = self.own.points.of(contact.slot);
-            debug_assert_eq!(point.location.footprint, self.body.footprint_at_level(level));
             let position = point.rest + point.state.displacement;
             let height = self.body.smooth_height(&point.location);
-            if contact.force != DVec3::ZERO || self.distance(position, height) < height {
+            if contact.force != DVec3::ZERO || self.distance(position, height + depth) < height + depth {
                 self.meet(candidates, position, point.rest + point.free, point.location, contact.id.feature);
                 added += 1;
             }
         }
         // Nodes that are too deep.
         let cache = &mut positions[self.object];
-        let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
         let search = &mut context.levels[detail].search;
         if search.is_finished() {
             *search = Traversal::START;
         }
         near_nodes.clear();
-        let mut surface = self.surface(0, cache, context.step);
+        let moment = SurfaceTime::StepStart(context.step);
+        let (response, points) = (&self.own.response, &self.own.points);
+        let mut surface = DeformedSurface::new(self.body, Footprint::Point, response, points, cache, moment);
         let residual = surface.max_residual();
         surface.clear_marks();
         surface.resume_traversal(
@@ -72,42 +71,15 @@ impl ObstacleQuery<'_> {
                 }
             },
         );
-        for node in near_nodes.iter().map(|&node| node as usize) {
-            if added >= max_added {
-                return;
+        for node in near_nodes.iter().map(|&node| node as usize).take(max_added.saturating_sub(added)) {
+            let feature = FeatureId::of_node(0, node);
+            if candidates.list[first..].iter().any(|candidate| candidate.id.feature == feature) {
+                continue;
             }
-            for level in (0..self.level).rev() {
-                let Some(sample) = self.body.nearest_sample(level, node) else { continue };
-                let feature = FeatureId::of_node(level, sample);
-                if candidates.list[first..].iter().any(|candidate| candidate.id.feature == feature) {
-                    continue;
-                }
-                let mut surface = self.surface(level, cache, context.step);
-                let (from, to) = (surface.position(sample), surface.predicted_position(sample));
-                let footprint = self.body.footprint_at_level(level);
-                if self.gap(from, (footprint, sample), 0.0) >= 0.0 {
-                    continue;
-                }
-                let location = ContactLocation { point: self.body.node_point(footprint, sample), footprint };
-                let before = candidates.list.len();
-                self.meet(candidates, from, to, location, feature);
-                if candidates.list.len() > before {
-                    added += 1;
-                    break;
-                }
-            }
+            let (from, to) = (surface.position(node), surface.predicted_position(node));
+            let footprint = Footprint::Point;
+            let location = ContactLocation { point: self.body.node_point(footprint, node), footprint };
+            self.meet(candidates, from, to, location, feature);
         }
-    }
-
-    /// Surface of the object at a level of detail, at the start of the step.
-    fn surface<'s>(
-        &'s self,
-        level: usize,
-        cache: &'s mut NodePositionCache,
-        step: u64,
-    ) -> DeformedSurface<'s> {
-        let footprint = self.body.footprint_at_level(level);
-        let moment = SurfaceTime::StepStart(step);
-        DeformedSurface::new(self.body, footprint, &self.own.response, &self.own.points, cache, moment)
     }
 }
