@@ -221,7 +221,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "built-in-scenes",
-        about: "built-in scenes for ten minutes alone, and for minutes with random pointers: in reach, in shape, energies in order",
+        about: "built-in scenes for a minute alone, and for one with random pointers: in reach, in shape, energies in order",
         compute: built_in_scenes::built_in_scenes,
     },
     Case {
