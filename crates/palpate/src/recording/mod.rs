@@ -12,6 +12,7 @@ pub use metadata::{
     Certificate, CertificateEvent, CertificateLevel, Damping, MassProperties, Material, MeshCounts, Metadata,
     PeakForceError, Provenance, Support,
 };
+pub(crate) use residual::block_at;
 pub use residual::{NearField, ResidualCompliance};
 
 use crate::error::{Error, RecordingError, RecordingPart};

@@ -137,10 +137,7 @@ impl NearField {
     }
 
     fn block(&self, at: usize) -> DMat3 {
-        let b = &self.blocks[9 * at..9 * at + 9];
-        let row =
-            |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
-        DMat3::from_cols(row(0), row(1), row(2)).transpose()
+        block_at(&self.blocks, at)
     }
 
     /// Wendland's function ψ at the ratio s ≥ 0 of distance and radius [1].
@@ -151,4 +148,11 @@ impl NearField {
         let square = (1.0 - s) * (1.0 - s);
         square * square * (4.0 * s + 1.0)
     }
+}
+
+/// Block of a list of blocks, each row by row.
+pub(crate) fn block_at(blocks: &[f32], at: usize) -> DMat3 {
+    let b = &blocks[9 * at..9 * at + 9];
+    let row = |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
+    DMat3::from_cols(row(0), row(1), row(2)).transpose()
 }

@@ -15,7 +15,7 @@
 //!
 //! Equations: docs/theory.md (C59), (C60).
 
-use crate::recording::{NearField, Recording, ResidualCompliance};
+use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
 use crate::surface::{EDGE_COSINE, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -252,16 +252,10 @@ impl PatchNodeCompliance {
         out
     }
 
-    fn block(&self, at: usize) -> DMat3 {
-        let b = &self.blocks[9 * at..9 * at + 9];
-        let row =
-            |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
-        DMat3::from_cols(row(0), row(1), row(2)).transpose()
-    }
-
     /// Blocks of a patch's row, with their nodes.
     fn row(&self, patch: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
-        (self.offsets[patch]..self.offsets[patch + 1]).map(|at| (self.nodes[at] as usize, self.block(at)))
+        (self.offsets[patch]..self.offsets[patch + 1])
+            .map(|at| (self.nodes[at] as usize, block_at(&self.blocks, at)))
     }
 
     /// Displacement of a patch per force at a node [m/N].
@@ -270,10 +264,10 @@ impl PatchNodeCompliance {
     pub(super) fn between(&self, patch: usize, node: usize) -> DMat3 {
         let (first, end) = (self.offsets[patch], self.offsets[patch + 1]);
         if end - first == self.node_count {
-            return self.block(first + node);
+            return block_at(&self.blocks, first + node);
         }
         match self.nodes[first..end].binary_search(&(node as u32)) {
-            Ok(at) => self.block(first + at),
+            Ok(at) => block_at(&self.blocks, first + at),
             Err(_) => DMat3::ZERO,
         }
     }

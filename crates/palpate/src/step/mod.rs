@@ -269,18 +269,14 @@ fn set_up_constraints(model: &Model, state: &mut State) {
             OtherSide::Obstacle { start, .. } | OtherSide::Clamp { start, .. } => start,
             OtherSide::Object { number, slot } => at(number, slot),
         };
-        if let (true, OtherSide::Device(number)) = (contact.is_held(), contact.other) {
-            if contact.is_new {
+        if contact.is_held() {
+            if let (true, OtherSide::Device(number)) = (contact.is_new, contact.other) {
                 // The hand takes the point where it is.
                 let (parameters, h) = (&model.parameters.devices[number], model.parameters.step_s);
                 let device = &mut devices[number];
                 device.activate(at(contact.object(), contact.slot));
                 device.begin(parameters, h, device.target);
             }
-            workspace.constraints.push(Constraint::default());
-            continue;
-        }
-        if contact.is_held() {
             workspace.constraints.push(Constraint::default());
             continue;
         }
