@@ -11,7 +11,7 @@ use crate::solve_error::SolveError;
 use crate::transient::{Transient, TransientState, resolved_frequency_hz};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, Par};
-use palpate::{Damping, OscillatorState, ResidualCompliance, SampledOscillator, Sampling};
+use palpate::{Damping, OscillatorState, ResidualCompliance, SampledOscillator, SampledResidual, Sampling};
 use rayon::prelude::*;
 
 /// Parameters of a table.
@@ -94,7 +94,7 @@ struct ClosedForm {
     surface_index: Vec<Option<u32>>,
     /// Whether interior nodes are observed.
     observes_interior: bool,
-    /// Response of the residual compliance in each sample, as a share of it: (1 − e)·eˢ.
+    /// Response of the residual compliance in each sample, as a share of it.
     residual_shares: Vec<f64>,
 }
 
@@ -312,12 +312,18 @@ impl ClosedForm {
         let is_interior = |node: &u32| surface_index[*node as usize].is_none();
         let observes_interior = parameters.observed_nodes.iter().any(is_interior);
         let highest = modes.squares.last().map_or(f64::INFINITY, |square| square.sqrt());
-        let decay = damping.residual_decay(highest, evaluation_interval_s(parameters));
+        let relaxation_s = damping.residual_relaxation_s(highest);
+        let residual = SampledResidual::new(relaxation_s, evaluation_interval_s(parameters));
         let mut residual_shares = vec![0.0; parameters.samples];
-        let mut share = 0.0;
-        for evaluation in 0..parameters.samples * evaluations {
-            share = decay * share + if evaluation < evaluations { 1.0 - decay } else { 0.0 };
-            residual_shares[evaluation / evaluations] += share / evaluations as f64;
+        if evaluations == 1 {
+            residual_shares.iter_mut().enumerate().for_each(|(s, share)| *share = residual.share(s));
+        } else {
+            // A mean over the step does not lead: nothing is extrapolated to its end.
+            let (decay, mut share) = (residual.decay(), 0.0);
+            for evaluation in 0..parameters.samples * evaluations {
+                share = decay * share + if evaluation < evaluations { 1.0 - decay } else { 0.0 };
+                residual_shares[evaluation / evaluations] += share / evaluations as f64;
+            }
         }
         Self { modal_responses, observed, surface_index, observes_interior, residual_shares }
     }

@@ -8,7 +8,7 @@
 //! Input is the work Σ f·Δx [J] of the other sides of the object's contacts, in world coordinates: devices, obstacles, other
 //! objects; for a scene, of devices and obstacles. Friction and impact are the energies that contacts dissipate across and
 //! along their normals. Dissipated is the energy loss of modal damping (a quadratic form, `response::oscillator`) and of the
-//! residual spring when its force jumps, at least ½·Δfᵀ·S·Δf. The defect is the imbalance of these terms: round-off of the
+//! residual compliance (`response::sampled_residual`). The defect is the imbalance of these terms: round-off of the
 //! solver and of the sums; with the paper's update also the error of semi-implicit Euler.
 //!
 //! Equations: docs/theory.md (C47), (C48).
@@ -20,7 +20,7 @@ pub struct EnergyLedger {
     pub kinetic: f64,
     /// Elastic energy of the modes [J].
     pub elastic: f64,
-    /// Elastic energy of the residual compliance [J], ½·fᵀ·S·f.
+    /// Elastic energy of the residual compliance [J], ½·fᵀ·S·f under constant forces.
     pub residual: f64,
     /// Potential energy in the gravity field [J]; 0 at the world's origin.
     pub potential: f64,

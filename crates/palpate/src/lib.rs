@@ -25,7 +25,7 @@
 //!   [`MassProperties`], [`Provenance`], and the [`Certificate`] of a [`CertificateEvent`] and of [`CertificateLevel`]s.
 //! - **Table.** [`ImpulseResponse`] of the paper, with its [`Sampling`] and [`ImpulseColumns`] ([`Column`],
 //!   [`ColumnsInMemory`]).
-//! - **Modes.** [`SampledOscillator`] and [`OscillatorState`].
+//! - **Modes.** [`SampledOscillator`] and [`OscillatorState`]; [`SampledResidual`].
 //! - **Errors.** [`Error`] with the kinds of [`RecordingError`] ([`RecordingPart`]) and [`ModelError`].
 //!
 //! # Conventions
@@ -85,7 +85,7 @@ pub use recording::{
     GravityResponse, ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata,
     ModalBasis, NearField, PeakForceError, Provenance, Recording, ResidualCompliance, Sampling, Support,
 };
-pub use response::{OscillatorState, ResponseForm, SampledOscillator};
+pub use response::{OscillatorState, ResponseForm, SampledOscillator, SampledResidual};
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};
 pub use snapshot::{DeformationSnapshot, ResidualFieldCache};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};

@@ -3,7 +3,7 @@
 use crate::bounded_vec::BoundedVec;
 use crate::clamp::ClampState;
 use crate::collision::{CollisionScene, CollisionWorkspace, Contact, LevelOfDetail};
-use crate::contact::{Constraint, Solver};
+use crate::contact::{Constraint, RecoveryBudget, Solver};
 use crate::device::DeviceState;
 use crate::energy::EnergyLedger;
 use crate::io::{ClampOutput, DeviceOutput, ObjectOutput, Output, StepStatus};
@@ -48,6 +48,7 @@ pub struct State {
     pub(crate) levels: Vec<LevelOfDetail>,
     /// Energy of the virtual couplings.
     pub(crate) couplings: EnergyLedger,
+    pub(crate) recovery: RecoveryBudget,
     pub(crate) workspace: Workspace,
     pub(crate) output: Output,
 }
@@ -98,6 +99,7 @@ impl State {
             contacts: BoundedVec::new(contacts),
             levels: vec![LevelOfDetail::default(); count * (obstacles.len() + count)],
             couplings: EnergyLedger::default(),
+            recovery: RecoveryBudget::default(),
             workspace: Workspace {
                 collision: CollisionWorkspace::new(model.collision_scene(), contacts),
                 solver: Solver::new(

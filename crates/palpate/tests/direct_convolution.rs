@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 const H: f64 = 1e-3;
 
-/// R[s] = Φ·g(s)·Φᵀ + (1 − e)·eˢ·S of a recording's own modes, e = exp(−h/τ).
+/// R[s] = Φ·g(s)·Φᵀ + ((1 − e)·eˢ + c·(δ₀ − δ₁))·S of a recording's own modes, e = exp(−h/τ), c = ½·(1 + e)/(1 − e) − τ/h.
 fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
     let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
     let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
@@ -31,26 +31,37 @@ fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse 
         })
         .collect();
     let row = |dof: usize| recording.modes.row(dof / 3, dof % 3);
-    // Column under modal forces, with an additional displacement that decays from sample to sample.
-    let respond = |forces: &[f64], first: &dyn Fn(usize) -> f64, decay: f64| -> Vec<f64> {
+    // Column under modal forces, with an additional displacement times a share per sample.
+    let respond = |forces: &[f64], beyond: &dyn Fn(usize) -> f64, share: &dyn Fn(usize) -> f64| -> Vec<f64> {
         let mut column = Vec::with_capacity(samples * dofs);
         for (s, responses) in responses.iter().enumerate() {
             for i in 0..dofs {
                 let modal: f64 = (0..m).map(|k| row(i)[k] * responses[k] * forces[k]).sum();
-                column.push(modal + first(i) * decay.powi(s as i32));
+                column.push(modal + beyond(i) * share(s));
             }
         }
         column
     };
-    let decay = (-step_s / recording.residual_relaxation_s()).exp();
+    let relaxation = recording.residual_relaxation_s() / step_s;
+    let decay = (-1.0 / relaxation).exp();
+    let lead = 0.5 * (1.0 + decay) / (1.0 - decay) - relaxation;
+    let share = |s: usize| {
+        let last = match s {
+            0 => lead,
+            1 => -lead,
+            _ => 0.0,
+        };
+        (1.0 - decay) * decay.powi(s as i32) + last
+    };
     let residual = |i: usize, j: usize| recording.residual.block(i / 3, j / 3).col(j % 3)[i % 3];
-    let columns = (0..dofs).flat_map(|j| respond(row(j), &|i| (1.0 - decay) * residual(i, j), decay));
+    let columns = (0..dofs).flat_map(|j| respond(row(j), &|i| residual(i, j), &share));
     let values: Vec<f64> = columns.collect();
     let gravity = recording.gravity.as_ref().map(|gravity| {
         let along = |axis: usize| {
             let unit = DVec3::from_array(std::array::from_fn(|a| f64::from(u8::from(a == axis))));
             let forces = &gravity.modal_forces[axis * m..(axis + 1) * m];
-            respond(forces, &|i| gravity.residual_displacement(i / 3, unit)[i % 3], 0.0)
+            let sag = |i: usize| gravity.residual_displacement(i / 3, unit)[i % 3];
+            respond(forces, &sag, &|s| f64::from(u8::from(s == 0)))
         };
         (0..3).flat_map(along).collect()
     });

@@ -45,7 +45,7 @@ const SMALL_DISPLACEMENT: f64 = 1e-2;
 const NOT_ROUND_OFF_M: f64 = 1e-9;
 
 /// Share of the work that semi-implicit Euler leaves as a defect [1]: first order in the step, so neither round-off nor all of it.
-const FIRST_ORDER_DEFECT: Range<f64> = 1e-6..0.1;
+const FIRST_ORDER_DEFECT: Range<f64> = 1e-6..0.3;
 
 /// A grasp within a triangle.
 fn grasp(object: usize, triangle: u32) -> Grasp {

@@ -3,7 +3,7 @@
 use super::{EVENT, displacement, oscillator};
 use crate::krylov::LoadedMode;
 use glam::{DMat3, DVec3};
-use palpate::{Damping, OscillatorState};
+use palpate::{Damping, OscillatorState, SampledResidual};
 
 /// Error of the dynamic compliance that ends the bandwidth, as a share of the static compliance.
 const BANDWIDTH_TOLERANCE: f64 = 0.05;
@@ -61,9 +61,8 @@ impl Response {
 
     /// Instantaneous compliance R[0] of the recording [m/N].
     pub fn modelled_instantaneous(&self, damping: Damping) -> DMat3 {
-        let decay = self.residual_decay(damping);
         Self::sum(&self.kept, |m| oscillator(m.square, damping, EVENT.step_s).instantaneous_compliance())
-            + self.residual * (1.0 - decay)
+            + self.residual * self.sampled_residual(damping).share(0)
     }
 
     /// Relaxation time of the residual compliance [s].
@@ -71,9 +70,9 @@ impl Response {
         self.kept.last().map_or(0.0, |highest| damping.residual_relaxation_s(highest.square.sqrt()))
     }
 
-    /// Factor by which the displacement of the residual compliance decays in a step.
-    fn residual_decay(&self, damping: Damping) -> f64 {
-        self.kept.last().map_or(0.0, |highest| damping.residual_decay(highest.square.sqrt(), EVENT.step_s))
+    /// Residual compliance at the event's step.
+    fn sampled_residual(&self, damping: Damping) -> SampledResidual {
+        SampledResidual::new(self.residual_relaxation_s(damping), EVENT.step_s)
     }
 
     /// Frequency [Hz] up to which the truncated modes respond quasi-statically. The kept modes are equal in both models.
@@ -121,15 +120,18 @@ impl Response {
             .collect();
         let compliance = if all { self.instantaneous(damping) } else { self.modelled_instantaneous(damping) };
         let inverse = compliance.inverse();
-        let decay = if all { 0.0 } else { self.residual_decay(damping) };
-        let mut residual = DVec3::ZERO;
+        let sampled = self.sampled_residual(damping);
+        let residual = if all { DMat3::ZERO } else { self.residual };
+        // Displacements by the relaxed force and by that of the last step.
+        let [mut relaxed, mut held] = [DVec3::ZERO; 2];
         (1..=steps)
             .map(|step| {
                 let target = axis * displacement(step as f64 * EVENT.step_s);
                 let free: DVec3 =
                     modes.iter().map(|(map, gain, state)| *gain * map.advance(*state, 0.0).q).sum();
-                let force = inverse * (target - free - residual * decay);
-                residual = residual * decay + self.residual * force * (1.0 - decay);
+                let force = inverse * (target - free - relaxed * sampled.decay() + held * sampled.lead());
+                held = residual * force;
+                relaxed = relaxed * sampled.decay() + held * (1.0 - sampled.decay());
                 for (map, gain, state) in &mut modes {
                     *state = map.advance(*state, gain.dot(force));
                 }

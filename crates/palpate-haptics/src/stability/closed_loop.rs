@@ -4,7 +4,7 @@ use super::discrete_oscillator::DiscreteOscillator;
 use super::point_response::PointResponse;
 use crate::device::{DeviceSpec, Hand};
 use num_complex::Complex64;
-use palpate::Coupling;
+use palpate::{Coupling, SampledResidual};
 use std::f64::consts::{PI, TAU};
 
 /// Slowest growth that counts as unstable: by a factor e in this time [s]. The circle is wider than 1 accordingly.
@@ -74,9 +74,9 @@ struct Sample {
 pub struct ClosedLoop {
     timing: LoopTiming,
     body: Vec<(DiscreteOscillator, f64)>,
-    /// Residual compliance [m/N], and its decay in a step.
+    /// Residual compliance [m/N], and how it is sampled.
     residual: f64,
-    residual_decay: f64,
+    sampled_residual: SampledResidual,
     device: DiscreteOscillator,
     /// Mobility of device and hand, 1/mass [1/kg].
     mobility: f64,
@@ -94,7 +94,7 @@ impl ClosedLoop {
             timing,
             body: point.discrete_oscillators(timing.step_s),
             residual: point.residual(),
-            residual_decay: point.residual_decay(timing.step_s),
+            sampled_residual: point.sampled_residual(timing.step_s),
             device: DiscreteOscillator::mass(mass, hand.stiffness_n_m, damping, timing.step_s),
             mobility: 1.0 / mass,
             samples: Vec::new(),
@@ -256,7 +256,8 @@ impl ClosedLoop {
         let w = Complex64::from_polar(1.0 / (1.0 + step_s / SLOWEST_GROWTH_S), -angle);
         let elastic: Complex64 = self.body.iter().map(|(map, gain)| map.response(w) * *gain).sum();
         let device = self.device.response(w) * self.mobility * w.powu(1 + delay_updates);
-        let residual = self.residual * (1.0 - self.residual_decay) / (1.0 - self.residual_decay * w);
+        let (decay, lead) = (self.sampled_residual.decay(), self.sampled_residual.lead());
+        let residual = self.residual * ((1.0 - decay) / (1.0 - decay * w) + lead * (1.0 - w));
         Sample { angle, w, body: elastic + residual, device }
     }
 

@@ -1,7 +1,7 @@
 //! Driving-point response of an object at a point of its surface, along a direction n.
 //!
 //! ```text
-//! C(z) = Σᵢ φᵢ²·gᵢ(z) + s·(1 − e)/(1 − e/z) + m·g₀(z)
+//! C(z) = Σᵢ φᵢ²·gᵢ(z) + s·((1 − e)/(1 − e/z) + c·(1 − 1/z)) + m·g₀(z)
 //! φ = nᵀ·J·Φ,  s = nᵀ·J·S·Jᵀ·n,  m = 1/M + (r×n)ᵀ·I⁻¹·(r×n),  e = exp(−h/τ)
 //! ```
 //!
@@ -11,7 +11,7 @@
 
 use super::discrete_oscillator::DiscreteOscillator;
 use glam::DVec3;
-use palpate::{Recording, Support, Surface, SurfacePoint};
+use palpate::{Recording, SampledResidual, Support, Surface, SurfacePoint};
 
 /// Driving-point response at a point of an object's surface, along a direction.
 #[derive(Debug, Clone)]
@@ -65,7 +65,7 @@ impl PointResponse {
             .iter()
             .map(|(map, gain)| gain * map.instantaneous_compliance())
             .sum::<f64>()
-            + self.residual * (1.0 - self.residual_decay(step_s))
+            + self.residual * self.sampled_residual(step_s).share(0)
     }
 
     /// Static compliance [m/N], without rigid motion.
@@ -78,9 +78,9 @@ impl PointResponse {
         self.residual
     }
 
-    /// Factor e by which the displacement of the residual compliance decays in a step [s].
-    pub fn residual_decay(&self, step_s: f64) -> f64 {
-        if self.relaxation_s > 0.0 { (-step_s / self.relaxation_s).exp() } else { 0.0 }
+    /// Residual compliance at a step [s].
+    pub fn sampled_residual(&self, step_s: f64) -> SampledResidual {
+        SampledResidual::new(self.relaxation_s, step_s)
     }
 
     /// Oscillators: ω [rad/s], ζ and gain φ² [1/kg] of every mode, and of the rigid motion with ω = 0.

@@ -17,16 +17,17 @@ const DROP: f64 = 0.05;
 /// Time before the second contact [s].
 const FIRST_JUMP: f64 = 0.29;
 
-/// Steps, and by how much 200 modes + S may miss the rebound of 24.5 mm. The shorter the step, the more the inertia of the modes
-/// counts that S leaves out: at 0.5 ms they are 2.1 % low, by the modes and not by the contact solver, as
-/// `second_algorithm` shows, and at 0.25 ms 2.8 %. With 1200 modes it is 0.5 % at most (`bounce_many_modes`).
-const STEPS_OF_200_MODES: [(&str, f64, f64); 4] =
-    [("2 ms", 2e-3, REBOUND), ("1 ms", 1e-3, REBOUND), ("0.5 ms", 5e-4, 0.03), ("0.25 ms", 2.5e-4, 0.03)];
+/// Steps of the rebound of 24.5 mm.
+const STEPS: [(&str, f64); 4] = [("2 ms", 2e-3), ("1 ms", 1e-3), ("0.5 ms", 5e-4), ("0.25 ms", 2.5e-4)];
 
-/// Tolerance against the solution with all modes: 200 modes + S are 1.0 % off at 1 ms.
-const UNREDUCED: f64 = 0.015;
+/// Tolerance of heights against the solution with all modes: 200 modes + S are 0.6 % off at 1 ms.
+const UNREDUCED: f64 = 0.01;
 
-/// Tolerance of the rebound at other steps, where the modes suffice.
+/// Tolerance of the energy, vibrations included: the residual compliance loses a quarter of the second difference of a force, squared, and in the blow forces
+/// change from step to step: 2.5 % at 1 ms, 0.1 % at 2 ms.
+const ENERGY: f64 = 0.03;
+
+/// Tolerance of the rebound at other steps.
 const REBOUND: f64 = 0.02;
 
 /// Tolerance of the two algorithms, which solve the same problem: where contacts open and close the runtime leaves them violated by a
@@ -91,11 +92,11 @@ pub fn bounce() -> Result<Vec<Check>, VerifyError> {
             format!("energy at {name} after the first jump [J]"),
             own.energies[last],
             energies[last],
-            UNREDUCED,
+            ENERGY,
         ));
     }
-    for (name, step_s, tolerance) in STEPS_OF_200_MODES {
-        checks.extend(steps(&cube, name, step_s, tolerance)?);
+    for (name, step_s) in STEPS {
+        checks.extend(steps(&cube, name, step_s)?);
     }
     let (ours, theirs) = (fall(&cube, 5e-4, FIRST_JUMP)?, second_algorithm(&cube, 5e-4, FIRST_JUMP));
     let quantity = "rebound at 0.5 ms against a second algorithm [m]";
@@ -105,10 +106,10 @@ pub fn bounce() -> Result<Vec<Check>, VerifyError> {
 }
 
 /// Rebound at a step, and the invariants of the run.
-fn steps(cube: &Arc<Recording>, name: &str, step_s: f64, tolerance: f64) -> Result<Vec<Check>, VerifyError> {
+fn steps(cube: &Arc<Recording>, name: &str, step_s: f64) -> Result<Vec<Check>, VerifyError> {
     let own = fall(cube, step_s, FIRST_JUMP)?;
     let quantity = format!("rebound at {name} against 24.5 mm [m]");
-    let mut checks = vec![Check::new(quantity, rebound(&own.heights), UNREDUCED_REBOUND_M, tolerance)];
+    let mut checks = vec![Check::new(quantity, rebound(&own.heights), UNREDUCED_REBOUND_M, REBOUND)];
     checks.extend(own.invariants.checks(name));
     Ok(checks)
 }
@@ -117,8 +118,8 @@ fn steps(cube: &Arc<Recording>, name: &str, step_s: f64, tolerance: f64) -> Resu
 pub fn bounce_many_modes() -> Result<Vec<Check>, VerifyError> {
     let cube = PAPER_MATERIAL.free_body(paper_cube::mesh(CELLS)?, ElementOrder::Linear, 1200)?;
     let mut checks = Vec::new();
-    for (name, step_s) in [("2 ms", 2e-3), ("1 ms", 1e-3), ("0.5 ms", 5e-4), ("0.25 ms", 2.5e-4)] {
-        checks.extend(steps(&cube, name, step_s, REBOUND)?);
+    for (name, step_s) in STEPS {
+        checks.extend(steps(&cube, name, step_s)?);
     }
     Ok(checks)
 }
@@ -138,20 +139,27 @@ fn second_algorithm(recording: &Recording, step_s: f64, seconds: f64) -> Vec<f64
     let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
     let oscillators: Vec<_> = pairs.map(|(&w, &z)| SampledOscillator::new(w, z, step_s)).collect();
     let n = low.len();
-    let mut w = vec![vec![0.0; n]; n];
+    let (mut w, mut s) = (vec![vec![0.0; n]; n], vec![vec![0.0; n]; n]);
+    let relaxation = recording.residual_relaxation_s() / step_s;
+    let decay = (-1.0 / relaxation).exp();
+    let lead = 0.5 * (1.0 + decay) / (1.0 - decay) - relaxation;
     for i in 0..n {
         for j in 0..n {
             let mut bent = oscillators.iter().zip(row(j)).map(|(o, phi)| o.instantaneous_compliance() * phi);
-            let residual = recording.residual.block(low[i], low[j]).y_axis.y;
-            w[i][j] = dot(row(i), &mut bent) + residual + 0.5 * step_s * step_s / mass;
+            s[i][j] = recording.residual.block(low[i], low[j]).y_axis.y;
+            let share = 1.0 - decay + lead;
+            w[i][j] = dot(row(i), &mut bent) + share * s[i][j] + 0.5 * step_s * step_s / mass;
         }
     }
     let mut q = vec![OscillatorState { q: 0.0, v: 0.0 }; count];
-    let (mut height, mut speed, mut forces) = (DROP, 0.0, vec![0.0; n]);
+    let (mut height, mut speed, mut forces, mut relaxed) = (DROP, 0.0, vec![0.0; n], vec![0.0; n]);
     let run = (0..(seconds / step_s).round() as usize).map(|_| {
         let free: Vec<_> = oscillators.iter().zip(&q).map(|(o, q)| o.advance(*q, 0.0).q).collect();
         let fallen = height + step_s * speed - 0.5 * step_s * step_s * GRAVITY_M_S2;
-        let gaps: Vec<f64> = (0..n).map(|i| fallen + dot(row(i), &mut free.iter().copied())).collect();
+        let effective = |i: usize| decay * relaxed[i] - lead * forces[i];
+        let residual = |i: usize| dot(&s[i], &mut (0..n).map(effective));
+        let gap = |i: usize| fallen + dot(row(i), &mut free.iter().copied()) + residual(i);
+        let gaps: Vec<f64> = (0..n).map(gap).collect();
         if gaps.iter().all(|gap| *gap > 0.0) {
             forces.fill(0.0);
         } else {
@@ -171,6 +179,9 @@ fn second_algorithm(recording: &Recording, step_s: f64, seconds: f64) -> Vec<f64
         for (mode, q) in q.iter_mut().enumerate() {
             let push = (0..n).map(|i| row(i)[mode] * forces[i]).sum();
             *q = oscillators[mode].advance(*q, push);
+        }
+        for (relaxed, force) in relaxed.iter_mut().zip(&forces) {
+            *relaxed = decay * *relaxed + (1.0 - decay) * force;
         }
         let acceleration = forces.iter().sum::<f64>() / mass - GRAVITY_M_S2;
         height += step_s * speed + 0.5 * step_s * step_s * acceleration;

@@ -130,13 +130,7 @@ fn roll(
 pub fn rolling_ball() -> Result<Vec<Check>, VerifyError> {
     const FRICTION: f64 = 0.1;
     const SPEED: f64 = 0.3;
-    /// Of pivot friction, and of what friction takes.
     const ALLOWED: f64 = 0.05;
-    /// Speed and energy that a ball without damping loses where it rolls: nodes that come and go lose the jumps of their forces in
-    /// the residual compliance, a spring without mass.
-    const SLID: f64 = 0.07;
-    const ROLLED: f64 = 0.16;
-    const LOST: f64 = 0.2;
     let ball = FOAM.free_body(ball_mesh(RADIUS, LAYERS)?, ElementOrder::Quadratic, MODES)?;
     let damped = with_stiffness_damping(&ball, 4e-3);
     // Mass and inertia of the continuum: those of the mesh, whose chords cut a part off, are 1 % smaller.
@@ -154,13 +148,13 @@ pub fn rolling_ball() -> Result<Vec<Check>, VerifyError> {
         let mut invariants = RunInvariants::default();
         let rolling = roll(&ball, SPEED, samples, &mut invariants)?;
         let quantity = format!("{name}: speed of a ball that slid with 0.3 m/s and rolls [m/s]");
-        checks.push(Check::new(quantity, rolling.speeds[0], 5.0 / 7.0 * SPEED, SLID));
+        checks.push(Check::new(quantity, rolling.speeds[0], 5.0 / 7.0 * SPEED, ALLOWED));
         let quantity = format!("{name}: energy that friction takes until then, of all [1]");
         checks.push(Check::new(quantity, rolling.friction / rolling.kinetic, 2.0 / 7.0, ALLOWED));
         let quantity = format!("{name}: speed after 2 s of rolling [m/s]");
-        checks.push(Check::new(quantity, rolling.speeds[1], rolling.speeds[0], ROLLED));
+        checks.push(Check::new(quantity, rolling.speeds[1], rolling.speeds[0], ALLOWED));
         let quantity = format!("{name}: energy lost in 2 s of rolling, of all [1]");
-        checks.push(Check::new(quantity, rolling.lost / rolling.kinetic, 0.0, LOST));
+        checks.push(Check::new(quantity, rolling.lost / rolling.kinetic, 0.0, ALLOWED));
         checks.extend(invariants.checks(&format!("{name}, rolling")));
     }
     Ok(checks)

@@ -102,10 +102,6 @@ pub(crate) struct Contact {
     pub(crate) distance: f64,
     /// Force on the object, held over the step [N, world]; before the solver, the warm start.
     pub(crate) force: DVec3,
-    /// Change of the force over the last step [N], for the warm start.
-    pub(crate) force_trend: DVec3,
-    /// Force of the last step [N], where the warm start extrapolates it.
-    pub(crate) last_force: Option<DVec3>,
 }
 
 impl Contact {

@@ -195,8 +195,7 @@ fn instantiate(
             }
         }
     };
-    let (force, last_force) =
-        before.map_or((DVec3::ZERO, None), |known| warm_start(known, candidate, is_new));
+    let force = before.map_or(DVec3::ZERO, |known| warm_start(known, candidate, is_new));
     Some(Contact {
         id: candidate.id,
         slot,
@@ -206,20 +205,13 @@ fn instantiate(
         normal: candidate.normal,
         distance: candidate.distance,
         force,
-        force_trend: DVec3::ZERO,
-        last_force,
     })
 }
 
-/// Warm start: the force of the last step extrapolated by its trend, turned with the normal, and the force that it was
-/// extrapolated from.
-fn warm_start(known: &Contact, candidate: &ContactCandidate, is_new: bool) -> (DVec3, Option<DVec3>) {
+/// Warm start: the force of the last step, turned with the normal.
+fn warm_start(known: &Contact, candidate: &ContactCandidate, is_new: bool) -> DVec3 {
     if candidate.law == ContactLaw::Bilateral {
-        return (if is_new { DVec3::ZERO } else { known.force }, None);
+        return if is_new { DVec3::ZERO } else { known.force };
     }
-    let turn = glam::DQuat::from_rotation_arc(known.normal, candidate.normal);
-    let (force, next) = (turn * known.force, turn * (known.force + known.force_trend));
-    // No further than the force can go: contacts do not pull.
-    let pulls = next.dot(candidate.normal) > 0.0;
-    if pulls || force == DVec3::ZERO { (force, None) } else { (next, Some(force)) }
+    glam::DQuat::from_rotation_arc(known.normal, candidate.normal) * known.force
 }

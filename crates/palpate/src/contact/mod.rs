@@ -6,9 +6,11 @@ mod coulomb;
 mod islands;
 mod parameters;
 mod problem;
+mod recovery;
 mod solver;
 
 pub(crate) use constraint::Constraint;
 pub(crate) use parameters::{SOLVER, UNSOLVED};
 pub(crate) use problem::{ContactProblem, StepRules};
+pub(crate) use recovery::RecoveryBudget;
 pub(crate) use solver::{Solver, SolverReport};

@@ -140,13 +140,6 @@ impl Damping {
             Self::Ratio(zeta) => 2.0 * zeta / highest,
         }
     }
-
-    /// Factor e = exp(−h/τ) by which the displacement of truncated modes decays in a step h [s]; see
-    /// [`Self::residual_relaxation_s`].
-    pub fn residual_decay(&self, highest: f64, step_s: f64) -> f64 {
-        let relaxation = self.residual_relaxation_s(highest);
-        if relaxation > 0.0 { libm::exp(-step_s / relaxation) } else { 0.0 }
-    }
 }
 
 /// Size of the finite element model.

@@ -137,12 +137,6 @@ impl Recording {
         highest.map_or(0.0, |highest| self.metadata.damping.residual_relaxation_s(*highest))
     }
 
-    /// Factor by which the displacement of the residual compliance decays in a step [s], see [`Damping::residual_decay`].
-    pub fn residual_decay(&self, step_s: f64) -> f64 {
-        let highest = self.modes.angular_frequencies.last();
-        highest.map_or(0.0, |highest| self.metadata.damping.residual_decay(*highest, step_s))
-    }
-
     /// Mass [kg] of the body.
     pub fn mass(&self) -> f64 {
         self.metadata.mass.mass_kg

@@ -1,7 +1,6 @@
 //! Residual compliance S: static compliance of the modes that are not kept.
 //!
-//! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. It acts within
-//! a step only, as a massless spring. Whole for small surfaces; for large ones its near field
+//! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. Whole for small surfaces; for large ones its near field
 //! S ∘ ψ(|xᵢ − xⱼ|/r), with Wendland's function ψ(s) = (1 − s)⁴(4s + 1) for s < 1, 0 beyond. ψ
 //! is positive definite in space, so by Schur's product theorem the near field is positive
 //! semi-definite too, and its diagonal is exact (Wendland 1995, Adv. Comput. Math. 4, 389).

@@ -5,8 +5,9 @@
 use super::dot_products::{dot3, dot3_single};
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
-use super::residual_kernel::{FactoredForce, ResidualKernel};
+use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
+use super::sampled_residual::{ResidualMemory, SampledResidual};
 use crate::recording::Recording;
 use crate::surface::{
     Bands, Bounds, Cell, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals,
@@ -42,31 +43,49 @@ pub(crate) struct LocationState {
     pub(crate) residual: DVec3,
     /// Part by the body's weight beyond the modes; constant, since only bodies with fixed nodes have one.
     pub(crate) sag: DVec3,
+    /// Displacements by every part of the residual compliance's state.
+    pub(crate) memory: ResidualMemory,
 }
 
-/// Force g in the springs of the residual compliance at a location (see `modal`).
+/// Force of the residual compliance at a location.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SpringForce {
     pub(crate) location: ContactLocation,
-    /// Force [N, body].
+    /// Memory of the forces there, and the force whose static displacement they have [N, body].
+    pub(super) memory: ResidualMemory,
     pub(crate) force: DVec3,
     /// Rest position [m, body].
     pub(crate) rest: DVec3,
-    /// Factored force of a patch that is no contact sample.
-    factored: FactoredForce,
+    /// Factor Aᵀ of a patch that is no contact sample [√(m/N)], and Aᵀ·force [√J].
+    factor: DMat3,
+    factored: DVec3,
 }
 
 impl SpringForce {
-    /// Multiply the force.
+    /// Multiply the memory.
     pub(super) fn scale(&mut self, factor: f64) {
+        self.memory.scale(factor);
         self.force *= factor;
-        self.factored.value *= factor;
+        self.factored *= factor;
     }
 
-    /// Add another force at the same location.
+    /// Add another memory at the same location.
     pub(super) fn add(&mut self, other: &Self) {
+        self.memory.add(&other.memory);
         self.force += other.force;
-        self.factored.value += other.factored.value;
+        self.factored += other.factored;
+    }
+
+    /// Whether the contact has left this location.
+    pub(crate) fn is_left(&self) -> bool {
+        self.memory.held == DVec3::ZERO
+    }
+
+    /// Let the memory pass over a step without force.
+    pub(super) fn relax(&mut self, residual: &SampledResidual) {
+        residual.relax(&mut self.memory);
+        self.force = residual.effective(&self.memory);
+        self.factored = self.factor * self.force;
     }
 }
 
@@ -372,7 +391,7 @@ impl Body {
     ///
     /// # Real time
     /// Costs a few blocks; between samples of different levels a patch.
-    fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
+    pub(super) fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
         let is_tip = |footprint: Footprint| self.kernel(footprint).is_some();
         if is_tip(footprint) || is_tip(location.footprint) {
             return DMat3::ZERO;
@@ -409,18 +428,21 @@ impl Body {
         }
     }
 
-    /// Spring force [N, body] at a location.
+    /// Spring force at a location with the memory of its forces [N, body].
     ///
     /// # Real time
-    pub(crate) fn spring_force(&self, location: ContactLocation, force: DVec3) -> SpringForce {
+    pub(super) fn spring_force(
+        &self,
+        location: ContactLocation,
+        memory: ResidualMemory,
+        residual: &SampledResidual,
+    ) -> SpringForce {
         let rest = self.rest_position(&location);
-        let factored = match self.patch(location.footprint).map(|patch| &patch.centres) {
-            Some(PatchCentres::Nodes(kernel)) => {
-                kernel.factored(&self.recording, &location.point, rest, force)
-            }
-            _ => FactoredForce::default(),
-        };
-        SpringForce { location, force, rest, factored }
+        let factor = self
+            .kernel(location.footprint)
+            .map_or(DMat3::ZERO, |kernel| kernel.factor_at(&self.recording, &location.point).transpose());
+        let force = residual.effective(&memory);
+        SpringForce { location, memory, force, rest, factor, factored: factor * force }
     }
 
     /// Residual displacement of a footprint's node under a force [m, body]. That of a tip's patch is constant up to a distance
@@ -435,7 +457,7 @@ impl Body {
     ) -> DVec3 {
         match self.kernel(footprint) {
             Some(kernel) if footprint == applied.location.footprint => {
-                kernel.displacement(&self.recording, node, &applied.factored, flat_radius)
+                kernel.displacement(&self.recording, node, (applied.rest, applied.factored), flat_radius)
             }
             _ => self.residual_at(footprint, node, &applied.location) * applied.force,
         }

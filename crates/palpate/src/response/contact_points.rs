@@ -269,7 +269,7 @@ impl ContactPoints {
         if view.body.recording.gravity.is_some() {
             for point in &mut self.points {
                 let change = view.body.sag(&point.location, view.gravity) - point.state.sag;
-                let LocationState { displacement, residual, sag } = &mut point.state;
+                let LocationState { displacement, residual, sag, .. } = &mut point.state;
                 [displacement, residual, sag].into_iter().for_each(|value| *value += change);
             }
         }

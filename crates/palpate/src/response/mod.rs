@@ -16,6 +16,7 @@ mod point_displacement;
 mod residual_fields;
 mod residual_kernel;
 mod sample_surface;
+mod sampled_residual;
 mod spring_forces;
 
 pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
@@ -24,6 +25,7 @@ pub(crate) use dot_products::dot;
 pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
 pub(crate) use residual_fields::ResidualFields;
+pub use sampled_residual::SampledResidual;
 
 use crate::error::ModelError;
 use crate::recording::{ImpulseResponse, Recording};
@@ -126,9 +128,7 @@ impl Response {
     /// State at rest, for the body's number of surface nodes and a capacity of contact points.
     pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => {
-                ResponseState::Modal(ModalState::new(modes.len(), modes.relaxes(), nodes, capacity))
-            }
+            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), nodes, capacity)),
             Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
         }
     }
@@ -172,9 +172,11 @@ impl ResponseView<'_> {
         from: impl Iterator<Item = ContactLocation>,
         to: impl Iterator<Item = ContactLocation> + Clone,
     ) -> f64 {
-        match self.state {
-            ResponseState::Modal(state) => state.move_spring_forces(self.body, from, to),
-            ResponseState::Fir(_) => 0.0,
+        match (self.response, &mut *self.state) {
+            (Response::Modal(modes), ResponseState::Modal(state)) => {
+                state.move_spring_forces(self.body, &modes.residual, from, to)
+            }
+            _ => 0.0,
         }
     }
 
@@ -292,18 +294,18 @@ impl ResponseState {
         }
     }
 
-    /// Upper bound of the residual displacement of any node [m].
-    pub(crate) fn max_residual(&self) -> f64 {
+    /// √(dᵀ·S·d) of the forces d whose static displacement the residual one is [√J].
+    pub(crate) fn residual_norm(&self) -> f64 {
         match self {
-            Self::Modal(state) => state.max_residual,
+            Self::Modal(state) => state.residual_norm,
             Self::Fir(_) => 0.0,
         }
     }
 
-    /// Elastic energy of the residual compliance [J].
-    pub(crate) fn residual_energy(&self) -> f64 {
+    /// Upper bound of the residual displacement of any node [m].
+    pub(crate) fn max_residual(&self) -> f64 {
         match self {
-            Self::Modal(state) => state.residual_energy,
+            Self::Modal(state) => state.max_residual,
             Self::Fir(_) => 0.0,
         }
     }

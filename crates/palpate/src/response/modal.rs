@@ -1,12 +1,7 @@
-//! Modal form of a body's response: u = Φ·q + S·f.
+//! Modal form of a body's response: u = Φ·q + S·d.
 //!
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (`oscillator`). The residual compliance S [m/N] is the
-//! static compliance of the modes that are not kept: massless springs with dampers, whose forces g relax to the applied forces f
-//! with the time constant τ. Sampled exactly over a step h:
-//!
-//! ```text
-//! u = Φ·q + S·g        g⁺ = e·g + (1 − e)·f        e = exp(−h/τ)
-//! ```
+//! static compliance of the modes that are not kept (`sampled_residual`), d the forces whose static displacement it has.
 //!
 //! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
 
@@ -16,7 +11,8 @@ use super::nodal_compliance::NodalCompliance;
 use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
-use super::spring_forces::{FORGOTTEN, RELAXING};
+use super::sampled_residual::{Products, SampledResidual};
+use super::spring_forces::RELAXING;
 use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 use crate::bounded_vec::BoundedVec;
 use crate::recording::Recording;
@@ -32,8 +28,7 @@ const FLUSH_BELOW: f64 = 1e-150;
 #[derive(Debug, Clone)]
 pub(crate) struct SampledModes {
     step_s: f64,
-    /// Factor e by which the residual's spring forces decay in a step.
-    decay: f64,
+    pub(super) residual: SampledResidual,
     oscillators: Vec<SampledOscillator>,
     /// Precomputed R[0] between nodes, by footprint.
     pub(super) nodal_compliance: Vec<Arc<NodalCompliance>>,
@@ -54,19 +49,24 @@ pub(crate) struct ModalState {
     rows: Vec<f64>,
     /// Three rows J·Φ·B.
     weighted: Vec<f64>,
-    /// Spring forces g of the residual compliance with their locations.
+    /// Forces of the residual compliance with their locations.
     pub(super) spring_forces: BoundedVec<SpringForce>,
     /// Spring forces at points, distributed to nodes.
     pub(super) nodal: NodalForces,
-    /// Elastic energy of the residual compliance [J], ½·gᵀ·S·g.
+    /// Products of the parts of the residual compliance's state, over all locations.
+    pub(super) products: Products,
+    /// Elastic energy of the residual compliance [J], and √(dᵀ·S·d) of the forces d whose static displacement it has [√J].
     pub(super) residual_energy: f64,
-    /// Upper bound of the residual displacement of any node [m].
+    pub(super) residual_norm: f64,
+    /// Upper bounds of the displacements of any node by the relaxed forces and by the held ones of the last step, and of its residual displacement [m].
+    max_relaxed: f64,
+    max_held: f64,
     pub(super) max_residual: f64,
 }
 
 impl ModalState {
-    /// State at rest; `relaxes` says whether spring forces outlast a step.
-    pub(crate) fn new(modes: usize, relaxes: bool, nodes: usize, capacity: usize) -> Self {
+    /// State at rest for numbers of modes and surface nodes, and a capacity of contact points.
+    pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
         Self {
             modes: vec![OscillatorState::default(); modes],
             q: vec![0.0; modes],
@@ -75,9 +75,13 @@ impl ModalState {
             forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
-            spring_forces: BoundedVec::new(capacity + if relaxes { RELAXING } else { 0 }),
-            nodal: NodalForces::new(nodes, if relaxes { nodes } else { capacity }),
+            spring_forces: BoundedVec::new(capacity + RELAXING),
+            nodal: NodalForces::new(nodes),
+            products: Products::default(),
             residual_energy: 0.0,
+            residual_norm: 0.0,
+            max_relaxed: 0.0,
+            max_held: 0.0,
             max_residual: 0.0,
         }
     }
@@ -98,6 +102,13 @@ impl ModalState {
         }
     }
 
+    /// Set the products of the residual compliance's state, with its energy and norm.
+    pub(super) fn set_products(&mut self, products: Products, residual: &SampledResidual) {
+        self.products = products;
+        self.residual_energy = residual.energy(&products);
+        self.residual_norm = libm::sqrt(residual.effective_square(&products).max(0.0));
+    }
+
     fn rows(&self, slot: usize) -> &[f64] {
         let m = self.modes.len();
         &self.rows[3 * m * slot..3 * m * (slot + 1)]
@@ -109,18 +120,13 @@ impl SampledModes {
         let modes = &recording.modes;
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
-        let decay = recording.residual_decay(step_s);
-        Self { step_s, decay, oscillators, nodal_compliance: Vec::new() }
+        let residual = SampledResidual::new(recording.residual_relaxation_s(), step_s);
+        Self { step_s, residual, oscillators, nodal_compliance: Vec::new() }
     }
 
-    /// Whether the residual's spring forces outlast a step.
-    pub(super) fn relaxes(&self) -> bool {
-        self.decay > FORGOTTEN
-    }
-
-    /// Share of the residual compliance that answers within a step, 1 − e.
+    /// Share of the residual compliance that answers within a step.
     pub(super) fn residual_share(&self) -> f64 {
-        1.0 - self.decay
+        self.residual.share(0)
     }
 
     /// Number of modes.
@@ -158,11 +164,12 @@ impl SampledModes {
             body.add_rows(location.footprint, node, weight, rows);
         }
         let sag = body.sag(location, gravity);
-        let residual = sag + state.residual_displacement(body, location);
-        LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag }
+        let memory = state.displacements_by_memory(body, location);
+        let residual = sag + self.residual.effective(&memory);
+        LocationState { displacement: dot3(state.rows(slot), &state.q) + residual, residual, sag, memory }
     }
 
-    /// R[0] = J_a·Φ·B·Φᵀ·J_bᵀ + (1 − e)·S [m/N] between the location of a slot and every contact point.
+    /// R[0] = J_a·Φ·B·Φᵀ·J_bᵀ + (1 − e + c)·S [m/N] between the location of a slot and every contact point.
     ///
     /// # Real time
     /// Costs modes × points, or points where it is precomputed.
@@ -216,7 +223,7 @@ impl SampledModes {
     ///
     /// # Real time
     pub(crate) fn free(&self, state: &ModalState, slot: usize, start: &LocationState) -> DVec3 {
-        dot3(state.rows(slot), &state.free) + start.sag + (start.residual - start.sag) * self.decay
+        dot3(state.rows(slot), &state.free) + start.sag + self.residual.free(&start.memory)
     }
 
     /// Advance over the predicted step under the held forces of the contact points, and predict the next step with its
@@ -253,37 +260,51 @@ impl SampledModes {
         state.predicted = None;
         self.predict(&body.recording, state, next_gravity);
 
-        // Residual springs with dampers: work f·Δ(S·g), stored ½·gᵀ·S·g; the difference, ½·(1 − e²)·(f − g)ᵀ·S·(f − g), is
-        // dissipated.
-        let (decay, share) = (self.decay, self.residual_share());
-        let (mut work, mut energy) = (0.0, decay * decay * state.residual_energy);
-        let mut largest = 0.0_f64;
-        state.relax(decay);
+        // The residual compliance dissipates the work that it does not store.
+        let residual_share = self.residual_share();
+        let (mut work, mut products) = (0.0, [0.0; 3]);
+        let (mut largest, mut largest_held, mut pressed) = (0.0_f64, 0.0_f64, 0);
+        state.relax(&self.residual);
         for point in points.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let [modal, free] = dots(rows, [&state.q, &state.free]);
             let residual = point.displacement - modal;
-            let LocationState { residual: start, sag, .. } = point.state;
-            let (before, after) = ((start - sag) * decay, residual - sag);
-            point.free = free + sag + after * decay;
-            work += point.force_in_body.dot(residual - start);
-            energy += 0.5 * share * point.force_in_body.dot(after + before);
-            largest = largest.max((after - before).length());
-            point.state.residual = residual;
-            if let Some(node) = point.single_node() {
-                state.nodal.store(node, after);
+            let LocationState { residual: start, sag, memory, .. } = &mut point.state;
+            // S·f, from the displacement that the contact problem has found.
+            let held = (residual - *sag - self.residual.free(memory)) / residual_share;
+            let force = point.force_in_body;
+            work += force.dot(residual - *start);
+            for (sum, displacement) in products.iter_mut().zip([memory.relaxed, memory.held, held]) {
+                *sum += force.dot(displacement);
             }
-            let force = point.force_in_body * share;
+            self.residual.relax(memory);
+            memory.add(&self.residual.of_force(held));
+            point.free = free + *sag + self.residual.free(memory);
+            largest = largest.max((residual - *sag).length());
+            largest_held = largest_held.max(held.length());
+            *start = residual;
+            let sag = *sag;
+            if let Some(node) = point.single_node() {
+                state.nodal.store(node, residual - sag);
+            }
             if force != DVec3::ZERO {
-                state.add_spring_force(body.spring_force(point.location, force));
-                state.add_at_nodes(body, &point.location, force);
+                pressed += 1;
+                let memory = self.residual.of_force(force);
+                state.add_spring_force(body.spring_force(point.location, memory, &self.residual));
+                state.add_at_nodes(body, &point.location, &memory, &self.residual);
             }
         }
-        // Residual displacement is largest at the contacts: twice theirs bounds that of all nodes.
-        state.max_residual = decay * state.max_residual + 2.0 * largest;
-        let dissipated = dissipated + work - (energy - state.residual_energy);
-        state.residual_energy = energy;
-        dissipated
+        // Residual displacement is largest at the contacts, and where they have been: twice theirs bounds that of all nodes.
+        let (decay, lead) = (self.residual.decay(), self.residual.lead());
+        let has_left = state.spring_forces.len() > pressed;
+        let left = if has_left { decay * state.max_relaxed + lead * state.max_held } else { 0.0 };
+        state.max_residual = 2.0 * largest + left;
+        state.max_relaxed = decay * state.max_relaxed + (1.0 - decay) * 2.0 * largest_held;
+        state.max_held = 2.0 * largest_held;
+        let products = self.residual.advance(&state.products, products);
+        let before = state.residual_energy;
+        state.set_products(products, &self.residual);
+        dissipated + work - (state.residual_energy - before)
     }
 
     /// Kinetic, elastic and residual energy [J].
@@ -299,7 +320,7 @@ impl SampledModes {
         sum
     }
 
-    /// Displacement of every surface node [m, body], u = Φ·q + S·g.
+    /// Displacement of every surface node [m, body], u = Φ·q + S·d.
     pub(crate) fn surface_displacement(
         &self,
         body: &Body,
@@ -316,7 +337,7 @@ impl SampledModes {
         }
     }
 
-    /// Displacement of every surface node beyond the modes [m, body]: S·g, and the sag of a fixed body.
+    /// Displacement of every surface node beyond the modes [m, body]: S·d, and the sag of a fixed body.
     pub(crate) fn residual_displacements(
         &self,
         body: &Body,

@@ -1,5 +1,6 @@
 //! Spring forces of the residual compliance on nodes, and their displacements.
 
+use super::sampled_residual::{ResidualMemory, SampledResidual};
 use super::{Body, Footprint, SpringForce};
 use crate::recording::ResidualCompliance;
 use alloc::vec;
@@ -9,8 +10,10 @@ use glam::DVec3;
 /// Forces at points [N, body], distributed to the nodes of their triangles and summed.
 #[derive(Debug, Clone)]
 pub(crate) struct NodalForces {
-    /// Loaded nodes and their forces.
+    /// Loaded nodes and the forces whose static displacement they have.
     loaded: Vec<(u32, DVec3)>,
+    /// Memory of the forces on each.
+    memories: Vec<ResidualMemory>,
     /// Index of each surface node in `loaded`, from 1; 0 for unloaded nodes.
     at: Vec<u32>,
     /// Cached residual displacements of surface nodes [m, body], and the nodes that have one.
@@ -19,9 +22,10 @@ pub(crate) struct NodalForces {
 }
 
 impl NodalForces {
-    pub(super) fn new(nodes: usize, points: usize) -> Self {
+    pub(super) fn new(nodes: usize) -> Self {
         Self {
-            loaded: Vec::with_capacity(nodes.min(3 * points)),
+            loaded: Vec::with_capacity(nodes),
+            memories: Vec::with_capacity(nodes),
             at: vec![0; nodes],
             displacements: vec![None; nodes],
             cached: Vec::with_capacity(nodes),
@@ -44,26 +48,64 @@ impl NodalForces {
         cached.drain(..).for_each(|node| displacements[node as usize] = None);
     }
 
-    /// Let all forces decay by a factor, and forget those below a limit [N].
-    pub(super) fn relax(&mut self, decay: f64, least: f64) {
+    /// Let all memories pass over a step without force, and forget those below a limit [N].
+    pub(super) fn relax(&mut self, residual: &SampledResidual, least: f64) {
         self.clear_cache();
-        let Self { loaded, at, .. } = self;
-        loaded.iter().for_each(|(node, _)| at[*node as usize] = 0);
-        loaded.retain(|(_, force)| decay > 0.0 && force.length() > least);
-        for (index, (node, force)) in loaded.iter_mut().enumerate() {
-            *force *= decay;
-            at[*node as usize] = index as u32 + 1;
+        let Self { loaded, memories, at, .. } = self;
+        let mut kept = 0;
+        for index in 0..loaded.len() {
+            let node = loaded[index].0;
+            let mut memory = memories[index];
+            residual.relax(&mut memory);
+            let is_kept = memory.size() > least;
+            at[node as usize] = if is_kept { kept as u32 + 1 } else { 0 };
+            if is_kept {
+                (loaded[kept], memories[kept]) = ((node, residual.effective(&memory)), memory);
+                kept += 1;
+            }
         }
+        loaded.truncate(kept);
+        memories.truncate(kept);
     }
 
-    pub(super) fn add(&mut self, corners: [(usize, f64); 3], force: DVec3) {
+    pub(super) fn add(
+        &mut self,
+        corners: [(usize, f64); 3],
+        memory: &ResidualMemory,
+        residual: &SampledResidual,
+    ) {
         for (node, weight) in corners.into_iter().filter(|(_, weight)| *weight != 0.0) {
             if self.at[node] == 0 {
                 self.loaded.push((node as u32, DVec3::ZERO));
+                self.memories.push(ResidualMemory::default());
                 self.at[node] = self.loaded.len() as u32;
             }
-            self.loaded[self.at[node] as usize - 1].1 += force * weight;
+            let index = self.at[node] as usize - 1;
+            self.memories[index].add(&memory.map(|force| force * weight));
+            self.loaded[index].1 = residual.effective(&self.memories[index]);
         }
+    }
+
+    /// Displacements of a node by every part of the memories, and by those of contact samples [m, body].
+    ///
+    /// # Real time
+    /// Costs the loaded nodes and the springs.
+    pub(super) fn displacements_by_memory(
+        &self,
+        body: &Body,
+        springs: &[SpringForce],
+        node: usize,
+    ) -> ResidualMemory {
+        let mut sum = ResidualMemory::default();
+        for ((other, _), memory) in self.loaded.iter().zip(&self.memories) {
+            let block = body.recording.residual.block(node, *other as usize);
+            sum.add(&memory.map(|force| block * force));
+        }
+        for spring in springs.iter().filter(|spring| spring.location.footprint != Footprint::Point) {
+            let block = body.residual_at(Footprint::Point, node, &spring.location);
+            sum.add(&spring.memory.map(|force| block * force));
+        }
+        sum
     }
 
     /// Residual displacement of a node under these forces and the springs of contact samples [m, body].

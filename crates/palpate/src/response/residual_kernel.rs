@@ -25,15 +25,6 @@ pub(crate) struct ResidualKernel {
     range: f64,
 }
 
-/// Factored force Aᵀ·f of a patch.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct FactoredForce {
-    /// Rest position [m, body].
-    rest: DVec3,
-    /// Aᵀ·f [√J].
-    pub(super) value: DVec3,
-}
-
 /// Number of patches whose residual compliance with others determines the kernel's range.
 const FIT_CENTRES: usize = 24;
 
@@ -88,37 +79,25 @@ impl ResidualKernel {
     /// Factor A at a surface point [√(m/N)].
     ///
     /// # Real time
-    fn factor_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
+    pub(super) fn factor_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
         let corners = recording.surface.corners(point);
         let used = corners.iter().filter(|corner| corner.1 != 0.0);
         used.map(|&(node, w)| self.factors[node] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// Residual displacement K·f of the patch about a node [m, body], constant within `flat_radius` [m] of the force.
+    /// Residual displacement K·f of the patch about a node [m, body] under a force with its rest position and Aᵀ·f [√J], constant within
+    /// `flat_radius` [m] of the force.
     ///
     /// # Real time
     pub(super) fn displacement(
         &self,
         recording: &Recording,
         node: usize,
-        force: &FactoredForce,
+        (rest, factored): (DVec3, DVec3),
         flat_radius: f64,
     ) -> DVec3 {
-        let distance = ((recording.surface.positions[node] - force.rest).length() - flat_radius).max(0.0);
-        self.factors[node] * force.value * NearField::taper(distance / self.range)
-    }
-
-    /// Factored force Aᵀ·f of a force [N, body] at a surface point with this rest position.
-    ///
-    /// # Real time
-    pub(super) fn factored(
-        &self,
-        recording: &Recording,
-        point: &SurfacePoint,
-        rest: DVec3,
-        force: DVec3,
-    ) -> FactoredForce {
-        FactoredForce { rest, value: self.factor_at(recording, point).transpose() * force }
+        let distance = ((recording.surface.positions[node] - rest).length() - flat_radius).max(0.0);
+        self.factors[node] * factored * NearField::taper(distance / self.range)
     }
 
     /// Steepest slope of ψ(r/L) [1/m].

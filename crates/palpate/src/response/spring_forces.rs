@@ -1,44 +1,47 @@
-//! Spring forces g of the residual compliance in modal form: relaxation, addition, and transfer at changes of level.
+//! Forces of the residual compliance in modal form: relaxation, addition, and transfer at changes of level.
 //!
 //! Equations: docs/theory.md (C55) to (C57), (C61).
 
 use super::modal::ModalState;
+use super::sampled_residual::{Products, ResidualMemory, SampledResidual};
 use super::{Body, ContactLocation, Footprint, SpringForce};
 use crate::surface::patch_kernel;
-use glam::DVec3;
 
-/// Spring force that is forgotten, as a share of the largest one of the object: an error of that share of S·g. Patches leave one
+/// Spring force that is forgotten, as a share of the largest one of the object: an error of that share of its displacement. Patches leave one
 /// behind in every place; at points they gather on nodes, so that round-off can do.
-pub(super) const FORGOTTEN: f64 = 1e-6;
+const FORGOTTEN: f64 = 1e-6;
 const FORGOTTEN_AT_NODES: f64 = 1e-13;
 
 /// Room for relaxing forces on places that contacts have left.
 pub(super) const RELAXING: usize = 256;
 
 impl ModalState {
-    /// Residual displacement of a location at the start of the step [m, body]; that of nodes is cached until the forces change.
-    pub(super) fn residual_displacement(&mut self, body: &Body, location: &ContactLocation) -> DVec3 {
+    /// Displacements of a location by every part of the residual compliance's state at the start of the step [m, body].
+    pub(super) fn displacements_by_memory(&self, body: &Body, location: &ContactLocation) -> ResidualMemory {
         let springs = &self.spring_forces;
+        let mut sum = ResidualMemory::default();
         if location.footprint != Footprint::Point {
-            return springs.iter().map(|other| body.residual(location, &other.location) * other.force).sum();
+            for other in springs.iter() {
+                let block = body.residual(location, &other.location);
+                sum.add(&other.memory.map(|force| block * force));
+            }
+            return sum;
         }
         let corners = body.recording.surface.corners(&location.point).into_iter();
-        let mut sum = DVec3::ZERO;
         for (node, weight) in corners.filter(|(_, weight)| *weight != 0.0) {
-            let displacement = self.nodal.residual_displacement(body, springs, node);
-            self.nodal.store(node, displacement);
-            sum += displacement * weight;
+            let mut own = self.nodal.displacements_by_memory(body, springs, node);
+            own.scale(weight);
+            sum.add(&own);
         }
         sum
     }
 
-    /// Let all spring forces decay by a factor, and forget those that are small.
-    pub(super) fn relax(&mut self, decay: f64) {
-        let largest = self.spring_forces.iter().map(|spring| spring.force.length()).fold(0.0, f64::max);
-        let least = largest / decay;
-        self.spring_forces.retain(|spring| decay > 0.0 && spring.force.length() > FORGOTTEN * least);
-        self.spring_forces.iter_mut().for_each(|spring| spring.scale(decay));
-        self.nodal.relax(decay, FORGOTTEN_AT_NODES * least);
+    /// Let all memories pass over a step without force, and forget those that are small.
+    pub(super) fn relax(&mut self, residual: &SampledResidual) {
+        let largest = self.spring_forces.iter().map(|spring| spring.memory.size()).fold(0.0, f64::max);
+        self.spring_forces.iter_mut().for_each(|spring| spring.relax(residual));
+        self.spring_forces.retain(|spring| spring.memory.size() > FORGOTTEN * largest);
+        self.nodal.relax(residual, FORGOTTEN_AT_NODES * largest);
     }
 
     /// Add a spring force to that of its location; without room, the smallest one is forgotten.
@@ -49,7 +52,7 @@ impl ModalState {
             return;
         }
         if springs.is_full() {
-            let size = |at: &usize| springs[*at].force.length();
+            let size = |at: &usize| springs[*at].memory.size();
             if let Some(least) = (0..springs.len()).min_by(|a, b| size(a).total_cmp(&size(b))) {
                 springs.swap_remove(least);
             }
@@ -62,6 +65,7 @@ impl ModalState {
     pub(super) fn move_spring_forces(
         &mut self,
         body: &Body,
+        residual: &SampledResidual,
         from: impl Iterator<Item = ContactLocation>,
         to: impl Iterator<Item = ContactLocation> + Clone,
     ) -> f64 {
@@ -71,8 +75,8 @@ impl ModalState {
             let Some(at) = self.spring_forces.iter().position(|spring| spring.location == location) else {
                 continue;
             };
-            let SpringForce { force, rest, .. } = self.spring_forces.swap_remove(at);
-            self.add_at_nodes(body, &location, -force);
+            let SpringForce { memory, rest, .. } = self.spring_forces.swap_remove(at);
+            self.add_at_nodes(body, &location, &memory.map(|force| -force), residual);
             let radius = |location: &ContactLocation| body.patch_radius(location.footprint);
             let share = |to: &ContactLocation| {
                 let s = (body.rest_position(to) - rest).length() / radius(to).max(radius(&location));
@@ -80,10 +84,10 @@ impl ModalState {
             };
             let sum: f64 = to.clone().map(|to| share(&to)).sum();
             for to in to.clone().filter(|_| sum > 0.0) {
-                let part = force * (share(&to) / sum);
-                if part != DVec3::ZERO {
-                    self.add_spring_force(body.spring_force(to, part));
-                    self.add_at_nodes(body, &to, part);
+                let part = memory.map(|force| force * (share(&to) / sum));
+                if part.size() > 0.0 {
+                    self.add_spring_force(body.spring_force(to, part, residual));
+                    self.add_at_nodes(body, &to, &part, residual);
                 }
             }
         }
@@ -96,19 +100,22 @@ impl ModalState {
                 count += 1;
             }
         }
-        // Energy ½·gᵀ·S·g of the moved forces, of the others, and between them.
-        let (mut moved, mut between, mut others) = (0.0, 0.0, 0.0);
+        // Products, and with them the energy, of the moved memories, of the others, and between them.
+        let [mut moved_products, mut between_products, mut other_products] = [Products::default(); 3];
         for (at, a) in springs.iter().enumerate() {
             for (other, b) in springs[..=at].iter().enumerate() {
-                let product = a.force.dot(body.residual(&a.location, &b.location) * b.force);
-                let energy = if at == other { 0.5 * product } else { product };
+                let block = body.residual(&a.location, &b.location);
+                let products = Products::of(&a.memory, &b.memory.map(|force| block * force));
+                let factor = if at == other { 1.0 } else { 2.0 };
                 match (at < count, other < count) {
-                    (true, _) => others += energy,
-                    (false, true) => between += energy,
-                    (false, false) => moved += energy,
+                    (true, _) => other_products.add(&products, factor),
+                    (false, true) => between_products.add(&products, factor),
+                    (false, false) => moved_products.add(&products, factor),
                 }
             }
         }
+        let [moved, between, others] =
+            [&moved_products, &between_products, &other_products].map(|products| residual.energy(products));
         // The largest scale s ≤ 1 with moved·s² + between·s + others ≤ energy before.
         let excess = others - before;
         let root = libm::sqrt((between * between - 4.0 * moved * excess).max(0.0));
@@ -118,19 +125,28 @@ impl ModalState {
             true => ((root - between) / (2.0 * moved)).clamp(0.0, 1.0),
             false => 0.0,
         };
-        self.residual_energy = (moved * scale + between) * scale + others;
+        let mut products = other_products;
+        products.add(&between_products, scale);
+        products.add(&moved_products, scale * scale);
+        self.set_products(products, residual);
         for at in count..self.spring_forces.len() {
-            let SpringForce { location, force, .. } = self.spring_forces[at];
+            let SpringForce { location, memory, .. } = self.spring_forces[at];
             self.spring_forces[at].scale(scale);
-            self.add_at_nodes(body, &location, force * (scale - 1.0));
+            self.add_at_nodes(body, &location, &memory.map(|force| force * (scale - 1.0)), residual);
         }
         before - self.residual_energy
     }
 
-    /// Add a force to those at nodes, if it acts at a point.
-    pub(super) fn add_at_nodes(&mut self, body: &Body, location: &ContactLocation, force: DVec3) {
+    /// Add the memory of a force to those at nodes, if it acts at a point.
+    pub(super) fn add_at_nodes(
+        &mut self,
+        body: &Body,
+        location: &ContactLocation,
+        memory: &ResidualMemory,
+        residual: &SampledResidual,
+    ) {
         if location.footprint == Footprint::Point {
-            self.nodal.add(body.recording.surface.corners(&location.point), force);
+            self.nodal.add(body.recording.surface.corners(&location.point), memory, residual);
         }
     }
 }

@@ -22,8 +22,9 @@ pub(super) fn prescribed_force(device: &DeviceState, objects: &mut [ObjectState]
     objects[object].ledger.input += force.dot(travel(objects, object, slot));
 }
 
-/// Add a contact's work over the step to the ledgers of its objects: the input by the other side, and the losses between.
-pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut [ObjectState]) {
+/// Add a contact's work over the step to the ledgers of its objects: the input by the other side, and the losses between. Gives the energy
+/// that it gives back along its normal [J].
+pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut [ObjectState]) -> f64 {
     let work = contact.force.dot(travel(objects, contact.object(), contact.slot));
     let (impact, friction) = if contact.is_held() { (0.0, 0.0) } else { constraint.losses(contact) };
     let ledger = &mut objects[contact.object()].ledger;
@@ -34,6 +35,7 @@ pub(super) fn contact(contact: &Contact, constraint: &Constraint, objects: &mut 
         let work = contact.force.dot(travel(objects, number, slot));
         objects[number].ledger.input -= work;
     }
+    (-impact).max(0.0)
 }
 
 /// Advance a device's proxy, and add what its coupling takes in, stores and dissipates over the step.

@@ -246,7 +246,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
 fn set_up_constraints(model: &Model, state: &mut State) {
     let gravity = state.gravity;
-    let State { steps, objects, devices, contacts, workspace, output, .. } = state;
+    let State { steps, objects, devices, contacts, recovery, workspace, .. } = state;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let orientation = own.rigid.pose.orientation;
         let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
@@ -258,7 +258,7 @@ fn set_up_constraints(model: &Model, state: &mut State) {
     }
     // Losses pay for pushing out tips, and objects within the slop, shared among their contacts; deeper objects are moved apart at the end of
     // the step.
-    let mut budget = 0.5 * output.energy.lost().max(0.0);
+    let mut budget = recovery.available();
     workspace.constraints.clear();
     for contact in contacts.iter() {
         let at = |object: usize, slot: usize| {
@@ -331,10 +331,10 @@ fn solve(model: &Model, state: &mut State) {
 /// Integrate deformation and rigid motion with the forces held, and account for the energy.
 fn integrate(model: &Model, state: &mut State) {
     let gravity = state.gravity;
-    let State { objects, devices, contacts, obstacles, workspace, couplings, output, .. } = state;
-    for (contact, constraint) in contacts.iter_mut().zip(workspace.constraints.iter()) {
-        accounting::contact(contact, constraint, objects);
-        contact.force_trend = contact.last_force.map_or(DVec3::ZERO, |last| contact.force - last);
+    let State { objects, devices, contacts, obstacles, workspace, couplings, recovery, output, .. } = state;
+    let mut given_back = 0.0;
+    for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
+        given_back += accounting::contact(contact, constraint, objects);
     }
     for device in devices.iter() {
         accounting::prescribed_force(device, objects);
@@ -351,7 +351,7 @@ fn integrate(model: &Model, state: &mut State) {
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
     }
     depenetration::depenetrate((model, gravity), objects, contacts, &workspace.constraints);
-    for (object, own) in model.objects.iter().zip(objects) {
+    for (object, own) in model.objects.iter().zip(&mut *objects) {
         own.ledger.input += own.base_work(object, gravity);
         own.update_ledger(object, gravity);
         own.ledger.defect =
@@ -361,6 +361,8 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::coupling(parameters, device, couplings);
     }
     obstacles.copy_from_slice(&workspace.next_obstacles);
+    let lost = objects.iter().fold(couplings.lost(), |sum, own| sum + own.ledger.lost());
+    recovery.close(model.parameters.step_s, lost - output.energy.lost(), given_back);
 }
 
 /// Remember where each tip touches, and which have come through a surface because their contacts could not be solved.

@@ -12,8 +12,8 @@ const SQUARINGS: i32 = 30;
 /// Stiffnesses that are judged, over the stable bound.
 const SHARES: [f64; 4] = [0.5, 0.999, 1.001, 2.0];
 
-/// Largest |eigenvalue| of the loop along an axis. The state: modes, stretch of the coupling, delayed forces, device, residual
-/// displacement.
+/// Largest |eigenvalue| of the loop along an axis. The state: modes, stretch of the coupling, delayed forces, device, relaxed
+/// displacement of the residual compliance. The last force is the first of the delayed ones.
 fn spectral_radius(cell: &Cell, place: &PointResponse, coupling: Coupling) -> f64 {
     let LoopTiming { step_s: h, delay_updates } = cell.timing();
     let swings: Vec<(SampledOscillator, f64)> = place
@@ -28,14 +28,14 @@ fn spectral_radius(cell: &Cell, place: &PointResponse, coupling: Coupling) -> f6
     let sum = coupling.stiffness + rate;
     let (m, d) = (swings.len(), delay_updates as usize);
     let n = 2 * m + 1 + d + 3;
-    let decay = place.residual_decay(h);
+    let sampled = place.sampled_residual(h);
     let next = |state: &[f64]| -> Vec<f64> {
         let mode = |at: usize| OscillatorState { q: state[2 * at], v: state[2 * at + 1] };
         let swung: f64 =
             swings.iter().enumerate().map(|(at, (map, phi))| phi * map.advance(mode(at), 0.0).q).sum();
-        let residual = decay * state[n - 1];
-        let free = swung + residual;
         let (stretch, line) = (state[2 * m], &state[2 * m + 1..2 * m + 1 + d]);
+        let relaxed = sampled.decay() * state[n - 1];
+        let free = swung + relaxed - sampled.lead() * place.residual() * line[0];
         let hand = OscillatorState { q: state[n - 3], v: state[n - 2] };
         let force = (hand.q - free - rate / sum * stretch) / (within + 1.0 / sum);
         let mut next = Vec::with_capacity(n);
@@ -49,7 +49,7 @@ fn spectral_radius(cell: &Cell, place: &PointResponse, coupling: Coupling) -> f6
         next.extend(&line[..d - 1]);
         let moved = device.advance(hand, -line[d - 1] / mass);
         next.extend([moved.q, moved.v]);
-        next.push(residual + (1.0 - decay) * place.residual() * force);
+        next.push(relaxed + (1.0 - sampled.decay()) * place.residual() * force);
         next
     };
     let mut matrix = Mat::<f64>::zeros(n, n);
