@@ -14,7 +14,7 @@ use crate::modes::ElasticModes;
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
 use crate::system::System;
-use held_places::{HeldPlaces, kept_modes};
+use held_places::{HeldPlaces, MARGIN, MARGIN_OF_PATCHES, kept_modes};
 use palpate::{
     Certificate, CertificateEvent, Damping, PeakForceError, ResidualCompliance, SampledOscillator, Surface,
 };
@@ -143,8 +143,11 @@ pub(crate) fn certificate(
         let rigid = rigid.subcols(3 * first, 3 * group.len()).to_owned();
         for chosen in HELD.iter().filter(|chosen| chosen.iter().all(|&place| place < group.len())) {
             let held = HeldPlaces::new(group, chosen, &rigid, &kept, &truncated, residual, damping);
-            let peak = if group[0].radius == 0.0 { &mut peaks.held } else { &mut peaks.touched };
-            raise(&mut peak[chosen.len() - 1], held.peak_force_error(damping));
+            let (peak, margin) = match group[0].radius {
+                0.0 => (&mut peaks.held, MARGIN),
+                _ => (&mut peaks.touched, MARGIN_OF_PATCHES),
+            };
+            raise(&mut peak[chosen.len() - 1], margin * held.peak_force_error(damping));
         }
         first += group.len();
     }

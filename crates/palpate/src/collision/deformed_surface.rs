@@ -43,14 +43,8 @@ pub(crate) enum SurfaceTime<'a> {
     Coordinates(&'a [f64]),
 }
 
-/// Contact whose own residual displacement is excluded.
-#[derive(Clone, Copy)]
-struct OwnContact {
-    location: ContactLocation,
-    /// Rest position of the location [m], and its own displacement [m].
-    rest: DVec3,
-    displacement: DVec3,
-}
+/// Contacts whose own residual displacement is excluded, with the displacement of their location [m].
+type OwnContacts = [Option<(ContactLocation, DVec3)>; MAX_TIP_CONTACTS];
 
 /// Surface of an object at a moment, read with a contact footprint; body frame.
 pub(crate) struct DeformedSurface<'a> {
@@ -64,7 +58,7 @@ pub(crate) struct DeformedSurface<'a> {
     spring_forces: &'a [SpringForce],
     nodal: Option<&'a NodalForces>,
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
-    own: [Option<OwnContact>; MAX_TIP_CONTACTS],
+    own: OwnContacts,
     flat_radius: f64,
     cache: &'a mut NodePositionCache,
     bound: DeformationBound,
@@ -120,28 +114,17 @@ impl<'a> DeformedSurface<'a> {
         flat_radius: f64,
     ) {
         if own.iter().any(Option::is_some) {
-            self.flat_radius = flat_radius;
-            let own_contact = |location: ContactLocation| {
-                let rest = self.body.rest_position(&location);
-                let mut own = OwnContact { location, rest, displacement: DVec3::ZERO };
-                if self.footprint == Footprint::Point {
-                    let forces = self.spring_forces.iter().filter(|force| self.is_of(force, &own));
-                    own.displacement =
-                        forces.map(|f| self.body.residual(&location, &f.location) * f.force).sum();
-                }
-                own
+            let own_displacement = |location: ContactLocation| {
+                let is_its =
+                    |force: &&SpringForce| self.footprint == Footprint::Point && force.location == location;
+                let force = self.spring_forces.iter().find(is_its);
+                let displacement =
+                    force.map_or(DVec3::ZERO, |f| self.body.residual(&location, &location) * f.force);
+                (location, displacement)
             };
-            self.own = own.map(|location| location.map(own_contact));
+            (self.own, self.flat_radius) = (own.map(|location| location.map(own_displacement)), flat_radius);
             self.cache.exclude_own();
         }
-    }
-
-    /// Whether a force is that of an excluded contact, or what it has left close by.
-    fn is_of(&self, force: &SpringForce, own: &OwnContact) -> bool {
-        force.location == own.location
-            || force.is_left()
-                && force.location.footprint == own.location.footprint
-                && (force.rest - own.rest).length() < self.flat_radius
     }
 
     /// Whether residual displacement varies smoothly between nodes, so that bounds can use its slope.
@@ -235,7 +218,7 @@ impl<'a> DeformedSurface<'a> {
         let at = (self.footprint, node);
         if self.footprint != Footprint::Point {
             let flat = |force: &SpringForce| {
-                if own().any(|own| self.is_of(force, own)) { self.flat_radius } else { 0.0 }
+                if own().any(|(own, _)| *own == force.location) { self.flat_radius } else { 0.0 }
             };
             let couples = |force: &&SpringForce| self.body.couples(self.footprint, force.location.footprint);
             let forces = self.spring_forces.iter().filter(couples);
@@ -247,10 +230,13 @@ impl<'a> DeformedSurface<'a> {
             position += nodal.residual_displacement(self.body, self.spring_forces, node);
         }
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
-        for own in own().filter(|own| (self.rest(node) - own.rest).length() < self.flat_radius) {
-            let forces = self.spring_forces.iter().filter(|force| self.is_of(force, own));
-            let here = forces.map(|force| self.body.residual_displacement(at, force, 0.0));
-            position += own.displacement - here.sum::<DVec3>();
+        for (own, displacement) in own() {
+            let is_beside = |force: &&SpringForce| {
+                force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
+            };
+            if let Some(force) = self.spring_forces.iter().find(is_beside) {
+                position += *displacement - self.body.residual_displacement(at, force, 0.0);
+            }
         }
         position
     }

@@ -66,7 +66,7 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     refine_after_steps: 50,
     refine_below: 0.8,
     refine_pairs_below: 1.0 / 6.0,
-    sample_tolerance: 2e-4,
+    sample_tolerance: 3e-4,
     search_visits: 64,
 };
 

@@ -1,4 +1,4 @@
-//! Budget of recovery: what losses pay for pushing sides out of penetration by contact forces.
+//! Budget of recovery: what losses pay for pushing objects out of obstacles and of each other by contact forces.
 //!
 //! ```text
 //! b⁺ = e^(−h/T)·b + ½·losses − given back
@@ -10,7 +10,7 @@
 //! Equations: docs/theory.md (C38), (C81).
 
 /// Time T in which losses are forgotten [s]: some time constants of the motion that pushes out, less than anybody waits for a body to rest.
-const MEMORY_S: f64 = 0.1;
+const MEMORY_S: f64 = 0.2;
 
 /// Budget of recovery of a scene.
 #[derive(Debug, Clone, Copy, Default)]

@@ -76,11 +76,6 @@ impl SpringForce {
         self.factored += other.factored;
     }
 
-    /// Whether the contact has left this location.
-    pub(crate) fn is_left(&self) -> bool {
-        self.memory.held == DVec3::ZERO
-    }
-
     /// Let the memory pass over a step without force.
     pub(super) fn relax(&mut self, residual: &SampledResidual) {
         residual.relax(&mut self.memory);

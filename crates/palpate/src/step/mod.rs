@@ -246,7 +246,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
 fn set_up_constraints(model: &Model, state: &mut State) {
     let gravity = state.gravity;
-    let State { steps, objects, devices, contacts, recovery, workspace, .. } = state;
+    let State { steps, objects, devices, contacts, recovery, workspace, output, .. } = state;
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let orientation = own.rigid.pose.orientation;
         let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
@@ -256,9 +256,9 @@ fn set_up_constraints(model: &Model, state: &mut State) {
             point.start_arm = orientation * (point.rest + point.state.displacement);
         }
     }
-    // Losses pay for pushing out tips, and objects within the slop, shared among their contacts; deeper objects are moved apart at the end of
+    // Losses pay for pushing out tips, and recent losses for pushing out objects within the slop; deeper objects are moved apart at the end of
     // the step.
-    let mut budget = recovery.available();
+    let (mut tip_budget, mut object_budget) = (0.5 * output.energy.lost().max(0.0), recovery.available());
     workspace.constraints.clear();
     for contact in contacts.iter() {
         let at = |object: usize, slot: usize| {
@@ -286,9 +286,10 @@ fn set_up_constraints(model: &Model, state: &mut State) {
         let is_tip = matches!(contact.other, OtherSide::Device(_));
         if gap < 0.0 && (is_tip || gap > -depenetration::slop(model, contact.object())) {
             let push = SOLVER.recovery * -gap;
+            let budget = if is_tip { &mut tip_budget } else { &mut object_budget };
             let cost = 2.0 * contact.force.length() * push;
-            let paid = if cost > budget { 0.0 } else { push };
-            budget -= if paid > 0.0 { cost } else { 0.0 };
+            let paid = if cost > *budget { 0.0 } else { push };
+            *budget -= if paid > 0.0 { cost } else { 0.0 };
             constraint.min_gap = gap + paid;
         }
         workspace.constraints.push(constraint);
@@ -334,7 +335,8 @@ fn integrate(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, obstacles, workspace, couplings, recovery, output, .. } = state;
     let mut given_back = 0.0;
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
-        given_back += accounting::contact(contact, constraint, objects);
+        let given = accounting::contact(contact, constraint, objects);
+        given_back += if matches!(contact.other, OtherSide::Device(_)) { 0.0 } else { given };
     }
     for device in devices.iter() {
         accounting::prescribed_force(device, objects);
