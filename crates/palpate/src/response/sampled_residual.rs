@@ -45,7 +45,7 @@ pub(crate) struct Products {
     previous_previous: f64,
 }
 
-/// What a place remembers of the force on it [N, body], or the displacements by it at another place [m, body].
+/// Memory of the force on a location [N, body], or the displacements by it at another place [m, body].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ResidualMemory {
     /// Relaxed force g.
@@ -109,7 +109,7 @@ impl SampledResidual {
         memory.relaxed + (memory.held - memory.previous) * self.lead
     }
 
-    /// The same at the end of the next step without force, e·g − c·f.
+    /// Force whose static displacement is that at the end of the next step without force, e·g − c·f.
     pub(super) fn free(&self, memory: &ResidualMemory) -> DVec3 {
         memory.relaxed * self.decay - memory.held * self.lead
     }
