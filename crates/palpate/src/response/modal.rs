@@ -263,7 +263,7 @@ impl SampledModes {
         // The residual compliance dissipates the work that it does not store.
         let residual_share = self.residual_share();
         let (mut work, mut products) = (0.0, [0.0; 3]);
-        let (mut largest, mut largest_held, mut pressed) = (0.0_f64, 0.0_f64, 0);
+        let (mut largest, mut largest_held) = (0.0_f64, 0.0_f64);
         state.relax(&self.residual);
         for point in points.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
@@ -288,7 +288,6 @@ impl SampledModes {
                 state.nodal.store(node, residual - sag);
             }
             if force != DVec3::ZERO {
-                pressed += 1;
                 let memory = self.residual.of_force(force);
                 state.add_spring_force(body.spring_force(point.location, memory, &self.residual));
                 state.add_at_nodes(body, &point.location, &memory, &self.residual);
@@ -296,7 +295,7 @@ impl SampledModes {
         }
         // Residual displacement is largest at the contacts, and where they have been: twice theirs bounds that of all nodes.
         let (decay, lead) = (self.residual.decay(), self.residual.lead());
-        let has_left = state.spring_forces.len() > pressed;
+        let has_left = state.spring_forces.iter().any(|spring| spring.memory.held == DVec3::ZERO);
         let left = if has_left { decay * state.max_relaxed + lead * state.max_held } else { 0.0 };
         state.max_residual = 2.0 * largest + left;
         state.max_relaxed = decay * state.max_relaxed + (1.0 - decay) * 2.0 * largest_held;

@@ -99,11 +99,11 @@ impl NodalForces {
         let mut sum = ResidualMemory::default();
         for ((other, _), memory) in self.loaded.iter().zip(&self.memories) {
             let block = body.recording.residual.block(node, *other as usize);
-            sum.add(&memory.map(|force| block * force));
+            sum.add_displacements(&block, memory);
         }
         for spring in springs.iter().filter(|spring| spring.location.footprint != Footprint::Point) {
             let block = body.residual_at(Footprint::Point, node, &spring.location);
-            sum.add(&spring.memory.map(|force| block * force));
+            sum.add_displacements(&block, &spring.memory);
         }
         sum
     }

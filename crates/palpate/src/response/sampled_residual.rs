@@ -12,7 +12,7 @@
 //!
 //! Equations: docs/theory.md (C55) to (C57).
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Residual compliance at a step.
 ///
@@ -207,6 +207,11 @@ impl ResidualMemory {
         self.previous += other.previous;
     }
 
+    /// Add the displacements by another memory's forces through a block of the residual compliance [m/N].
+    pub(super) fn add_displacements(&mut self, block: &DMat3, forces: &Self) {
+        self.add(&forces.map(|force| *block * force));
+    }
+
     /// Every part, linearly mapped.
     pub(super) fn map(&self, map: impl Fn(DVec3) -> DVec3) -> Self {
         Self { relaxed: map(self.relaxed), held: map(self.held), previous: map(self.previous) }
@@ -221,6 +226,7 @@ impl ResidualMemory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use alloc::vec::Vec;
 
     const STEP_S: f64 = 1e-3;
     /// Relaxation times [s]: none, shorter and longer than a step, and about a step.
@@ -236,8 +242,6 @@ mod tests {
             })
             .collect()
     }
-
-    use alloc::vec::Vec;
 
     #[test]
     fn shares_are_the_response_to_a_force_held_for_one_step() {

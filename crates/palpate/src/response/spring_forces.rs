@@ -23,7 +23,7 @@ impl ModalState {
         if location.footprint != Footprint::Point {
             for other in springs.iter() {
                 let block = body.residual(location, &other.location);
-                sum.add(&other.memory.map(|force| block * force));
+                sum.add_displacements(&block, &other.memory);
             }
             return sum;
         }
