@@ -52,11 +52,6 @@ impl LevelOfDetail {
         if self.is_trial { (COLLISION.refine_below * max as f64) as usize } else { max }
     }
 
-    /// Put off the trial of a finer level, in a step in which enough samples are near.
-    pub(super) fn put_off(&mut self, step: u64) {
-        self.since = step;
-    }
-
     /// Go to the next coarser level, in a step in which too many samples are near.
     pub(super) fn coarsen(&mut self, step: u64) {
         let lasted = step - self.since >= self.trial_interval;

@@ -54,7 +54,7 @@ pub(crate) struct NodePositionCache {
 
 impl NodePositionCache {
     pub(crate) fn new(body: &Body) -> Self {
-        let nodes = body.recording.surface.positions.len();
+        let nodes = body.max_vertices();
         let positions = || Stamped::new(DVec3::ZERO, nodes);
         Self {
             modal: positions(),

@@ -264,9 +264,9 @@ impl Body {
         self.surface(location.footprint).corners(&location.point)
     }
 
-    /// Outward unit normal of a surface node at rest [body]; zero on a sheet of no thickness.
-    pub(crate) fn outward_normal(&self, node: usize) -> DVec3 {
-        self.normals[node]
+    /// Outward unit normal of a vertex of a footprint's surface at rest [body]; zero on a sheet of no thickness.
+    pub(crate) fn outward_normal(&self, footprint: Footprint, vertex: usize) -> DVec3 {
+        self.samples(footprint).map_or(self.normals[vertex], |samples| samples.normal(vertex))
     }
 
     /// Height [m] of the smooth surface over a location; 0 on the decimated surface between contact samples, which lie on it.
@@ -291,19 +291,34 @@ impl Body {
         self.surface(location.footprint).rest_position(&location.point)
     }
 
-    /// Nodes of a footprint's surface.
-    pub(super) fn nodes(&self, footprint: Footprint) -> Vec<u32> {
-        match self.samples(footprint) {
-            Some(samples) => samples.nodes().to_vec(),
-            None => (0..self.recording.surface.positions.len() as u32).collect(),
-        }
+    /// Number of vertices of a footprint's surface: nodes, or contact samples with the one-sided patches of those on creases.
+    pub(crate) fn vertices(&self, footprint: Footprint) -> usize {
+        self.samples(footprint).map_or(self.recording.surface.positions.len(), SampleSurface::len)
     }
 
-    /// Index of a node among them.
+    /// Largest number of vertices of any footprint's surface.
+    pub(crate) fn max_vertices(&self) -> usize {
+        let of_patches = (0..self.patches.len()).map(|at| self.vertices(Footprint::Patch(at as u32)));
+        of_patches.fold(self.vertices(Footprint::Point), usize::max)
+    }
+
+    /// Node or contact sample that a vertex of a footprint's surface belongs to.
     ///
     /// # Real time
-    pub(super) fn node_index(&self, footprint: Footprint, node: usize) -> usize {
-        self.patch(footprint).map_or(node, |patch| patch.index(node))
+    pub(crate) fn sample_of(&self, footprint: Footprint, vertex: usize) -> usize {
+        self.samples(footprint).map_or(vertex, |samples| samples.sample_of(vertex))
+    }
+
+    /// Vertex of a node or contact sample that faces a direction [body]: on a crease the patch on the side with the nearest normal.
+    ///
+    /// # Real time
+    pub(crate) fn facing_vertex(
+        &self,
+        footprint: Footprint,
+        sample: usize,
+        direction: impl FnOnce() -> DVec3,
+    ) -> usize {
+        self.samples(footprint).map_or(sample, |samples| samples.facing_vertex(sample, direction))
     }
 
     pub(super) fn patch(&self, footprint: Footprint) -> Option<&PatchField> {
@@ -326,7 +341,7 @@ impl Body {
         let own = |index: usize| 3 * m * index..3 * m * (index + 1);
         match self.patch(footprint) {
             None => dot3(&shapes[own(node)], q),
-            Some(patch) => dot3_single(&patch.rows[own(patch.index(node))], single),
+            Some(patch) => dot3_single(&patch.rows[own(node)], single),
         }
     }
 
@@ -342,7 +357,7 @@ impl Body {
                 .zip(&self.recording.modes.mode_shapes[own(node)])
                 .for_each(|(row, phi)| *row += weight * phi),
             Some(patch) => {
-                let pairs = rows.iter_mut().zip(&patch.rows[own(patch.index(node))]);
+                let pairs = rows.iter_mut().zip(&patch.rows[own(node)]);
                 pairs.for_each(|(row, phi)| *row += weight * f64::from(*phi));
             }
         }
@@ -396,16 +411,16 @@ impl Body {
             (Some(own), _) if footprint == location.footprint => own.residual_at(node, &location.point),
             (Some(own), _) => {
                 let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
-                    None => own.to_nodes.between(own.index(node), corner) * weight,
+                    None => own.to_nodes.between(node, corner) * weight,
                     Some(patch) => {
-                        let nodes = patch.weights.of(patch.index(corner));
-                        own.to_nodes.averaged(own.index(node), nodes) * weight
+                        let nodes = patch.weights.of(corner);
+                        own.to_nodes.averaged(node, nodes) * weight
                     }
                 };
                 used(self.corners(location)).map(sum).sum()
             }
             (None, Some(other)) => {
-                let of = |sample: usize| other.to_nodes.between(other.index(sample), node).transpose();
+                let of = |sample: usize| other.to_nodes.between(sample, node).transpose();
                 used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
             }
         }
@@ -465,7 +480,7 @@ impl Body {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),
                 Some(patch) => {
-                    patch.weights.of(patch.index(corner)).for_each(|(node, w)| give(node, w * weight))
+                    patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight))
                 }
             }
         }

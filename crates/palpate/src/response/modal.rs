@@ -189,7 +189,7 @@ impl SampledModes {
         let mut weighed = false;
         for (index, point) in points.iter().enumerate() {
             if let Some(nodal) = precomputed.filter(|nodal| nodal.footprint == point.location.footprint) {
-                give(index, nodal.between(body, &own, &body.corners(&point.location)));
+                give(index, nodal.between(&own, &body.corners(&point.location)));
                 continue;
             }
             if !weighed {

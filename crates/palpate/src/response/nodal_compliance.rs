@@ -28,20 +28,17 @@ pub(crate) struct NodalCompliance {
 impl NodalCompliance {
     /// Nodal compliance of a body with its modes; none beyond the limit of nodes.
     pub(super) fn new(body: &Body, modes: &SampledModes, footprint: Footprint) -> Option<Self> {
-        let nodes = body.nodes(footprint);
-        let count = nodes.len();
+        let count = body.vertices(footprint);
         if count > MAX_NODES {
             return None;
         }
         let width = 3 * modes.len();
         let mut rows = vec![0.0; count * width];
-        for (node, rows) in nodes.iter().zip(rows.chunks_exact_mut(width.max(1))) {
-            body.add_rows(footprint, *node as usize, 1.0, rows);
+        for (vertex, rows) in (0..count).zip(rows.chunks_exact_mut(width.max(1))) {
+            body.add_rows(footprint, vertex, 1.0, rows);
         }
-        let location = |index: usize| ContactLocation {
-            point: body.node_point(footprint, nodes[index] as usize),
-            footprint,
-        };
+        let location =
+            |vertex: usize| ContactLocation { point: body.node_point(footprint, vertex), footprint };
         let of = |index: usize| &rows[index * width..(index + 1) * width];
         let mut weighted = vec![0.0; width];
         let mut blocks = Vec::with_capacity(count * (count + 1) / 2);
@@ -57,12 +54,11 @@ impl NodalCompliance {
     /// Displacement at one location per force at another [m/N], both by the weights of surface nodes.
     ///
     /// # Real time
-    pub(super) fn between(&self, body: &Body, a: &Corners, b: &Corners) -> DMat3 {
-        let index = |node: usize| body.node_index(self.footprint, node);
+    pub(super) fn between(&self, a: &Corners, b: &Corners) -> DMat3 {
         let mut sum = DMat3::ZERO;
         for &(a, of_a) in a.iter().filter(|corner| corner.1 != 0.0) {
             for &(b, of_b) in b.iter().filter(|corner| corner.1 != 0.0) {
-                sum += self.of(index(a), index(b)) * (of_a * of_b);
+                sum += self.of(a, b) * (of_a * of_b);
             }
         }
         sum

@@ -65,8 +65,8 @@ impl PatchField {
     ) -> Self {
         let radius = level.spacing;
         let order = recording.metadata.mesh.order;
-        let weights = PatchWeights::new(&recording.surface, order, radius, &level.nodes);
-        let samples = SampleSurface::new(recording, level, &weights, (normals, heights));
+        let (weights, one_sided) = PatchWeights::of_samples(&recording.surface, order, radius, &level.nodes);
+        let samples = SampleSurface::new(recording, level, (&weights, &one_sided), (normals, heights));
         Self::averaged_at(recording, samples, weights, radius)
     }
 
@@ -87,9 +87,8 @@ impl PatchField {
     ) -> Self {
         let rows = averaged_rows(recording, &weights);
         let distances = ModalDistances::new(recording, &rows);
-        let index = |node: usize| samples.index(node);
-        let between = |i: usize, c: Option<usize>| distances.between(index(i), c.map(index));
-        let size = |i: usize| libm::sqrt(samples.residual.trace(index(i), index(i)));
+        let between = |i: usize, c: Option<usize>| distances.between(i, c);
+        let size = |i: usize| libm::sqrt(samples.residual.trace(i, i));
         let bounds = samples.tree.bounds(&samples.surface.triangles, between, size);
         Self { radius, weights, rows, bounds, centres: PatchCentres::Samples(Box::new(samples)) }
     }
@@ -100,13 +99,6 @@ impl PatchField {
             PatchCentres::Nodes(_) => None,
             PatchCentres::Samples(samples) => Some(samples),
         }
-    }
-
-    /// Index of the patch about a surface node that has one.
-    ///
-    /// # Real time
-    pub(super) fn index(&self, node: usize) -> usize {
-        self.samples().map_or(node, |samples| samples.index(node))
     }
 
     /// Surface between the nodes that have a patch.

@@ -61,7 +61,7 @@ fn compliance_field(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32
     let nodes = body.recording.surface.positions.len();
     let mut field = Vec::with_capacity(9 * nodes);
     let Some(patch) = body.patch(footprint) else { return field };
-    let weights: Vec<(usize, f64)> = patch.weights.of(patch.index(corner)).collect();
+    let weights: Vec<(usize, f64)> = patch.weights.of(corner).collect();
     for node in 0..nodes {
         let block = |(other, weight): &(usize, f64)| body.recording.residual.block(node, *other) * *weight;
         let sum: DMat3 = weights.iter().map(block).sum();

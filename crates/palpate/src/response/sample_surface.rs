@@ -9,40 +9,47 @@
 //! D_cd = Σᵢⱼ w_ci·Sᵢⱼ·w_dj
 //! ```
 //!
-//! Nodes across an edge are left out: a sample of an edge or of a corner stays there, and a body rests on it. The residual
+//! Nodes across an edge are left out: a sample of an edge or of a corner stays there, and a body rests on it. Such a sample has one-sided
+//! patches as well, one for each smooth side; a contact takes the one whose normal opposes it most. The residual
 //! compliance D [m/N] between samples is that of the nodes, averaged on both sides: as exact as it is recorded, and positive
 //! semi-definite with it.
 //!
 //! Equations: docs/theory.md (C59), (C60).
 
 use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
-use crate::surface::{EDGE_COSINE, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint};
+use crate::surface::{
+    EDGE_COSINE, OneSidedPatch, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, area_normal,
+};
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
-/// Contact samples of a surface, with the decimated surface between them.
+/// No triangle.
+const NONE: u32 = u32::MAX;
+
+/// Contact samples of a surface, with the decimated surface between them. Its vertices are the samples and, after them, the one-sided
+/// patches of samples on creases; or the cells of clamps.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleSurface {
-    /// Sample index of each surface node; [`NONE`] for the others.
-    indices: Vec<u32>,
-    /// Surface node of each sample.
-    nodes: Vec<u32>,
-    /// Decimated surface between the positions X̂ of the samples; a degenerate triangle per sample where the level has none.
+    /// Number of samples, which are the first vertices.
+    samples: usize,
+    /// Sample of each further vertex; they stand sample after sample.
+    one_sided: Vec<u32>,
+    /// Outward unit normal of every vertex at rest [body]; zero on a sheet of no thickness.
+    normals: Vec<DVec3>,
+    /// Decimated surface between the positions X̂ of the vertices, and a degenerate triangle for every vertex without one.
     pub(crate) surface: Surface,
     /// Whether the level has a decimated surface.
     pub(crate) is_surface: bool,
-    /// One triangle of each sample.
+    /// One triangle of each vertex.
     triangle: Vec<u32>,
+    /// Tree over the decimated surface, or over the samples where there is none.
     pub(crate) tree: SphereTree,
-    /// Residual compliance D between samples [m/N].
+    /// Residual compliance D between vertices [m/N].
     pub(super) residual: ResidualCompliance,
-    /// Residual compliance between samples and surface nodes [m/N].
+    /// Residual compliance between vertices and surface nodes [m/N].
     pub(super) to_nodes: PatchNodeCompliance,
 }
-
-/// Sample index of a surface node without sample.
-const NONE: u32 = u32::MAX;
 
 impl SampleSurface {
     /// Contact samples of a level, whose patches have these weights; with the outward normals of all surface nodes and the heights of
@@ -50,79 +57,115 @@ impl SampleSurface {
     pub(super) fn new(
         recording: &Recording,
         level: &SampleLevel,
-        weights: &PatchWeights,
+        (weights, one_sided): (&PatchWeights, &[OneSidedPatch]),
         (normals, heights): (&[DVec3], &[f64]),
     ) -> Self {
-        let (surface, nodes) = (&recording.surface, &level.nodes);
-        let mut indices = vec![NONE; surface.positions.len()];
-        nodes.iter().enumerate().for_each(|(index, &node)| indices[node as usize] = index as u32);
+        let rest = &recording.surface;
+        let samples = level.nodes.len();
+        let of_sample: Vec<u32> = one_sided.iter().map(|side| side.sample as u32).collect();
+        let nodes: Vec<u32> =
+            level.nodes.iter().copied().chain(of_sample.iter().map(|&of| level.nodes[of as usize])).collect();
+        let at_nodes = level.nodes.iter().map(|&node| normals[node as usize]);
+        let vertex_normals: Vec<DVec3> = at_nodes.chain(one_sided.iter().map(|side| side.normal)).collect();
         let is_surface = !level.triangles.is_empty();
-        let triangles =
-            if is_surface { level.triangles.clone() } else { nodes.iter().map(|&node| [node; 3]).collect() };
-        let mut triangle = vec![0; nodes.len()];
-        for (t, corners) in triangles.iter().enumerate() {
-            corners.iter().for_each(|node| triangle[indices[*node as usize] as usize] = t as u32);
-        }
-        let surface = Surface {
-            triangles,
-            positions: averaged_positions(surface, nodes, weights, (normals, heights)),
-            ..surface.clone()
+        let triangles = if is_surface {
+            let mut index = vec![u32::MAX; rest.positions.len()];
+            level.nodes.iter().enumerate().for_each(|(sample, &node)| index[node as usize] = sample as u32);
+            // A corner on a crease has the patch on the triangle's side.
+            let vertex = |node: u32, normal: DVec3| {
+                let sample = index[node as usize] as usize;
+                facing_vertex((samples, &of_sample, &vertex_normals), sample, || normal) as u32
+            };
+            let on_surface = |corners: &[u32; 3]| {
+                let positions = corners.map(|node| rest.positions[node as usize]);
+                let normal = area_normal(positions).normalize_or_zero();
+                corners.map(|node| vertex(node, normal))
+            };
+            level.triangles.iter().map(on_surface).collect()
+        } else {
+            Vec::new()
         };
-        let tree = SphereTree::new(&surface.positions, &surface.triangles);
-        let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, surface.positions.len());
-        let residual = averaged(&recording.residual, &to_nodes, weights);
-        Self { indices, nodes: nodes.clone(), surface, is_surface, triangle, tree, residual, to_nodes }
+        let positions = averaged_positions(rest, (&nodes, &vertex_normals), weights, (normals, heights));
+        let source_nodes = nodes.iter().map(|&node| rest.source_nodes[node as usize]).collect();
+        let surface = Surface { positions, triangles, source_nodes };
+        Self { one_sided: of_sample, ..Self::of(recording, surface, samples, vertex_normals, weights) }
     }
 
-    /// Cells with these weights: each has the node next to its centroid that no other cell has, as its name, and its position at rest
-    /// is the centroid.
+    /// Cells of clamps, whose positions at rest are their centroids.
     pub(super) fn of_cells(recording: &Recording, weights: &PatchWeights) -> Self {
         let rest = &recording.surface.positions;
-        let (mut indices, mut nodes) = (vec![NONE; rest.len()], Vec::with_capacity(weights.len()));
-        let mut positions = rest.clone();
-        for c in 0..weights.len() {
-            let centroid: DVec3 = weights.of(c).map(|(node, w)| rest[node] * w).sum();
-            let distance = |node: &usize| (rest[*node] - centroid).length_squared();
-            let unused = (0..rest.len()).filter(|node| indices[*node] == NONE);
-            let Some(node) = unused.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { break };
-            indices[node] = c as u32;
-            positions[node] = centroid;
-            nodes.push(node as u32);
+        let count = weights.len();
+        let centroid = |c: usize| weights.of(c).map(|(node, w)| rest[node] * w).sum();
+        let positions: Vec<DVec3> = (0..count).map(centroid).collect();
+        let surface = Surface { positions, triangles: Vec::new(), source_nodes: vec![0; count] };
+        Self::of(recording, surface, count, vec![DVec3::ZERO; count], weights)
+    }
+
+    /// Samples, and further vertices, of a surface that may have no triangles.
+    fn of(
+        recording: &Recording,
+        mut surface: Surface,
+        samples: usize,
+        normals: Vec<DVec3>,
+        weights: &PatchWeights,
+    ) -> Self {
+        let is_surface = !surface.triangles.is_empty();
+        let mut triangle = vec![NONE; weights.len()];
+        for (t, corners) in surface.triangles.iter().enumerate() {
+            corners.iter().for_each(|vertex| triangle[*vertex as usize] = t as u32);
         }
-        let triangles: Vec<[u32; 3]> = nodes.iter().map(|&node| [node; 3]).collect();
-        let triangle = (0..nodes.len() as u32).collect();
-        let surface = Surface { triangles, positions, ..recording.surface.clone() };
-        let tree = SphereTree::new(&surface.positions, &surface.triangles);
-        let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, rest.len());
+        let in_tree = if is_surface { surface.triangles.len() } else { samples };
+        for (vertex, triangle) in triangle.iter_mut().enumerate().filter(|(_, t)| **t == NONE) {
+            *triangle = surface.triangles.len() as u32;
+            surface.triangles.push([vertex as u32; 3]);
+        }
+        let tree = SphereTree::new(&surface.positions, &surface.triangles[..in_tree]);
+        let to_nodes =
+            PatchNodeCompliance::new(&recording.residual, weights, recording.surface.positions.len());
         let residual = averaged(&recording.residual, &to_nodes, weights);
-        Self { indices, nodes, surface, is_surface: false, triangle, tree, residual, to_nodes }
+        let one_sided = Vec::new();
+        Self { samples, one_sided, normals, surface, is_surface, triangle, tree, residual, to_nodes }
     }
 
-    /// Surface nodes of the samples.
-    pub(super) fn nodes(&self) -> &[u32] {
-        &self.nodes
+    /// Number of vertices: samples and one-sided patches.
+    pub(super) fn len(&self) -> usize {
+        self.triangle.len()
     }
 
-    /// Index of the sample at a surface node that is one.
+    /// Sample that a vertex belongs to.
     ///
     /// # Real time
-    pub(super) fn index(&self, node: usize) -> usize {
-        self.indices[node] as usize
+    pub(super) fn sample_of(&self, vertex: usize) -> usize {
+        self.one_sided.get(vertex.wrapping_sub(self.samples)).map_or(vertex, |sample| *sample as usize)
     }
 
-    /// Sample as a point of the decimated surface.
-    pub(super) fn node_point(&self, node: usize) -> SurfacePoint {
-        let triangle = self.triangle[self.index(node)];
+    /// Vertex of a sample whose normal is nearest to a direction [body].
+    ///
+    /// # Real time
+    pub(super) fn facing_vertex(&self, sample: usize, direction: impl FnOnce() -> DVec3) -> usize {
+        facing_vertex((self.samples, &self.one_sided, &self.normals), sample, direction)
+    }
+
+    /// Outward unit normal of a vertex at rest [body].
+    ///
+    /// # Real time
+    pub(super) fn normal(&self, vertex: usize) -> DVec3 {
+        self.normals[vertex]
+    }
+
+    /// Vertex as a point of the decimated surface.
+    pub(super) fn node_point(&self, vertex: usize) -> SurfacePoint {
+        let triangle = self.triangle[vertex];
         let corners = self.surface.triangles[triangle as usize];
-        let first = corners.iter().position(|corner| *corner as usize == node);
+        let first = corners.iter().position(|corner| *corner as usize == vertex);
         SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
     }
 
-    /// Residual compliance [m/N] of a sample: its displacement per force at a point of the decimated surface.
+    /// Residual compliance [m/N] of a vertex: its displacement per force at a point of the decimated surface.
     ///
     /// # Real time
-    pub(super) fn residual_at(&self, node: usize, point: &SurfacePoint) -> DMat3 {
-        let between = |other: usize| self.residual.block(self.index(node), self.index(other));
+    pub(super) fn residual_at(&self, vertex: usize, point: &SurfacePoint) -> DMat3 {
+        let between = |other: usize| self.residual.block(vertex, other);
         self.used_corners(point).map(|(other, weight)| between(other) * weight).sum()
     }
 
@@ -131,26 +174,40 @@ impl SampleSurface {
     }
 }
 
-/// Node positions [m] with those of the samples on the smooth surface, averaged along their normals.
+/// Vertex of a sample whose normal is nearest to a direction, by the number of samples, the sample of every further vertex and all normals.
+fn facing_vertex(
+    (samples, one_sided, normals): (usize, &[u32], &[DVec3]),
+    sample: usize,
+    direction: impl FnOnce() -> DVec3,
+) -> usize {
+    let first = one_sided.partition_point(|of| (*of as usize) < sample);
+    let count = one_sided[first..].iter().take_while(|of| **of as usize == sample).count();
+    if count == 0 {
+        return sample;
+    }
+    let direction = direction();
+    let facing = |vertex: usize| normals[vertex].dot(direction);
+    let further = (0..count).map(|side| samples + first + side);
+    further.fold(sample, |best, vertex| if facing(vertex) > facing(best) { vertex } else { best })
+}
+
+/// Positions [m] of vertices at these nodes with these normals: on the smooth surface, averaged along the normal.
 fn averaged_positions(
     surface: &Surface,
-    samples: &[u32],
+    (nodes, own_normals): (&[u32], &[DVec3]),
     weights: &PatchWeights,
     (normals, heights): (&[DVec3], &[f64]),
 ) -> Vec<DVec3> {
-    let mut positions = surface.positions.clone();
-    for (c, node) in samples.iter().map(|&node| node as usize).enumerate() {
-        let (centre, normal) = (surface.positions[node], normals[node]);
-        let smooth = weights.of(c).filter(|(other, _)| normals[*other].dot(normal) > EDGE_COSINE);
+    let of_vertex = |(vertex, (&node, &normal)): (usize, (&u32, &DVec3))| {
+        let centre = surface.positions[node as usize];
+        let smooth = weights.of(vertex).filter(|(other, _)| normals[*other].dot(normal) > EDGE_COSINE);
         let (sum, height) = smooth.fold((0.0, 0.0), |(sum, height), (other, w)| {
             let over = surface.positions[other] - centre + normals[other] * heights[other];
             (sum + w, height + w * normal.dot(over))
         });
-        if sum > 0.0 {
-            positions[node] += normal * (height / sum);
-        }
-    }
-    positions
+        if sum > 0.0 { centre + normal * (height / sum) } else { centre }
+    };
+    nodes.iter().zip(own_normals).enumerate().map(of_vertex).collect()
 }
 
 /// Residual compliance between patches, averaged over both, from that between patches and nodes: (W·S)·Wᵀ.

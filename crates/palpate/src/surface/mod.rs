@@ -9,6 +9,7 @@ mod patch_weights;
 mod poisson_disk;
 mod quadratic_face;
 mod sample_level;
+mod smooth_parts;
 mod sphere_tree;
 #[cfg(test)]
 mod test_surfaces;
@@ -16,7 +17,7 @@ mod triangle;
 
 pub(crate) use cells::{Cell, cells};
 pub(crate) use decimation::decimate;
-pub(crate) use patch_weights::{PatchWeights, patch_kernel, triangles_around};
+pub(crate) use patch_weights::{OneSidedPatch, PatchWeights, patch_kernel, triangles_around};
 pub(crate) use poisson_disk::{EDGE_COSINE, node_normals, poisson_disk_sample};
 pub(crate) use quadratic_face::smooth_heights;
 pub(crate) use sample_level::MAX_LEVELS;

@@ -9,10 +9,14 @@
 //! with the patch radius a [m] and the shape functions Nᵢ of the finite elements, over the part of the surface that is connected
 //! with c. Displacement is averaged and force distributed with the same weights. As a → 0 the patch becomes the node.
 //!
+//! A contact sample on a crease has one-sided patches as well: the same integral over the smooth part on each side, with that side's normal.
+//! A face that rests on a floor touches it with its own side of the crease, not with the faces beside it.
+//!
 //! Equations: docs/theory.md (C26).
 
 use super::cells::Cell;
 use super::quadratic_face::QuadraticFaces;
+use super::smooth_parts::smooth_parts;
 use super::{Surface, area_normal, at_weights};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -33,83 +37,72 @@ const MAX_EDGE_RATIO: f64 = 0.25;
 /// Upper limit of subdivisions: a patch a hundred times smaller than its triangle is its node.
 const MAX_HALVINGS: u32 = 7;
 
+/// Least share of the patches about a node that a one-sided one has, by the integral of the kernel: a rough mesh has creases everywhere.
+const MIN_SIDE: f64 = 0.1;
+
+/// Patch about a sample on a crease that lies on one side of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OneSidedPatch {
+    /// Index of the sample.
+    pub(crate) sample: usize,
+    /// Outward unit normal of the side at the sample.
+    pub(crate) normal: DVec3,
+}
+
 impl PatchWeights {
     /// Patches of a radius [m] about nodes of a surface, with finite elements of an order.
     pub(crate) fn new(surface: &Surface, order: u32, radius: f64, centres: &[u32]) -> Self {
-        let faces = QuadraticFaces::new(surface, order);
-        let n = surface.positions.len();
-        let around = triangles_around(surface);
-        let normals: Vec<DVec3> = (0..surface.triangles.len()).map(|t| area_vector(surface, t)).collect();
-        let mut patches = Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() };
-        let mut weight = vec![0.0; n];
-        let mut seen = vec![u32::MAX; surface.triangles.len()];
-        let mut is_touched = vec![u32::MAX; n];
-        let (mut queue, mut touched) = (Vec::new(), Vec::new());
-        for c in centres.iter().map(|&c| c as usize) {
-            let centre = surface.positions[c];
-            let normal = around[c].iter().map(|&t| normals[t as usize]).sum::<DVec3>().normalize_or_zero();
-            queue.clear();
-            touched.clear();
-            let mut add = |node: u32, w: f64, weight: &mut Vec<f64>| {
-                if is_touched[node as usize] != c as u32 {
-                    is_touched[node as usize] = c as u32;
-                    touched.push(node);
-                }
-                weight[node as usize] += w;
-            };
-            for &t in &around[c] {
-                seen[t as usize] = c as u32;
-                queue.push(t);
-            }
-            while let Some(t) = queue.pop() {
-                let corners = surface.triangles[t as usize];
-                let facing = normals[t as usize].normalize_or_zero().dot(normal);
-                if facing <= 0.0 || radius <= 0.0 {
-                    continue;
-                }
-                let positions = corners.map(|node| surface.positions[node as usize]);
-                let area = 0.5 * normals[t as usize].length() * facing;
-                let mut reached = false;
-                integrate(positions, centre, radius, |w, share| {
-                    reached = true;
-                    faces.shapes(surface, t as usize, w, |node, w| add(node, w * share * area, &mut weight));
-                });
-                if reached {
-                    for node in corners {
-                        for &next in &around[node as usize] {
-                            if seen[next as usize] != c as u32 {
-                                seen[next as usize] = c as u32;
-                                queue.push(next);
-                            }
-                        }
-                    }
-                }
-            }
-            let total: f64 = touched.iter().map(|&node| weight[node as usize]).sum();
-            touched.sort_unstable();
-            if total > 0.0 {
-                for &node in &touched {
-                    patches.nodes.push(node);
-                    patches.weights.push(weight[node as usize] / total);
-                }
-            } else {
-                patches.nodes.push(c as u32);
-                patches.weights.push(1.0);
-            }
-            touched.iter().for_each(|&node| weight[node as usize] = 0.0);
-            patches.offsets.push(patches.nodes.len() as u32);
-        }
+        let mut integrator = Integrator::new(surface, order, radius);
+        let mut patches = Self::empty();
+        centres.iter().for_each(|&node| patches.push(&integrator.patch(node, |_| true).weights));
         patches
+    }
+
+    /// Patches about samples, and after them the one-sided ones of samples on creases.
+    pub(crate) fn of_samples(
+        surface: &Surface,
+        order: u32,
+        radius: f64,
+        samples: &[u32],
+    ) -> (Self, Vec<OneSidedPatch>) {
+        let mut integrator = Integrator::new(surface, order, radius);
+        let mut patches = Self::empty();
+        samples.iter().for_each(|&node| patches.push(&integrator.patch(node, |_| true).weights));
+        let parts = smooth_parts(surface);
+        let mut one_sided = Vec::new();
+        for (sample, &node) in samples.iter().enumerate() {
+            let mut around: Vec<u32> =
+                integrator.around[node as usize].iter().map(|&t| parts[t as usize]).collect();
+            around.sort_unstable();
+            around.dedup();
+            if around.len() < 2 {
+                continue;
+            }
+            let side = |part: &u32| integrator.patch(node, |t| parts[t as usize] == *part);
+            let sides: Vec<Patch> = around.iter().map(side).collect();
+            let total: f64 = sides.iter().map(|side| side.total).sum();
+            for side in sides.iter().filter(|side| side.total > MIN_SIDE * total) {
+                patches.push(&side.weights);
+                one_sided.push(OneSidedPatch { sample, normal: side.normal });
+            }
+        }
+        (patches, one_sided)
+    }
+
+    fn empty() -> Self {
+        Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() }
+    }
+
+    fn push(&mut self, patch: &Cell) {
+        self.nodes.extend(patch.iter().map(|(node, _)| *node));
+        self.weights.extend(patch.iter().map(|(_, weight)| *weight));
+        self.offsets.push(self.nodes.len() as u32);
     }
 
     /// Patches with given nodes and weights.
     pub(crate) fn of_cells(cells: &[Cell]) -> Self {
-        let mut patches = Self { offsets: vec![0], nodes: Vec::new(), weights: Vec::new() };
-        for cell in cells {
-            patches.nodes.extend(cell.iter().map(|(node, _)| *node));
-            patches.weights.extend(cell.iter().map(|(_, weight)| *weight));
-            patches.offsets.push(patches.nodes.len() as u32);
-        }
+        let mut patches = Self::empty();
+        cells.iter().for_each(|cell| patches.push(cell));
         patches
     }
 
@@ -122,6 +115,91 @@ impl PatchWeights {
     pub(crate) fn of(&self, patch: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         let range = self.offsets[patch] as usize..self.offsets[patch + 1] as usize;
         self.nodes[range.clone()].iter().map(|&n| n as usize).zip(self.weights[range].iter().copied())
+    }
+}
+
+/// Patch about a node.
+struct Patch {
+    /// Weights of its nodes, which sum to 1.
+    weights: Cell,
+    /// Integral of the kernel [m²].
+    total: f64,
+    /// Outward unit normal at its centre.
+    normal: DVec3,
+}
+
+/// Integration of the kernel about one node after another.
+struct Integrator<'a> {
+    surface: &'a Surface,
+    radius: f64,
+    faces: QuadraticFaces,
+    /// Triangles around every node, and normals of all with twice the area as length [m²].
+    around: Vec<Vec<u32>>,
+    normals: Vec<DVec3>,
+    weight: Vec<f64>,
+    /// Number of the last patch that has seen a triangle, or touched a node.
+    seen: Vec<u32>,
+    touched_by: Vec<u32>,
+    number: u32,
+}
+
+impl<'a> Integrator<'a> {
+    fn new(surface: &'a Surface, order: u32, radius: f64) -> Self {
+        Self {
+            surface,
+            radius,
+            faces: QuadraticFaces::new(surface, order),
+            around: triangles_around(surface),
+            normals: (0..surface.triangles.len()).map(|t| area_vector(surface, t)).collect(),
+            weight: vec![0.0; surface.positions.len()],
+            seen: vec![0; surface.triangles.len()],
+            touched_by: vec![0; surface.positions.len()],
+            number: 0,
+        }
+    }
+
+    /// Patch about a node, over the triangles that are connected with it and belong to the patch.
+    fn patch(&mut self, node: u32, belongs: impl Fn(u32) -> bool) -> Patch {
+        let Self { surface, radius, faces, around, normals, weight, seen, touched_by, number } = self;
+        *number += 1;
+        let centre = surface.positions[node as usize];
+        let mut queue: Vec<u32> = around[node as usize].iter().copied().filter(|t| belongs(*t)).collect();
+        let normal = queue.iter().map(|&t| normals[t as usize]).sum::<DVec3>().normalize_or_zero();
+        queue.iter().for_each(|&t| seen[t as usize] = *number);
+        let mut touched = Vec::new();
+        let mut add = |node: u32, w: f64| {
+            if core::mem::replace(&mut touched_by[node as usize], *number) != *number {
+                touched.push(node);
+            }
+            weight[node as usize] += w;
+        };
+        while let Some(t) = queue.pop() {
+            let corners = surface.triangles[t as usize];
+            let facing = normals[t as usize].normalize_or_zero().dot(normal);
+            if facing <= 0.0 || *radius <= 0.0 {
+                continue;
+            }
+            let positions = corners.map(|node| surface.positions[node as usize]);
+            let area = 0.5 * normals[t as usize].length() * facing;
+            let mut reached = false;
+            integrate(positions, centre, *radius, |w, share| {
+                reached = true;
+                faces.shapes(surface, t as usize, w, |node, w| add(node, w * share * area));
+            });
+            if reached {
+                for &next in corners.iter().flat_map(|&node| &around[node as usize]) {
+                    if seen[next as usize] != *number && belongs(next) {
+                        seen[next as usize] = *number;
+                        queue.push(next);
+                    }
+                }
+            }
+        }
+        let total: f64 = touched.iter().map(|&node| weight[node as usize]).sum();
+        touched.sort_unstable();
+        let of = |&node: &u32| (node, core::mem::take(&mut weight[node as usize]) / total);
+        let weights: Cell = touched.iter().map(of).collect();
+        Patch { weights: if total > 0.0 { weights } else { vec![(node, 1.0)] }, total, normal }
     }
 }
 

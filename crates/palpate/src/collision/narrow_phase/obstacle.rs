@@ -120,6 +120,13 @@ impl ObstacleQuery<'_> {
         self.distance(p, most + height) - height
     }
 
+    /// Direction from a body point into the obstacle at the start [body].
+    fn towards(&self, p: DVec3) -> DVec3 {
+        let local = self.obstacle_from_body.transform_point3(p);
+        let outward = self.obstacle.shape.signed_distance(local, f64::INFINITY).map_or(DVec3::ZERO, |(_, n)| n);
+        -self.obstacle_from_body.matrix3.transpose() * outward
+    }
+
     /// Distance of a body point at the end of the step without contact force [m].
     fn distance_after(&self, p: DVec3, most: f64) -> f64 {
         let local = self.obstacle_from_body_after.transform_point3(p);
@@ -161,29 +168,34 @@ impl ObstacleQuery<'_> {
                 }
             },
             |surface, triangle| {
-                for node in triangles[triangle as usize].map(|n| n as usize) {
+                for vertex in triangles[triangle as usize] {
+                    let node = self.body.sample_of(footprint, vertex as usize);
                     if !surface.mark_node(node) {
                         continue;
                     }
                     let feature = FeatureId::of_node(self.level, node);
-                    let position = match known.binary_search_by(|c| c.id.feature.cmp(&feature)) {
-                        Ok(contact) => {
-                            let point = self.own.points.of(known[contact].slot);
-                            point.rest + point.state.displacement
-                        }
-                        Err(_) => {
+                    let contact = known.binary_search_by(|c| c.id.feature.cmp(&feature)).ok();
+                    let point = contact.map(|at| self.own.points.of(known[at].slot));
+                    let start = match point {
+                        Some(point) => point.rest + point.state.displacement,
+                        None => {
                             let height = self.body.node_height(footprint, node);
                             let reach = self.margin + residual + self.sweep_margin + height;
                             let modal = surface.modal_position(node);
                             if !self.approaches(modal, || surface.predicted_position(node), reach) {
                                 continue;
                             }
-                            surface.position(node)
+                            modal
                         }
                     };
-                    let free = surface.predicted_position(node);
+                    let vertex = self.body.facing_vertex(footprint, node, || self.towards(start));
+                    let position = match point.filter(|point| point.node == Some(vertex)) {
+                        Some(_) => start,
+                        None => surface.position(vertex),
+                    };
+                    let free = surface.predicted_position(vertex);
                     let location =
-                        ContactLocation { point: self.body.node_point(footprint, node), footprint };
+                        ContactLocation { point: self.body.node_point(footprint, vertex), footprint };
                     self.meet(candidates, position, free, location, feature);
                 }
                 if self.level == 0 {

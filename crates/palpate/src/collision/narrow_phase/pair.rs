@@ -51,10 +51,6 @@ impl CollisionContext<'_> {
                 near[side] > allowed[side] || is_too_much && is_larger
             });
             if !coarsens.contains(&true) {
-                let enough = COLLISION.refine_pairs_below * max_samples as f64;
-                for (at, _) in details.into_iter().zip(found).filter(|(_, found)| *found as f64 >= enough) {
-                    self.levels[at].put_off(self.step);
-                }
                 return;
             }
             for (at, _) in details.into_iter().zip(coarsens).filter(|(_, coarsens)| *coarsens) {
@@ -115,9 +111,11 @@ impl CollisionContext<'_> {
                     let id = ContactId { collider: Collider::Object(surface_of), object: nodes_of, feature };
                     candidates.list[first..].iter().any(|candidate| candidate.id == id)
                 };
-                let mut corners = base.object.body.corners(&candidate.location).into_iter();
+                let body = &base.object.body;
+                let mut corners = body.corners(&candidate.location).into_iter();
+                let is_held = |vertex| is_candidate(body.sample_of(base.footprint, vertex));
                 let is_redundant = uses_samples
-                    && corners.all(|(node, weight)| weight < COLLISION.on_edge || is_candidate(node));
+                    && corners.all(|(vertex, weight)| weight < COLLISION.on_edge || is_held(vertex));
                 if !is_redundant {
                     candidates.push(candidate);
                 }
@@ -163,7 +161,7 @@ impl Side<'_> {
         travel: f64,
         near_nodes: &mut BoundedVec<u32>,
     ) {
-        let Self { own, object, surface, .. } = self;
+        let Self { own, object, footprint, surface, .. } = self;
         let (pose, base_pose) = (own.rigid.pose, base.own.rigid.pose);
         let grown = base.surface.max_displacement()
             + travel
@@ -182,12 +180,13 @@ impl Side<'_> {
         surface.traverse(
             |_, _, centre, radius| is_near(centre, radius),
             |surface, triangle| {
-                for node in surface.surface().triangles[triangle as usize] {
-                    if surface.mark_node(node as usize)
-                        && is_near(surface.modal_position(node as usize), residual)
+                for vertex in surface.surface().triangles[triangle as usize] {
+                    let node = object.body.sample_of(*footprint, vertex as usize);
+                    if surface.mark_node(node)
+                        && is_near(surface.modal_position(node), residual)
                         && !near_nodes.is_full()
                     {
-                        near_nodes.push(node);
+                        near_nodes.push(node as u32);
                     }
                 }
             },
@@ -217,7 +216,7 @@ fn approach(
     let moving = MovingPoint {
         point: nodes.point_in(base, modal),
         travel: travel + deformation,
-        facing: nodes.direction_in(base, nodes.object.body.outward_normal(node)),
+        facing: nodes.direction_in(base, nodes.object.body.outward_normal(nodes.footprint, node)),
         known: known.map(|(_, location)| location.point.triangle),
         heights: nodes.object.body.node_height(nodes.footprint, node) + base.object.body.max_height,
         edge: nodes.object.body.edge.min(base.object.body.edge),
@@ -253,8 +252,9 @@ fn meet(
             location = last;
         }
     }
-    let Side { footprint, .. } = *nodes;
-    let of_node = ContactLocation { point: nodes.object.body.node_point(footprint, node), footprint };
+    let (footprint, body) = (nodes.footprint, &nodes.object.body);
+    let vertex = body.facing_vertex(footprint, node, || base.direction_in(nodes, -normal));
+    let of_node = ContactLocation { point: body.node_point(footprint, vertex), footprint };
     Some(ContactCandidate {
         id,
         location,
