@@ -57,7 +57,8 @@ fn block_rests_on_contact_samples_as_on_all_nodes() {
         let mut force = DVec3::ZERO;
         for number in 0..6000 {
             let output = step(&model, &mut state, &Input::default());
-            assert!(output.contacts.len() <= most.min(45));
+            // Samples, and at most twice as many nodes between them.
+            assert!(output.contacts.len() <= most.saturating_mul(3).min(45));
             if number >= 5000 {
                 force += output.contacts.iter().map(|c| c.force).sum::<DVec3>() * 1e-3;
             }

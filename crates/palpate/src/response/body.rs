@@ -302,13 +302,6 @@ impl Body {
         of_patches.fold(self.vertices(Footprint::Point), usize::max)
     }
 
-    /// Node or contact sample that a vertex of a footprint's surface belongs to.
-    ///
-    /// # Real time
-    pub(crate) fn sample_of(&self, footprint: Footprint, vertex: usize) -> usize {
-        self.samples(footprint).map_or(vertex, |samples| samples.sample_of(vertex))
-    }
-
     /// Vertex of a node or contact sample that faces a direction [body]: on a crease the patch on the side with the nearest normal.
     ///
     /// # Real time
@@ -479,9 +472,7 @@ impl Body {
             match self.patch(location.footprint) {
                 _ if weight == 0.0 => {}
                 None => give(corner, weight),
-                Some(patch) => {
-                    patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight))
-                }
+                Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
             }
         }
     }

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Nodes across an edge are left out: a sample of an edge or of a corner stays there, and a body rests on it. Such a sample has one-sided
-//! patches as well, one for each smooth side; a contact takes the one whose normal opposes it most. The residual
+//! patches as well, one for each smooth side; a contact with an obstacle takes the one whose normal opposes it most. The residual
 //! compliance D [m/N] between samples is that of the nodes, averaged on both sides: as exact as it is recorded, and positive
 //! semi-definite with it.
 //!
@@ -18,7 +18,7 @@
 
 use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
 use crate::surface::{
-    EDGE_COSINE, OneSidedPatch, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint, area_normal,
+    EDGE_COSINE, OneSidedPatch, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint,
 };
 use alloc::vec;
 use alloc::vec::Vec;
@@ -71,17 +71,8 @@ impl SampleSurface {
         let triangles = if is_surface {
             let mut index = vec![u32::MAX; rest.positions.len()];
             level.nodes.iter().enumerate().for_each(|(sample, &node)| index[node as usize] = sample as u32);
-            // A corner on a crease has the patch on the triangle's side.
-            let vertex = |node: u32, normal: DVec3| {
-                let sample = index[node as usize] as usize;
-                facing_vertex((samples, &of_sample, &vertex_normals), sample, || normal) as u32
-            };
-            let on_surface = |corners: &[u32; 3]| {
-                let positions = corners.map(|node| rest.positions[node as usize]);
-                let normal = area_normal(positions).normalize_or_zero();
-                corners.map(|node| vertex(node, normal))
-            };
-            level.triangles.iter().map(on_surface).collect()
+            let sample = |node: u32| index[node as usize];
+            level.triangles.iter().map(|corners| corners.map(sample)).collect()
         } else {
             Vec::new()
         };
@@ -132,18 +123,19 @@ impl SampleSurface {
         self.triangle.len()
     }
 
-    /// Sample that a vertex belongs to.
-    ///
-    /// # Real time
-    pub(super) fn sample_of(&self, vertex: usize) -> usize {
-        self.one_sided.get(vertex.wrapping_sub(self.samples)).map_or(vertex, |sample| *sample as usize)
-    }
-
     /// Vertex of a sample whose normal is nearest to a direction [body].
     ///
     /// # Real time
     pub(super) fn facing_vertex(&self, sample: usize, direction: impl FnOnce() -> DVec3) -> usize {
-        facing_vertex((self.samples, &self.one_sided, &self.normals), sample, direction)
+        let first = self.one_sided.partition_point(|of| (*of as usize) < sample);
+        let count = self.one_sided[first..].iter().take_while(|of| **of as usize == sample).count();
+        if count == 0 {
+            return sample;
+        }
+        let direction = direction();
+        let facing = |vertex: usize| self.normals[vertex].dot(direction);
+        let further = (0..count).map(|side| self.samples + first + side);
+        further.fold(sample, |best, vertex| if facing(vertex) > facing(best) { vertex } else { best })
     }
 
     /// Outward unit normal of a vertex at rest [body].
@@ -172,23 +164,6 @@ impl SampleSurface {
     fn used_corners(&self, point: &SurfacePoint) -> impl Iterator<Item = (usize, f64)> {
         self.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0)
     }
-}
-
-/// Vertex of a sample whose normal is nearest to a direction, by the number of samples, the sample of every further vertex and all normals.
-fn facing_vertex(
-    (samples, one_sided, normals): (usize, &[u32], &[DVec3]),
-    sample: usize,
-    direction: impl FnOnce() -> DVec3,
-) -> usize {
-    let first = one_sided.partition_point(|of| (*of as usize) < sample);
-    let count = one_sided[first..].iter().take_while(|of| **of as usize == sample).count();
-    if count == 0 {
-        return sample;
-    }
-    let direction = direction();
-    let facing = |vertex: usize| normals[vertex].dot(direction);
-    let further = (0..count).map(|side| samples + first + side);
-    further.fold(sample, |best, vertex| if facing(vertex) > facing(best) { vertex } else { best })
 }
 
 /// Positions [m] of vertices at these nodes with these normals: on the smooth surface, averaged along the normal.

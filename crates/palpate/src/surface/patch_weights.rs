@@ -344,4 +344,35 @@ mod tests {
             assert!((field(|p| p.y * p.y) / (a * a / 8.0) - 1.0).abs() < 5e-3, "{}", field(|p| p.y * p.y));
         }
     }
+
+    #[test]
+    fn samples_on_the_creases_of_a_block_have_one_patch_for_each_face() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = crate::recording::Recording::from_bytes(bytes).expect("a released recording");
+        let block = super::super::test_surfaces::cut_in_four(&recording.surface);
+        let (low, high) = block.extent();
+        let all: Vec<u32> = (0..block.positions.len() as u32).collect();
+        let (patches, one_sided) = PatchWeights::of_samples(&block, 1, 0.05, &all);
+        let faces_at = |p: DVec3| -> usize {
+            let on = |x: f64, a: f64, b: f64| usize::from((x - a).abs().min((x - b).abs()) < 1e-9);
+            on(p.x, low.x, high.x) + on(p.y, low.y, high.y) + on(p.z, low.z, high.z)
+        };
+        for (sample, &position) in block.positions.iter().enumerate() {
+            let sides = one_sided.iter().filter(|side| side.sample == sample).count();
+            assert_eq!(sides, if faces_at(position) > 1 { faces_at(position) } else { 0 }, "{position}");
+        }
+        assert_eq!(patches.len(), all.len() + one_sided.len());
+        for (at, side) in one_sided.iter().enumerate() {
+            let centre = block.positions[side.sample];
+            let mut sum = 0.0;
+            for (node, weight) in patches.of(all.len() + at) {
+                let height = side.normal.dot(block.positions[node] - centre);
+                assert!(weight > 0.0 && height.abs() < 1e-9, "on the face: {height}");
+                sum += weight;
+            }
+            assert!((sum - 1.0).abs() < 1e-12);
+        }
+        let ball = super::super::test_surfaces::ball(4);
+        assert!(PatchWeights::of_samples(&ball, 1, 0.3, &[0, 5, 40]).1.is_empty());
+    }
 }

@@ -31,8 +31,8 @@ const FLICKER: f64 = 2.5e-3;
 /// Energy that is lost within half a second at rest, as a share of weight times diagonal: nodes come and go.
 const LOST: f64 = 2e-4;
 
-/// Force of a punch by samples against all nodes: 2.8 % at most, and 7.6 % of a sheet that is thinner than the samples are apart.
-const BY_SAMPLES: f64 = 0.03;
+/// Force of a punch by samples against all nodes: 0.7 % at most, and 7.7 % of a sheet that is thinner than the samples are apart.
+const BY_SAMPLES: f64 = 0.01;
 const BY_SAMPLES_ON_SHEET: f64 = 0.08;
 
 /// Kinetic energy, as a share of weight times diagonal, below which a body is at rest: it falls by so much of its size.

@@ -123,7 +123,8 @@ impl ObstacleQuery<'_> {
     /// Direction from a body point into the obstacle at the start [body].
     fn towards(&self, p: DVec3) -> DVec3 {
         let local = self.obstacle_from_body.transform_point3(p);
-        let outward = self.obstacle.shape.signed_distance(local, f64::INFINITY).map_or(DVec3::ZERO, |(_, n)| n);
+        let outward =
+            self.obstacle.shape.signed_distance(local, f64::INFINITY).map_or(DVec3::ZERO, |(_, n)| n);
         -self.obstacle_from_body.matrix3.transpose() * outward
     }
 
@@ -168,8 +169,7 @@ impl ObstacleQuery<'_> {
                 }
             },
             |surface, triangle| {
-                for vertex in triangles[triangle as usize] {
-                    let node = self.body.sample_of(footprint, vertex as usize);
+                for node in triangles[triangle as usize].map(|n| n as usize) {
                     if !surface.mark_node(node) {
                         continue;
                     }

@@ -111,11 +111,9 @@ impl CollisionContext<'_> {
                     let id = ContactId { collider: Collider::Object(surface_of), object: nodes_of, feature };
                     candidates.list[first..].iter().any(|candidate| candidate.id == id)
                 };
-                let body = &base.object.body;
-                let mut corners = body.corners(&candidate.location).into_iter();
-                let is_held = |vertex| is_candidate(body.sample_of(base.footprint, vertex));
+                let mut corners = base.object.body.corners(&candidate.location).into_iter();
                 let is_redundant = uses_samples
-                    && corners.all(|(vertex, weight)| weight < COLLISION.on_edge || is_held(vertex));
+                    && corners.all(|(node, weight)| weight < COLLISION.on_edge || is_candidate(node));
                 if !is_redundant {
                     candidates.push(candidate);
                 }
@@ -161,7 +159,7 @@ impl Side<'_> {
         travel: f64,
         near_nodes: &mut BoundedVec<u32>,
     ) {
-        let Self { own, object, footprint, surface, .. } = self;
+        let Self { own, object, surface, .. } = self;
         let (pose, base_pose) = (own.rigid.pose, base.own.rigid.pose);
         let grown = base.surface.max_displacement()
             + travel
@@ -180,13 +178,12 @@ impl Side<'_> {
         surface.traverse(
             |_, _, centre, radius| is_near(centre, radius),
             |surface, triangle| {
-                for vertex in surface.surface().triangles[triangle as usize] {
-                    let node = object.body.sample_of(*footprint, vertex as usize);
-                    if surface.mark_node(node)
-                        && is_near(surface.modal_position(node), residual)
+                for node in surface.surface().triangles[triangle as usize] {
+                    if surface.mark_node(node as usize)
+                        && is_near(surface.modal_position(node as usize), residual)
                         && !near_nodes.is_full()
                     {
-                        near_nodes.push(node as u32);
+                        near_nodes.push(node);
                     }
                 }
             },
@@ -252,9 +249,8 @@ fn meet(
             location = last;
         }
     }
-    let (footprint, body) = (nodes.footprint, &nodes.object.body);
-    let vertex = body.facing_vertex(footprint, node, || base.direction_in(nodes, -normal));
-    let of_node = ContactLocation { point: body.node_point(footprint, vertex), footprint };
+    let Side { footprint, .. } = *nodes;
+    let of_node = ContactLocation { point: nodes.object.body.node_point(footprint, node), footprint };
     Some(ContactCandidate {
         id,
         location,
