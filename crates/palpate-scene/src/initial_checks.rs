@@ -158,8 +158,8 @@ fn in_obstacle(object: &Placed, name: &str, shape: &Shape, pose: Pose) -> Option
     };
     (distance < -object.allowed()).then(|| {
         let message = format!(
-            "the obstacle {name:?} begins inside the object {:?}, its centre {} deep: contact finds only its \
-             corners; move one of them",
+            "the obstacle {name:?} begins inside the object {:?}, its centre {} deep: no node of the \
+             object is near its surface; move one of them",
             object.name,
             millimetres(-distance)
         );

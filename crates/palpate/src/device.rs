@@ -39,8 +39,8 @@ pub struct Coupling {
 pub struct DeviceParameters {
     /// Radius of the spherical tip [m]; 0 for a point.
     pub tip_radius: f64,
-    /// Radius of the contact patch that a touch is spread over [m]; 0 for a point. From about four mesh edges on
-    /// the force does not show the mesh.
+    /// Radius of the contact patch that a touch is spread over [m]; 0 for a point. From about three mesh edges on
+    /// (six with linear elements) the force does not show the mesh.
     pub patch_radius: f64,
     /// Coulomb's coefficient of friction of the tip [1].
     pub friction: f64,

@@ -26,6 +26,11 @@ pub struct Obstacle {
 }
 
 /// Shape of an obstacle.
+///
+/// A new one is met everywhere by the compiler, but in its scene keys (`palpate-scene/src/file/keys.rs`, read by `obstacles.rs`) and on
+/// the page (`viewer/src/protocol/messages.ts`, `viewer/src/rendering/obstacle_mesh.ts`; VTU and glTF have their own triangles in
+/// `palpate-export/src/rigid_surface.rs`). Surfaces meet its signed distance at nodes; where faces can lie deeper it is round
+/// (the interiors of triangles meet it), where it can come in between nodes it has corners.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Half-space through the origin, on the side opposite to the unit normal.
@@ -226,12 +231,18 @@ impl Shape {
 
     /// Whether a face of an object can penetrate deeper than its corners ([`Self::deepest`]).
     pub(crate) fn is_round(&self) -> bool {
-        matches!(self, Self::Sphere { .. } | Self::Capsule { .. })
+        match self {
+            Self::Sphere { .. } | Self::Capsule { .. } => true,
+            Self::Plane { .. } | Self::Box { .. } | Self::Mesh(_) => false,
+        }
     }
 
     /// Whether the shape has corners ([`Self::corners`]).
     pub(crate) fn has_corners(&self) -> bool {
-        matches!(self, Self::Box { .. } | Self::Mesh(_))
+        match self {
+            Self::Box { .. } | Self::Mesh(_) => true,
+            Self::Plane { .. } | Self::Sphere { .. } | Self::Capsule { .. } => false,
+        }
     }
 
     /// Barycentric weights of the deepest point of a triangle in a round shape; none for other shapes, which meet faces with
@@ -323,7 +334,11 @@ impl Obstacle {
             Shape::Capsule { radius, half_length } if !(positive(*radius) && positive(*half_length)) => {
                 fail(format!("radius {radius} m and half length {half_length} m must be positive"))
             }
-            _ => Ok(()),
+            Shape::Plane { .. }
+            | Shape::Sphere { .. }
+            | Shape::Box { .. }
+            | Shape::Capsule { .. }
+            | Shape::Mesh(_) => Ok(()),
         }
     }
 }

@@ -1,13 +1,13 @@
 //! Contact problem of a step: objects, devices and contacts, and the effect of contact forces on them.
 //!
 //! ```text
-//! apart_c = b_c − Σ_d W_cd·f_d        W = J·(Φ·B·Φᵀ + S)·Jᵀ + c·h²·J·M⁻¹·Jᵀ + 1/(k + d/h)
+//! r_c = b_c − Σ_d W_cd·f_d        W = J·(Φ·B·Φᵀ + (1 − e + c)·S)·Jᵀ + rigid motion + 1/(k + d/h)
 //! ```
 //!
 //! W [m/N], the Delassus operator, is not formed: every object keeps its compliance between its contact points, and its
 //! linearised rigid motion.
 //!
-//! Equations: docs/theory.md (C31), (C32), (C34), (C44), (C45), (C46).
+//! Equations: docs/theory.md (C31), (C32), (C34), (C36), (C37), (C44), (C45), (C46).
 
 use super::constraint::Constraint;
 use super::coulomb::{solve_contact, tangents};
@@ -154,7 +154,7 @@ impl ContactProblem<'_> {
         }
     }
 
-    /// Project forces onto their laws: none on contacts that are open without it, and no friction beyond the cone.
+    /// Project forces onto their laws, (C36) and (C37): none on contacts that are open without it, and no friction beyond the cone.
     pub(super) fn project_forces(&mut self, members: &[u32]) {
         for at in members.iter().map(|&at| at as usize) {
             let contact = self.contacts[at];

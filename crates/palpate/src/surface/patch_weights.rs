@@ -217,7 +217,9 @@ pub(super) fn area_vector(surface: &Surface, triangle: usize) -> DVec3 {
     area_normal(surface.triangles[triangle].map(|node| surface.positions[node as usize]))
 }
 
-/// Kernel of patches times a scale: scale·(1 − s²)², for the ratio s of distance and radius [1].
+/// Kernel of patches times a scale: scale·(1 − s²)², for the ratio s of distance and radius [1]. Patches of fingers and of contact samples
+/// have it, and forces that move to another level of detail (C61). That it ends at s = 1 is assumed where tips exclude their own
+/// indentation (`collision/narrow_phase/tip.rs`), and by the range that is fitted to it (`response/residual_kernel.rs`).
 pub(crate) fn patch_kernel(scale: f64, s_squared: f64) -> f64 {
     if s_squared < 1.0 { scale * (1.0 - s_squared) * (1.0 - s_squared) } else { 0.0 }
 }
