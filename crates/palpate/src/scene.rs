@@ -157,18 +157,19 @@ impl Model {
             cells: &[],
             max_contact_samples: if uses_samples { parameters.max_contact_samples } else { usize::MAX },
         };
-        let make = |(number, object): (usize, ModelObject)| {
+        let given = objects;
+        let mut objects: Vec<Object> = Vec::with_capacity(given.len());
+        for (number, object) in given.into_iter().enumerate() {
             let ModelObject { recording, response, start, deformation, friction } = object;
             let rules = ObjectRules { cells: &cells[number], ..rules };
-            Object::new(recording, response, (start, deformation), friction, rules)
-                .map_err(|error| ModelError::Object { object: number, error: Box::new(error) })
-        };
-        let objects: Result<Vec<Object>, _> = objects.into_iter().enumerate().map(make).collect();
-        let mut objects = objects?;
+            let made = Object::new(recording, response, (start, deformation), friction, rules, &objects);
+            let fail = |error| ModelError::Object { object: number, error: Box::new(error) };
+            objects.push(made.map_err(fail)?);
+        }
         if parameters.touches_surfaces(objects.len()) {
             for at in 0..objects.len() {
                 let (before, own) = objects.split_at_mut(at);
-                let known = before.iter().map(|object| (&object.body, &object.response));
+                let known = before.iter().map(|object| (&*object.body, &object.response));
                 own[0].response.precompute_nodal_compliance(&own[0].body, known);
             }
         }

@@ -93,7 +93,7 @@ impl DeformationSnapshot {
         out: &mut [DVec3],
     ) {
         let (object, gravity) = self.object_and_gravity(model, out);
-        let object = (&object.response, &object.body);
+        let object = (&object.response, &*object.body);
         self.data.surface_displacement(object, gravity, &mut cache.0, out);
     }
 

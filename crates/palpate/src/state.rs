@@ -2,7 +2,7 @@
 
 use crate::bounded_vec::BoundedVec;
 use crate::clamp::ClampState;
-use crate::collision::{CollisionScene, CollisionWorkspace, Contact, LevelOfDetail};
+use crate::collision::{CollisionScene, CollisionWorkspace, Contact, Levels};
 use crate::contact::{Constraint, RecoveryBudget, Solver};
 use crate::device::DeviceState;
 use crate::energy::EnergyLedger;
@@ -44,8 +44,7 @@ pub struct State {
     pub(crate) gravity: DVec3,
     /// Contact cache, in the order of the ids.
     pub(crate) contacts: BoundedVec<Contact>,
-    /// Levels of detail: objects × (obstacles + objects).
-    pub(crate) levels: Vec<LevelOfDetail>,
+    pub(crate) levels: Levels,
     /// Energy of the virtual couplings.
     pub(crate) couplings: EnergyLedger,
     pub(crate) recovery: RecoveryBudget,
@@ -97,7 +96,7 @@ impl State {
             devices: vec![DeviceState::new(); devices],
             clamps: parameters.clamps.iter().map(|clamp| ClampState::new(clamp.frame)).collect(),
             contacts: BoundedVec::new(contacts),
-            levels: vec![LevelOfDetail::default(); count * (obstacles.len() + count)],
+            levels: Levels::new(count, obstacles.len()),
             couplings: EnergyLedger::default(),
             recovery: RecoveryBudget::default(),
             workspace: Workspace {

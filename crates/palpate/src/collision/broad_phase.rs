@@ -1,15 +1,70 @@
-//! Broad phase: where two objects can meet in a step.
+//! Broad phase: which objects can meet in a step, and where.
 //!
-//! Bounding spheres first, then a separating plane across the line between the centres: with upper bounds e_a and e_b of the
+//! Sweep and prune (Baraff 1992, Cornell University) over the boxes about the objects' bounding spheres, along the axis on which their
+//! centres spread most. Then a separating plane across the line between two centres: with upper bounds e_a and e_b of the
 //! objects' support functions along it, they are apart when e_a + e_b is less than the distance of the centres.
 //!
 //! Equations: docs/theory.md (C19).
 
 use super::context::CollisionContext;
-use super::deformed_surface::{DeformedSurface, SurfaceTime};
+use super::deformed_surface::{DeformedSurface, SurfaceTime, deformation_bound};
+use super::level_of_detail::ObjectPair;
 use super::parameters::COLLISION;
+use crate::object::Object;
 use crate::response::Footprint;
+use alloc::vec;
+use alloc::vec::Vec;
 use glam::DVec3;
+
+/// Sweep and prune over the objects; buffers are made once.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SweepAndPrune {
+    /// Touchable objects, by the lower ends of their boxes along the axis of the last step.
+    order: Vec<u32>,
+    /// Lowest and highest corner of every object's box [m, world].
+    boxes: Vec<[DVec3; 2]>,
+}
+
+impl SweepAndPrune {
+    pub(super) fn new(objects: &[Object]) -> Self {
+        let is_touchable = |at: &u32| objects[*at as usize].is_touchable();
+        let order = (0..objects.len() as u32).filter(is_touchable).collect();
+        Self { order, boxes: vec![[DVec3::ZERO; 2]; objects.len()] }
+    }
+
+    /// Set the boxes about spheres (centre, radius).
+    fn set(&mut self, sphere: impl Fn(usize) -> (DVec3, f64)) {
+        for at in self.order.iter().map(|&at| at as usize) {
+            let (centre, radius) = sphere(at);
+            self.boxes[at] = [centre - radius, centre + radius];
+        }
+    }
+
+    /// Axis on which the boxes' centres have the largest variance.
+    fn widest_axis(&self) -> usize {
+        let centres = || self.order.iter().map(|&at| self.boxes[at as usize]).map(|[low, high]| low + high);
+        let mean = centres().sum::<DVec3>() / self.order.len().max(1) as f64;
+        let variance = centres().map(|centre| (centre - mean) * (centre - mean)).sum::<DVec3>();
+        (0..3).fold(0, |best, axis| if variance[axis] > variance[best] { axis } else { best })
+    }
+
+    /// Pass all pairs of overlapping boxes to `found`, the lower number first.
+    fn overlaps(&mut self, mut found: impl FnMut([usize; 2])) {
+        let axis = self.widest_axis();
+        let Self { order, boxes } = self;
+        let low = |at: u32| boxes[at as usize][0][axis];
+        order.sort_unstable_by(|a, b| low(*a).total_cmp(&low(*b)).then(a.cmp(b)));
+        for (place, &a) in order.iter().enumerate() {
+            let [low_a, high_a] = boxes[a as usize];
+            for &b in order[place + 1..].iter().take_while(|b| low(**b) <= high_a[axis]) {
+                let [low_b, high_b] = boxes[b as usize];
+                if low_a.cmple(high_b).all() && low_b.cmple(high_a).all() {
+                    found([a.min(b) as usize, a.max(b) as usize]);
+                }
+            }
+        }
+    }
+}
 
 /// Half-space of an object: points farther than `offset` [m] from its centre along a direction [world].
 #[derive(Debug, Clone, Copy)]
@@ -19,57 +74,118 @@ pub(super) struct HalfSpace {
 }
 
 impl CollisionContext<'_> {
+    /// Find the contacts of all pairs of objects.
+    ///
+    /// # Real time
+    /// Costs the objects, the pairs whose boxes overlap along an axis, and the nodes that are near another object.
+    pub(crate) fn find_pair_contacts(&mut self) {
+        if self.states.len() < 2 {
+            return;
+        }
+        let mut sweep = core::mem::take(&mut self.workspace.sweep);
+        sweep.set(|at| self.bounding_sphere(at));
+        sweep.overlaps(|objects| self.find_contacts_of_pair(objects));
+        self.workspace.sweep = sweep;
+        self.levels.forget_pairs(self.step);
+    }
+
+    /// Sphere that holds an object over the step, at all levels of detail, with its share of the slack of [`Self::overlap`].
+    fn bounding_sphere(&self, at: usize) -> (DVec3, f64) {
+        let (own, object) = (&self.states[at], &self.scene.objects[at]);
+        let body = &object.body;
+        let bound = deformation_bound(body, Footprint::Point, &own.response, own.response.coordinates());
+        let displacement = (0..=body.coarsest_surface_level())
+            .map(|level| body.bounds(body.footprint_at_level(level)).max_displacement(&bound))
+            .fold(0.0, f64::max);
+        let slack =
+            body.max_height + COLLISION.margin * body.edge + COLLISION.motion_factor * self.motion(at);
+        (own.rigid.pose.position, object.radius + displacement + slack)
+    }
+
+    /// Bound of an object's motion over the step without contact force [m].
+    fn motion(&self, at: usize) -> f64 {
+        let (own, radius) = (&self.states[at], self.scene.objects[at].radius);
+        own.rigid.pose.motion_bound(&own.free.end.pose, radius) + own.surface_motion
+    }
+
     /// Half-spaces of two objects within which they can meet in the step; none when a plane separates them.
-    pub(super) fn overlap(&mut self, a: usize, b: usize) -> Option<[HalfSpace; 2]> {
-        let motion = |at: usize| {
-            let (own, radius) = (&self.states[at], self.scene.objects[at].radius);
-            own.rigid.pose.motion_bound(&own.free.end.pose, radius) + own.surface_motion
-        };
+    pub(super) fn overlap(&mut self, pair: &ObjectPair) -> Option<[HalfSpace; 2]> {
+        let [a, b] = pair.objects;
         let objects = self.scene.objects;
         let edge = objects[a].body.edge.max(objects[b].body.edge);
         let heights = objects[a].body.max_height + objects[b].body.max_height;
-        let slack = heights + COLLISION.margin * edge + COLLISION.motion_factor * (motion(a) + motion(b));
+        let slack =
+            heights + COLLISION.margin * edge + COLLISION.motion_factor * (self.motion(a) + self.motion(b));
         let between = self.states[b].rigid.pose.position - self.states[a].rigid.pose.position;
         let Some(along) = between.try_normalize() else {
             return Some([HalfSpace { direction: DVec3::X, offset: f64::NEG_INFINITY }; 2]);
         };
         let room = between.length() - slack;
         // The bounds by elastic energy are often enough.
-        let pair = [(a, b), (b, a)];
-        let extent = pair.map(|of| objects[of.0].radius + self.surface_against(of).max_displacement());
+        let extent = [0, 1]
+            .map(|side| objects[pair.objects[side]].radius + self.surface_of(pair, side).max_displacement());
         if extent[0] + extent[1] < room {
             return None;
         }
         // A plane between them costs less than both support functions.
         let middle = room * extent[0] / (extent[0] + extent[1]);
-        let mut end_a = self.support((a, b), along, middle);
-        let end_b = self.support((b, a), -along, room - end_a);
+        let mut end_a = self.support((pair, 0), along, middle);
+        let end_b = self.support((pair, 1), -along, room - end_a);
         if end_a + end_b > room && end_a <= middle {
-            end_a = self.support((a, b), along, room - end_b);
+            end_a = self.support((pair, 0), along, room - end_b);
         }
         let [of_a, of_b] = [(along, room - end_b), (-along, room - end_a)];
         let half_spaces = [of_a, of_b].map(|(direction, offset)| HalfSpace { direction, offset });
         (end_a + end_b > room).then_some(half_spaces)
     }
 
-    /// Upper bound of an object's support function along a direction [m, world], or `least` if that is larger.
-    fn support(&mut self, of: (usize, usize), direction: DVec3, least: f64) -> f64 {
-        let orientation = self.states[of.0].rigid.pose.orientation;
-        self.surface_against(of).support(orientation.inverse() * direction, least)
+    /// Upper bound of the support function of one of two objects along a direction [m, world], or `least` if that is larger.
+    fn support(&mut self, (pair, side): (&ObjectPair, usize), direction: DVec3, least: f64) -> f64 {
+        let orientation = self.states[pair.objects[side]].rigid.pose.orientation;
+        self.surface_of(pair, side).support(orientation.inverse() * direction, least)
     }
 
-    /// Footprint with which an object is read against another.
-    pub(super) fn footprint_against(&self, own: usize, other: usize) -> Footprint {
-        let level = self.levels[self.level_against_object(own, other)].level;
-        self.scene.objects[own].body.footprint_at_level(level)
+    /// Footprint with which one of two objects is read against the other.
+    pub(super) fn footprint_of(&self, pair: &ObjectPair, side: usize) -> Footprint {
+        self.scene.objects[pair.objects[side]].body.footprint_at_level(pair.details[side].level)
     }
 
-    /// Surface of an object as it is read against another, at the start of the step.
-    fn surface_against(&mut self, (at, other): (usize, usize)) -> DeformedSurface<'_> {
-        let footprint = self.footprint_against(at, other);
+    /// Surface of one of two objects as it is read against the other, at the start of the step.
+    fn surface_of(&mut self, pair: &ObjectPair, side: usize) -> DeformedSurface<'_> {
+        let (at, footprint) = (pair.objects[side], self.footprint_of(pair, side));
         let (own, body) = (&self.states[at], &self.scene.objects[at].body);
         let positions = &mut self.workspace.positions[at];
         let moment = SurfaceTime::StepStart(self.step);
         DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sweep_and_prune_finds_the_overlaps_of_all_pairs() {
+        let wave = |p: f64, k: usize| libm::sin(p * k as f64 + p);
+        for (count, spread) in
+            [(1, [1.0, 1.0, 1.0]), (40, [3.0, 0.1, 1.0]), (60, [0.2, 4.0, 2.0]), (60, [0.0; 3])]
+        {
+            let sphere = |k: usize| {
+                let centre = DVec3::new(wave(1.3, k), wave(2.1, k), wave(0.7, k)) * DVec3::from_array(spread);
+                (centre, 0.2 + 0.15 * wave(3.3, k))
+            };
+            let order = (0..count as u32).collect();
+            let mut sweep = SweepAndPrune { order, boxes: vec![[DVec3::ZERO; 2]; count] };
+            sweep.set(sphere);
+            let mut found = Vec::new();
+            sweep.overlaps(|pair| found.push(pair));
+            found.sort_unstable();
+            let overlaps = |&[a, b]: &[usize; 2]| {
+                let ((p, r), (q, s)) = (sphere(a), sphere(b));
+                (p - q).abs().max_element() <= r + s
+            };
+            let all = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
+            assert_eq!(found, all.filter(overlaps).collect::<Vec<_>>());
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! Context of a step's collision detection: the scene, and buffers that are made once.
 
+use super::broad_phase::SweepAndPrune;
 use super::candidate::CandidateList;
 use super::contact::Contact;
 use super::contact_cache::LevelChanges;
-use super::level_of_detail::LevelOfDetail;
+use super::level_of_detail::Levels;
 use super::node_cache::NodePositionCache;
 use super::proximity::ProximityQuery;
 use super::triangle_cache::TriangleCache;
@@ -31,6 +32,7 @@ pub(crate) struct CollisionWorkspace {
     pub(crate) positions: Vec<NodePositionCache>,
     /// Triangles near each device: devices × objects.
     pub(crate) triangles: Vec<TriangleCache>,
+    pub(crate) sweep: SweepAndPrune,
     /// Surface nodes that the broad phase leaves.
     pub(crate) near_nodes: BoundedVec<u32>,
     /// Modal coordinates at a time within the step.
@@ -50,6 +52,7 @@ impl CollisionWorkspace {
             query: ProximityQuery::new(),
             positions: objects.iter().map(|o| NodePositionCache::new(&o.body)).collect(),
             triangles: per_device.collect(),
+            sweep: SweepAndPrune::new(objects),
             near_nodes: BoundedVec::new(objects.iter().map(nodes).max().unwrap_or(0)),
             coordinates: vec![0.0; objects.iter().map(modes).max().unwrap_or(0)],
             candidates: CandidateList::new(contacts),
@@ -64,24 +67,13 @@ pub(crate) struct CollisionContext<'a> {
     pub(crate) states: &'a [ObjectState],
     /// Contacts of the last step.
     pub(crate) contacts: &'a [Contact],
-    /// Levels of detail: objects × (obstacles + objects).
-    pub(crate) levels: &'a mut [LevelOfDetail],
+    pub(crate) levels: &'a mut Levels,
     pub(crate) workspace: &'a mut CollisionWorkspace,
     /// Number of the step.
     pub(crate) step: u64,
 }
 
 impl CollisionContext<'_> {
-    /// Index of the level of detail of an object against an obstacle.
-    pub(super) fn level_against_obstacle(&self, object: usize, obstacle: usize) -> usize {
-        object * (self.scene.obstacles.len() + self.scene.objects.len()) + obstacle
-    }
-
-    /// Index of the level of detail of an object against another.
-    pub(super) fn level_against_object(&self, object: usize, other: usize) -> usize {
-        self.level_against_obstacle(object, self.scene.obstacles.len() + other)
-    }
-
     /// Index of the triangle cache of a device on an object.
     pub(super) fn triangle_cache(&self, device: usize, object: usize) -> usize {
         device * self.scene.objects.len() + object

@@ -46,6 +46,21 @@ pub(crate) enum SurfaceTime<'a> {
 /// Contacts whose own residual displacement is excluded, with the displacement of their location [m].
 type OwnContacts = [Option<(ContactLocation, DVec3)>; MAX_TIP_CONTACTS];
 
+/// Norms of a body's deformation at modal coordinates, read with a contact footprint.
+pub(super) fn deformation_bound(
+    body: &Body,
+    footprint: Footprint,
+    state: &ResponseState,
+    q: &[f64],
+) -> DeformationBound {
+    DeformationBound {
+        modal: body.band_norms(q),
+        residual: state.residual_norm(),
+        max_residual: state.max_residual(),
+        slope: body.residual_slope(footprint),
+    }
+}
+
 /// Surface of an object at a moment, read with a contact footprint; body frame.
 pub(crate) struct DeformedSurface<'a> {
     pub(crate) body: &'a Body,
@@ -86,12 +101,7 @@ impl<'a> DeformedSurface<'a> {
                 cache.take_contact_points(points, footprint);
             }
         }
-        let bound = DeformationBound {
-            modal: body.band_norms(q),
-            residual: state.residual_norm(),
-            max_residual: state.max_residual(),
-            slope: body.residual_slope(footprint),
-        };
+        let bound = deformation_bound(body, footprint, state, q);
         Self {
             body,
             footprint,

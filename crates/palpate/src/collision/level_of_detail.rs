@@ -1,4 +1,4 @@
-//! Level of detail of an object against one collider: all surface nodes, or ever fewer contact samples.
+//! Levels of detail of objects against obstacles and each other: all surface nodes, or ever fewer contact samples.
 //!
 //! A level is coarsened as soon as too many samples come near; the next finer one is tried every now and then. Nodes between
 //! the samples that penetrate are added (`narrow_phase/refinement`).
@@ -6,13 +6,19 @@
 //! Equations: docs/theory.md (C30).
 
 use super::parameters::COLLISION;
+use crate::bounded_vec::BoundedVec;
 use crate::surface::Traversal;
+use alloc::vec;
+use alloc::vec::Vec;
 
 /// Upper limit of the steps until a finer level is tried.
 const MAX_TRIAL_INTERVAL: u64 = 64 * COLLISION.refine_after_steps;
 
+/// Pairs of objects near each other at a time whose levels are kept, per object.
+const PAIRS_PER_OBJECT: usize = 16;
+
 /// Level of detail of an object against one obstacle or object.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct LevelOfDetail {
     /// 0 for all nodes; higher is coarser.
     pub(super) level: usize,
@@ -22,19 +28,11 @@ pub(crate) struct LevelOfDetail {
     trial_interval: u64,
     /// Whether the level is tried in this step.
     is_trial: bool,
-    /// Search for nodes that penetrate, a part of it in each step.
-    pub(super) search: Traversal,
 }
 
 impl Default for LevelOfDetail {
     fn default() -> Self {
-        Self {
-            level: 0,
-            since: 0,
-            trial_interval: COLLISION.refine_after_steps,
-            is_trial: false,
-            search: Traversal::FINISHED,
-        }
+        Self { level: 0, since: 0, trial_interval: COLLISION.refine_after_steps, is_trial: false }
     }
 }
 
@@ -61,6 +59,67 @@ impl LevelOfDetail {
             (2 * self.trial_interval).min(MAX_TRIAL_INTERVAL)
         };
         (self.level, self.since, self.is_trial) = (self.level + 1, step, false);
+    }
+}
+
+/// Level of detail against an obstacle.
+#[derive(Debug, Clone)]
+pub(crate) struct ObstacleLevel {
+    pub(super) detail: LevelOfDetail,
+    /// Search for nodes that penetrate, a part of it in each step.
+    pub(super) search: Traversal,
+}
+
+/// Two objects with their levels of detail against each other.
+#[derive(Debug, Clone)]
+pub(super) struct ObjectPair {
+    pub(super) objects: [usize; 2],
+    pub(super) details: [LevelOfDetail; 2],
+    /// Last step in which they were near each other.
+    step: u64,
+}
+
+/// Levels of detail of a scene.
+#[derive(Debug, Clone)]
+pub(crate) struct Levels {
+    /// Objects × obstacles.
+    of_obstacles: Vec<ObstacleLevel>,
+    obstacles: usize,
+    /// Pairs of objects that are near each other, ascending.
+    pairs: BoundedVec<ObjectPair>,
+}
+
+impl Levels {
+    pub(crate) fn new(objects: usize, obstacles: usize) -> Self {
+        let finest = ObstacleLevel { detail: LevelOfDetail::default(), search: Traversal::FINISHED };
+        let room = PAIRS_PER_OBJECT.min(objects.saturating_sub(1)) * objects;
+        Self { of_obstacles: vec![finest; objects * obstacles], obstacles, pairs: BoundedVec::new(room) }
+    }
+
+    /// Level of an object against an obstacle.
+    pub(super) fn against_obstacle(&mut self, object: usize, obstacle: usize) -> &mut ObstacleLevel {
+        &mut self.of_obstacles[object * self.obstacles + obstacle]
+    }
+
+    /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step.
+    pub(super) fn of_pair(&self, objects: [usize; 2], step: u64) -> ObjectPair {
+        let known = self.pairs.binary_search_by(|pair| pair.objects.cmp(&objects));
+        let details = known.map_or([LevelOfDetail::default(); 2], |at| self.pairs[at].details);
+        ObjectPair { objects, details, step }
+    }
+
+    /// Keep the levels of two objects. Without room the next step begins with the finest.
+    pub(super) fn keep_pair(&mut self, pair: ObjectPair) {
+        match self.pairs.binary_search_by(|known| known.objects.cmp(&pair.objects)) {
+            Ok(at) => self.pairs[at] = pair,
+            Err(at) if !self.pairs.is_full() => self.pairs.insert(at, pair),
+            Err(_) => {}
+        }
+    }
+
+    /// Forget the pairs that were not near in a step.
+    pub(super) fn forget_pairs(&mut self, step: u64) {
+        self.pairs.retain(|pair| pair.step == step);
     }
 }
 

@@ -51,7 +51,7 @@ impl Solver {
     pub(crate) fn new(objects: usize, held: usize, contacts: usize, uses_samples: bool) -> Self {
         Self {
             visits_until_loose: if uses_samples { SOLVER.visits_with_samples } else { SOLVER.visits },
-            islands: Islands::new(objects),
+            islands: Islands::new(objects, contacts),
             system: BilateralSystem::new(held),
             held: Vec::with_capacity(held),
             bodies: Vec::with_capacity(objects),
@@ -72,7 +72,11 @@ impl Solver {
             if !self.islands.is_root(root) {
                 continue;
             }
-            self.islands.members(root, problem.contacts, &mut self.bodies, &mut self.members);
+            let (bodies, members) = self.islands.members(root);
+            self.bodies.clear();
+            self.bodies.extend_from_slice(bodies);
+            self.members.clear();
+            self.members.extend_from_slice(members);
             if self.members.is_empty() {
                 let own = &mut problem.states[root];
                 own.end = own.free;

@@ -53,7 +53,8 @@ pub(crate) struct ObjectRules<'a> {
 /// One object of a scene; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct Object {
-    pub(crate) body: Body,
+    /// Its body, which objects of one recording share.
+    pub(crate) body: Arc<Body>,
     pub(crate) response: Response,
     /// Coulomb's coefficient against other objects [1].
     pub(crate) friction: f64,
@@ -66,13 +67,14 @@ pub(crate) struct Object {
 }
 
 impl Object {
-    /// Object from its recording, with the patches and contact samples that the scene asks for.
+    /// Object from its recording, with the patches and contact samples that the scene asks for; `others` are the earlier objects of the scene.
     pub(crate) fn new(
         recording: Arc<Recording>,
         form: ResponseForm,
         (start, deformation): (ObjectStart, InitialDeformation),
         friction: f64,
         rules: ObjectRules,
+        others: &[Self],
     ) -> Result<Self, ModelError> {
         let fail = |name, what| Err(ModelError::Parameter { name, what });
         let ObjectStart { mut pose, twist } = start;
@@ -127,7 +129,12 @@ impl Object {
                 "uses a table, which knows points only: a clamp needs the modal form".into(),
             );
         }
-        let body = Body::new(recording, &radii, max_samples, rules.cells);
+        let is_same = |other: &&Self| {
+            let has_clamps = !rules.cells.is_empty() || other.body.cells() > 0;
+            Arc::ptr_eq(&other.body.recording, &recording) && other.is_touchable() == is_modal && !has_clamps
+        };
+        let known = others.iter().find(is_same).map(|other| other.body.clone());
+        let body = known.unwrap_or_else(|| Arc::new(Body::new(recording, &radii, max_samples, rules.cells)));
         Ok(Self {
             body,
             response,

@@ -71,13 +71,13 @@ impl CollisionContext<'_> {
             sweep_margin: if travel > 0.5 * obstacle.shape.size() { travel } else { 0.0 },
         };
         let max_samples = self.scene.max_contact_samples;
-        let level = self.level_against_obstacle(at, number);
         let mark = self.workspace.candidates.mark();
         let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
-        let before_level = self.levels[level].level;
-        self.levels[level].begin(self.step);
+        let detail = &mut self.levels.against_obstacle(at, number).detail;
+        let before_level = detail.level;
+        detail.begin(self.step);
         let is_near = loop {
-            query.level = self.levels[level].level;
+            query.level = detail.level;
             let footprint = body.footprint_at_level(query.level);
             let positions = &mut self.workspace.positions[at];
             let moment = SurfaceTime::StepStart(self.step);
@@ -87,7 +87,7 @@ impl CollisionContext<'_> {
             let reach = object.radius + surface.max_displacement() + travel + query.margin + body.max_height;
             let candidates = &mut self.workspace.candidates;
             let is_near = apart - reach <= obstacle.shape.radius();
-            let allowed = self.levels[level].allowed(max_samples);
+            let allowed = detail.allowed(max_samples);
             if is_near {
                 query.nodes(surface, known, candidates, mark.len.saturating_add(allowed));
             }
@@ -95,11 +95,11 @@ impl CollisionContext<'_> {
                 break is_near;
             }
             candidates.rewind(mark);
-            self.levels[level].coarsen(self.step);
+            detail.coarsen(self.step);
         };
         if is_near && query.level > 0 {
             let is_coarser = query.level > before_level;
-            query.refine(self, if is_coarser { &[] } else { known }, level, mark.len);
+            query.refine(self, if is_coarser { &[] } else { known }, mark.len);
         }
         if obstacle.shape.has_corners() {
             query.corners(self);

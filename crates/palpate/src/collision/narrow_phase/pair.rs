@@ -8,6 +8,7 @@ use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, OtherSide};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
+use crate::collision::level_of_detail::ObjectPair;
 use crate::collision::parameters::COLLISION;
 use crate::collision::proximity::ProximityQuery;
 use crate::object::{Object, ObjectState};
@@ -15,71 +16,53 @@ use crate::response::{ContactLocation, Footprint};
 use glam::DVec3;
 
 impl CollisionContext<'_> {
-    /// Find the contacts of all pairs of objects.
-    ///
-    /// # Real time
-    /// Costs the pairs, and the nodes that are near another object.
-    pub(crate) fn find_pair_contacts(&mut self) {
-        let count = self.states.len();
-        for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
-            if self.scene.objects[a].is_touchable() && self.scene.objects[b].is_touchable() {
-                self.find_contacts_of_pair(a, b);
-            }
-        }
-    }
-
     /// Find the contacts of two objects, at the finest levels of detail that have few enough samples near.
-    fn find_contacts_of_pair(&mut self, a: usize, b: usize) {
+    pub(crate) fn find_contacts_of_pair(&mut self, objects: [usize; 2]) {
         let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
-        let details = [(a, b), (b, a)].map(|(own, other)| self.level_against_object(own, other));
-        details.iter().for_each(|&at| self.levels[at].begin(self.step));
+        let mut pair = self.levels.of_pair(objects, self.step);
+        pair.details.iter_mut().for_each(|detail| detail.begin(self.step));
         loop {
-            let found = match self.overlap(a, b) {
-                Some([of_a, of_b]) => {
-                    [self.nodes_against(a, b, of_a, mark.len), self.nodes_against(b, a, of_b, mark.len)]
-                }
+            let found = match self.overlap(&pair) {
+                Some(of) => [0, 1].map(|side| self.nodes_against(&pair, side, of[side], mark.len)),
                 None => [0; 2],
             };
-            let can_be_coarser = [self.can_be_coarser(a, b), self.can_be_coarser(b, a)];
-            let near = [0, 1].map(|side| if can_be_coarser[side] { found[side] } else { 0 });
-            let allowed = details.map(|at| self.levels[at].allowed(max_samples));
+            let near = [0, 1].map(|side| if self.can_be_coarser(&pair, side) { found[side] } else { 0 });
             let is_too_much = self.workspace.candidates.list.len() - mark.len > max_samples;
             // Coarsen a side that has too many near, or the one that has more of them.
             let coarsens = [0, 1].map(|side| {
                 let is_larger = near[side] > 0 && near[side] == near[0].max(near[1]);
-                near[side] > allowed[side] || is_too_much && is_larger
+                near[side] > pair.details[side].allowed(max_samples) || is_too_much && is_larger
             });
             if !coarsens.contains(&true) {
-                return;
+                break;
             }
-            for (at, _) in details.into_iter().zip(coarsens).filter(|(_, coarsens)| *coarsens) {
-                self.levels[at].coarsen(self.step);
+            for (detail, _) in pair.details.iter_mut().zip(coarsens).filter(|(_, coarsens)| *coarsens) {
+                detail.coarsen(self.step);
             }
             self.workspace.candidates.rewind(mark);
         }
+        self.levels.keep_pair(pair);
     }
 
-    fn can_be_coarser(&self, own: usize, other: usize) -> bool {
-        let level = self.levels[self.level_against_object(own, other)].level;
-        level < self.scene.objects[own].body.coarsest_surface_level()
+    fn can_be_coarser(&self, pair: &ObjectPair, side: usize) -> bool {
+        pair.details[side].level < self.scene.objects[pair.objects[side]].body.coarsest_surface_level()
     }
 
-    /// Find the contacts of one object's nodes in a half-space with the surface of another. Gives the number of nodes that
+    /// Find the contacts of the nodes of one of two objects in a half-space with the surface of the other. Gives the number of nodes that
     /// come near it; where a coarser level could stand for them, counting stops beyond the allowed.
     fn nodes_against(
         &mut self,
-        nodes_of: usize,
-        surface_of: usize,
+        pair: &ObjectPair,
+        side: usize,
         half_space: HalfSpace,
         first: usize,
     ) -> usize {
-        let can_be_coarser = self.can_be_coarser(nodes_of, surface_of);
+        let [nodes_of, surface_of] = [pair.objects[side], pair.objects[1 - side]];
+        let can_be_coarser = self.can_be_coarser(pair, side);
         let enough = if can_be_coarser { self.scene.max_contact_samples } else { usize::MAX };
-        let footprints =
-            [self.footprint_against(nodes_of, surface_of), self.footprint_against(surface_of, nodes_of)];
-        let [own_level, other_level] = [(nodes_of, surface_of), (surface_of, nodes_of)]
-            .map(|(own, other)| self.levels[self.level_against_object(own, other)].level as u8);
+        let footprints = [self.footprint_of(pair, side), self.footprint_of(pair, 1 - side)];
+        let [own_level, other_level] = [side, 1 - side].map(|side| pair.details[side].level as u8);
         let uses_samples = [own_level, other_level] != [0; 2];
         let Self { scene, states, contacts, step, .. } = self;
         let CollisionWorkspace { query, positions, near_nodes, candidates, .. } = &mut *self.workspace;

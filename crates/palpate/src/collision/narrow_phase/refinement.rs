@@ -13,18 +13,11 @@ use crate::surface::Traversal;
 use glam::DVec3;
 
 impl ObstacleQuery<'_> {
-    /// Keep the nodes among the known contacts, and search on; `detail` is the index of the level of detail, `first` that of
-    /// the first candidate against the obstacle.
+    /// Keep the nodes among the known contacts, and search on; `first` is the index of the first candidate against the obstacle.
     ///
     /// # Real time
     /// Costs the nodes that were added, and a limited number of visits.
-    pub(super) fn refine(
-        &self,
-        context: &mut CollisionContext,
-        known: &[Contact],
-        detail: usize,
-        first: usize,
-    ) {
+    pub(super) fn refine(&self, context: &mut CollisionContext, known: &[Contact], first: usize) {
         let max_added = context.scene.max_contact_samples.saturating_mul(2);
         let CollisionWorkspace { positions, near_nodes, candidates, .. } = &mut *context.workspace;
         let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
@@ -43,7 +36,7 @@ impl ObstacleQuery<'_> {
         }
         // Nodes that are too deep.
         let cache = &mut positions[self.object];
-        let search = &mut context.levels[detail].search;
+        let search = &mut context.levels.against_obstacle(self.object, self.number).search;
         if search.is_finished() {
             *search = Traversal::START;
         }
