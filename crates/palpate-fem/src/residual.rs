@@ -138,19 +138,22 @@ fn whole(
     surface_nodes: &[u32],
     progress: &mut dyn Progress,
 ) -> Result<ResidualCompliance, SolveError> {
-    let touchable = 3 * surface_nodes.len();
-    let mut packed = vec![0.0_f32; touchable * (touchable + 1) / 2];
-    let mut diagonal = vec![0.0; touchable];
-    for_each_column(system, modes, surface_nodes, progress, |j, column| {
-        for (i, &value) in column.iter().enumerate().skip(j) {
-            packed[i * (i + 1) / 2 + j] = value as f32;
+    let nodes = surface_nodes.len();
+    let mut blocks = vec![0.0_f32; 9 * nodes * (nodes + 1) / 2];
+    // Both triangles of the blocks on the diagonal.
+    let mut set = |i: usize, j: usize, value: f64| {
+        let first = 9 * (i / 3 * (i / 3 + 1) / 2 + j / 3);
+        blocks[first + 3 * (i % 3) + j % 3] = value as f32;
+        if i / 3 == j / 3 {
+            blocks[first + 3 * (j % 3) + i % 3] = value as f32;
         }
-        diagonal[j] = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
+    };
+    for_each_column(system, modes, surface_nodes, progress, |j, column| {
+        column.iter().enumerate().skip(j + 1).for_each(|(i, &value)| set(i, j, value));
+        let raised = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
+        set(j, j, raised);
     })?;
-    for (i, value) in diagonal.into_iter().enumerate() {
-        packed[i * (i + 1) / 2 + i] = value as f32;
-    }
-    Ok(ResidualCompliance::Whole(packed))
+    Ok(ResidualCompliance::Whole(blocks))
 }
 
 fn near_field(

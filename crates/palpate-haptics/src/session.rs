@@ -101,6 +101,8 @@ pub struct Report {
     pub steps: u64,
     /// Steps with an unsolved island or dropped contacts.
     pub unsolved_steps: u64,
+    /// Steps in which the budget of the contact solver was used up.
+    pub steps_out_of_budget: u64,
     /// Largest penetration of each object's contacts over all steps [m].
     pub largest_penetration_m: Vec<f64>,
     /// Number of steps in which each device's tip touched something.
@@ -145,6 +147,7 @@ struct ForceResult {
     granted: GrantedScheduling,
     timing: Timing,
     unsolved_steps: u64,
+    steps_out_of_budget: u64,
     largest_penetration_m: Vec<f64>,
     touching_steps: Vec<u64>,
     wall_s: f64,
@@ -262,6 +265,7 @@ impl Session {
                 steps: forces.process.steps(),
                 state: forces.process.into_state(),
                 unsolved_steps: forces.unsolved_steps,
+                steps_out_of_budget: forces.steps_out_of_budget,
                 largest_penetration_m: forces.largest_penetration_m,
                 touching_steps: forces.touching_steps,
                 log: steps.map(|steps| LogSummary { steps, missed: forces.missed_records }),
@@ -320,7 +324,7 @@ impl ForceLoop<'_> {
         let steal_time_before = steal_time();
         std::thread::sleep(HEAD_START);
         let mut timing = Timing::default();
-        let mut unsolved_steps = 0;
+        let (mut unsolved_steps, mut steps_out_of_budget) = (0, 0);
         let output = process.state().output();
         let mut largest_penetration_m = vec![0.0_f64; output.objects.len()];
         let mut touching_steps = vec![0; output.devices.len()];
@@ -343,6 +347,7 @@ impl ForceLoop<'_> {
             let output = process.cycle(clock.now_s());
             unsolved_steps +=
                 u64::from(output.status.unsolved_islands > 0 || output.status.dropped_contacts > 0);
+            steps_out_of_budget += u64::from(output.status.islands_out_of_budget > 0);
             for (largest, object) in largest_penetration_m.iter_mut().zip(&output.objects) {
                 *largest = largest.max(object.penetration_m);
             }
@@ -390,6 +395,7 @@ impl ForceLoop<'_> {
             granted,
             timing,
             unsolved_steps,
+            steps_out_of_budget,
             largest_penetration_m,
             touching_steps,
             wall_s,

@@ -68,21 +68,17 @@ fn interpolated(
     Recording { metadata, surface, modes, residual, gravity: None, sample_levels: Vec::new() }
 }
 
-/// S between all new nodes, its lower triangle packed by rows.
+/// S between all new nodes.
 fn whole_residual(parents: &[[usize; 2]], coarse: &ResidualCompliance) -> ResidualCompliance {
-    let mut packed = Vec::new();
+    let mut blocks = Vec::new();
     for (i, of_i) in parents.iter().enumerate() {
-        let block = |of_j: &[usize; 2]| -> DMat3 {
+        for of_j in &parents[..=i] {
             let pairs = of_i.iter().flat_map(|&a| of_j.iter().map(move |&b| (a, b)));
-            pairs.map(|(a, b)| coarse.block(a, b) * 0.25).sum()
-        };
-        let blocks: Vec<DMat3> = parents[..=i].iter().map(block).collect();
-        for axis in 0..3 {
-            let entries = blocks.iter().flat_map(|block| block.row(axis).to_array());
-            packed.extend(entries.take(3 * i + axis + 1).map(|x| x as f32));
+            let block: DMat3 = pairs.map(|(a, b)| coarse.block(a, b) * 0.25).sum();
+            blocks.extend(block.transpose().to_cols_array().map(|x| x as f32));
         }
     }
-    ResidualCompliance::Whole(packed)
+    ResidualCompliance::Whole(blocks)
 }
 
 /// S between new nodes within a few edges of each other, tapered to zero at the radius.

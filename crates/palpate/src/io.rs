@@ -188,6 +188,9 @@ pub struct StepStatus {
     /// not, because a device or a body moves too far in a step. Such contacts give a scaled force in this step, or none;
     /// islands with held points only give none.
     pub unsolved_islands: u32,
+    /// Islands whose contacts the solver left before they met their laws, since the budget of work was used up. Their forces give no energy,
+    /// and the next step goes on from them.
+    pub islands_out_of_budget: u32,
     /// Contacts dropped beyond an object's limit of contact points.
     pub dropped_contacts: u32,
 }

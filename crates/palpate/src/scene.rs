@@ -50,6 +50,9 @@ pub struct ModelParameters {
     /// Upper limit of contact samples of an object against one obstacle or object. Where more surface nodes come near,
     /// Poisson-disk samples replace them, each with the patch around it.
     pub max_contact_samples: usize,
+    /// Budget of the contact solver in a step, in products of a 3×3 block and a force, each some nanoseconds: it leaves an island early when
+    /// its share is used up (see [`StepStatus::islands_out_of_budget`](crate::StepStatus::islands_out_of_budget)).
+    pub solver_budget: u64,
 }
 
 impl Default for ModelParameters {
@@ -65,9 +68,27 @@ impl Default for ModelParameters {
             clamps: Vec::new(),
             max_contact_points: 512,
             max_contact_samples: usize::MAX,
+            solver_budget: u64::MAX,
         }
     }
 }
+
+impl ModelParameters {
+    /// Parameters for steps in real time: as by default, but 48 contact samples, and a budget of the solver.
+    pub fn for_real_time() -> Self {
+        Self {
+            max_contact_samples: REALTIME_CONTACT_SAMPLES,
+            solver_budget: REALTIME_SOLVER_BUDGET,
+            ..Self::default()
+        }
+    }
+}
+
+/// Contact samples in real time.
+const REALTIME_CONTACT_SAMPLES: usize = 48;
+
+/// Budget of the solver in real time: about 0.3 ms on a core of 2024.
+const REALTIME_SOLVER_BUDGET: u64 = 100_000;
 
 /// Object to be put into a scene.
 #[derive(Debug, Clone)]

@@ -39,7 +39,7 @@ fn model(workplace: &Workplace) -> Model {
         max_contact_samples: 8,
         devices: vec![finger; 2],
         obstacles: vec![floor],
-        ..ModelParameters::default()
+        ..ModelParameters::for_real_time()
     };
     let cube = object_at(&Arc::new(recording), DVec3::Z * 0.0501, DVec3::ZERO);
     Model::new(parameters, vec![cube]).expect("a model")

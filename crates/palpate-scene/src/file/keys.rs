@@ -25,6 +25,7 @@ pub(super) struct SceneFile {
     pub max_contact_points: Option<Spanned<i64>>,
     #[serde(alias = "most_places")]
     pub max_contact_samples: Option<Spanned<i64>>,
+    pub solver_budget: Option<Spanned<i64>>,
     #[serde(default)]
     pub object: Vec<ObjectEntry>,
     #[serde(default)]

@@ -29,9 +29,9 @@ use toml::Spanned;
 /// Upper bound of contact points of an object: their coupling takes 9·n² numbers, a gigabyte here.
 const MAX_CONTACT_POINTS: i64 = 4096;
 
-/// Range of the contact samples of an object on an obstacle; and their number where steps have a deadline.
+/// Ranges of the contact samples of an object on an obstacle, and of the budget of the contact solver.
 const CONTACT_SAMPLES: RangeInclusive<i64> = 8..=1_000_000;
-const REALTIME_CONTACT_SAMPLES: usize = 48;
+const SOLVER_BUDGET: RangeInclusive<i64> = 1000..=i64::MAX;
 
 /// Purpose of a scene, which decides defaults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -238,7 +238,10 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
 
 /// Parameters of the whole scene, without devices and obstacles.
 fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<ModelParameters, SceneError> {
-    let usual = ModelParameters::default();
+    let usual = match mode {
+        RunMode::Offline => ModelParameters::default(),
+        RunMode::RealTime => ModelParameters::for_real_time(),
+    };
     let integrators = [("exact", RigidIntegrator::ExactHold), ("paper", RigidIntegrator::Paper)];
     let motion = source.word("integrator", file.integrator.as_ref(), integrators)?;
     let rigid_compliance = if file.rigid_compliance.unwrap_or(true) {
@@ -260,17 +263,23 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
             format!("{key} is {count}, expected {least} to {most}"),
         )
     };
-    let usual_samples = match mode {
-        RunMode::Offline => usual.max_contact_samples,
-        RunMode::RealTime => REALTIME_CONTACT_SAMPLES,
-    };
     let allowed = 1..=MAX_CONTACT_POINTS;
     let max_contact_points =
         count("max_contact_points", &file.max_contact_points, usual.max_contact_points, allowed)?;
     let max_contact_samples =
-        count("max_contact_samples", &file.max_contact_samples, usual_samples, CONTACT_SAMPLES)?;
+        count("max_contact_samples", &file.max_contact_samples, usual.max_contact_samples, CONTACT_SAMPLES)?;
+    let usual_budget = usize::try_from(usual.solver_budget).unwrap_or(usize::MAX);
+    let solver_budget = count("solver_budget", &file.solver_budget, usual_budget, SOLVER_BUDGET)? as u64;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
-    Ok(ModelParameters { step_s, motion, rigid_compliance, max_contact_points, max_contact_samples, ..usual })
+    Ok(ModelParameters {
+        step_s,
+        motion,
+        rigid_compliance,
+        max_contact_points,
+        max_contact_samples,
+        solver_budget,
+        ..usual
+    })
 }
 
 /// Reads gravity into the parameters; gives its course in time, if it has one.

@@ -1,4 +1,4 @@
-//! Broad phase: which objects can meet in a step, and where.
+//! Broad phase: which objects can meet each other or a device in a step, and where.
 //!
 //! Sweep and prune (Baraff 1992, Cornell University) over the boxes about the objects' bounding spheres, along the axis on which their
 //! centres spread most. Then a separating plane across the line between two centres: with upper bounds e_a and e_b of the
@@ -6,10 +6,11 @@
 //!
 //! Equations: docs/theory.md (C19).
 
-use super::context::CollisionContext;
+use super::context::{CollisionContext, CollisionWorkspace};
 use super::deformed_surface::{DeformedSurface, SurfaceTime, deformation_bound};
 use super::level_of_detail::ObjectPair;
 use super::parameters::COLLISION;
+use crate::device::DeviceState;
 use crate::object::Object;
 use crate::response::Footprint;
 use alloc::vec;
@@ -23,21 +24,30 @@ pub(crate) struct SweepAndPrune {
     order: Vec<u32>,
     /// Lowest and highest corner of every object's box [m, world].
     boxes: Vec<[DVec3; 2]>,
+    /// Axis of the step, and the width of the widest box along it [m].
+    axis: usize,
+    widest: f64,
 }
 
 impl SweepAndPrune {
     pub(super) fn new(objects: &[Object]) -> Self {
         let is_touchable = |at: &u32| objects[*at as usize].is_touchable();
         let order = (0..objects.len() as u32).filter(is_touchable).collect();
-        Self { order, boxes: vec![[DVec3::ZERO; 2]; objects.len()] }
+        Self { order, boxes: vec![[DVec3::ZERO; 2]; objects.len()], axis: 0, widest: 0.0 }
     }
 
-    /// Set the boxes about spheres (centre, radius).
+    /// Set the boxes about spheres (centre, radius), and sort them.
     fn set(&mut self, sphere: impl Fn(usize) -> (DVec3, f64)) {
         for at in self.order.iter().map(|&at| at as usize) {
             let (centre, radius) = sphere(at);
             self.boxes[at] = [centre - radius, centre + radius];
         }
+        self.axis = self.widest_axis();
+        let Self { order, boxes, axis, .. } = self;
+        let low = |at: u32| boxes[at as usize][0][*axis];
+        order.sort_unstable_by(|a, b| low(*a).total_cmp(&low(*b)).then(a.cmp(b)));
+        let width = |at: &u32| boxes[*at as usize][1][*axis] - low(*at);
+        self.widest = order.iter().map(width).fold(0.0, f64::max);
     }
 
     /// Axis on which the boxes' centres have the largest variance.
@@ -49,21 +59,34 @@ impl SweepAndPrune {
     }
 
     /// Pass all pairs of overlapping boxes to `found`, the lower number first.
-    fn overlaps(&mut self, mut found: impl FnMut([usize; 2])) {
-        let axis = self.widest_axis();
-        let Self { order, boxes } = self;
-        let low = |at: u32| boxes[at as usize][0][axis];
-        order.sort_unstable_by(|a, b| low(*a).total_cmp(&low(*b)).then(a.cmp(b)));
+    fn overlaps(&self, mut found: impl FnMut([usize; 2])) {
+        let Self { order, boxes, axis, .. } = self;
         for (place, &a) in order.iter().enumerate() {
-            let [low_a, high_a] = boxes[a as usize];
-            for &b in order[place + 1..].iter().take_while(|b| low(**b) <= high_a[axis]) {
-                let [low_b, high_b] = boxes[b as usize];
-                if low_a.cmple(high_b).all() && low_b.cmple(high_a).all() {
+            let own = boxes[a as usize];
+            let low = |b: &&u32| boxes[**b as usize][0][*axis] <= own[1][*axis];
+            for &b in order[place + 1..].iter().take_while(low) {
+                if boxes_overlap(&own, &boxes[b as usize]) {
                     found([a.min(b) as usize, a.max(b) as usize]);
                 }
             }
         }
     }
+
+    /// Objects whose boxes overlap one about a sphere (centre, radius), ascending.
+    fn overlapping(&self, (centre, radius): (DVec3, f64), found: &mut Vec<u32>) {
+        let Self { order, boxes, axis, widest } = self;
+        let own = [centre - radius, centre + radius];
+        let low = |at: u32| boxes[at as usize][0][*axis];
+        let first = order.partition_point(|&at| low(at) < own[0][*axis] - widest);
+        found.clear();
+        let along = order[first..].iter().take_while(|&&at| low(at) <= own[1][*axis]);
+        found.extend(along.filter(|&&at| boxes_overlap(&own, &boxes[at as usize])));
+        found.sort_unstable();
+    }
+}
+
+fn boxes_overlap([low_a, high_a]: &[DVec3; 2], [low_b, high_b]: &[DVec3; 2]) -> bool {
+    low_a.cmple(*high_b).all() && low_b.cmple(*high_a).all()
 }
 
 /// Half-space of an object: points farther than `offset` [m] from its centre along a direction [world].
@@ -74,19 +97,33 @@ pub(super) struct HalfSpace {
 }
 
 impl CollisionContext<'_> {
+    /// Set and sort the boxes of all objects.
+    ///
+    /// # Real time
+    /// Costs the objects, times the logarithm of their number where they change places.
+    pub(crate) fn begin_broad_phase(&mut self) {
+        let mut sweep = core::mem::take(&mut self.workspace.sweep);
+        sweep.set(|at| self.bounding_sphere(at));
+        self.workspace.sweep = sweep;
+    }
+
     /// Find the contacts of all pairs of objects.
     ///
     /// # Real time
     /// Costs the objects, the pairs whose boxes overlap along an axis, and the nodes that are near another object.
     pub(crate) fn find_pair_contacts(&mut self) {
-        if self.states.len() < 2 {
-            return;
-        }
-        let mut sweep = core::mem::take(&mut self.workspace.sweep);
-        sweep.set(|at| self.bounding_sphere(at));
+        let sweep = core::mem::take(&mut self.workspace.sweep);
         sweep.overlaps(|objects| self.find_contacts_of_pair(objects));
         self.workspace.sweep = sweep;
         self.levels.forget_pairs(self.step);
+    }
+
+    /// Objects that a device's tip can meet in the step, ascending; they stay in `near_objects` of the workspace.
+    pub(crate) fn find_near_objects(&mut self, number: usize, device: &DeviceState) {
+        let travel = (device.predicted - device.proxy).length();
+        let reach = self.scene.devices[number].tip_radius + COLLISION.motion_factor * travel;
+        let CollisionWorkspace { sweep, near_objects, .. } = &mut *self.workspace;
+        sweep.overlapping((device.proxy, reach), near_objects);
     }
 
     /// Sphere that holds an object over the step, at all levels of detail, with its share of the slack of [`Self::overlap`].
@@ -175,7 +212,8 @@ mod tests {
                 (centre, 0.2 + 0.15 * wave(3.3, k))
             };
             let order = (0..count as u32).collect();
-            let mut sweep = SweepAndPrune { order, boxes: vec![[DVec3::ZERO; 2]; count] };
+            let boxes = vec![[DVec3::ZERO; 2]; count];
+            let mut sweep = SweepAndPrune { order, boxes, ..SweepAndPrune::default() };
             sweep.set(sphere);
             let mut found = Vec::new();
             sweep.overlaps(|pair| found.push(pair));
@@ -186,6 +224,13 @@ mod tests {
             };
             let all = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
             assert_eq!(found, all.filter(overlaps).collect::<Vec<_>>());
+            let (probe, mut near) = ((DVec3::new(0.4, 0.1, -0.3), 0.3), Vec::new());
+            sweep.overlapping(probe, &mut near);
+            let is_near = |&k: &u32| {
+                let (centre, radius) = sphere(k as usize);
+                (centre - probe.0).abs().max_element() <= radius + probe.1
+            };
+            assert_eq!(near, (0..count as u32).filter(is_near).collect::<Vec<_>>());
         }
     }
 }

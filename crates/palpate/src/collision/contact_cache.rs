@@ -17,7 +17,7 @@ struct Bodies<'a> {
 }
 
 impl Bodies<'_> {
-    /// Move spring forces of an object between locations, and read the state of its contact points again.
+    /// Move spring forces of an object between locations; the state of its contact points is read again afterwards.
     fn move_spring_forces(
         &mut self,
         object: usize,
@@ -28,6 +28,13 @@ impl Bodies<'_> {
         let view =
             &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
         own.ledger.dissipated += view.move_spring_forces(from, to);
+    }
+
+    /// Read the state of an object's contact points again.
+    fn read_state(&mut self, object: usize) {
+        let own = &mut self.states[object];
+        let view =
+            &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
         own.points.read_state(view);
     }
 
@@ -82,6 +89,7 @@ impl LevelChanges {
     fn apply(&self, bodies: &mut Bodies) {
         let same_sides = |a: &Place, b: &Place| (a.object, a.against) == (b.object, b.against);
         let mut rest = &*self.released;
+        let mut has_moved = false;
         while let Some((first, others)) = rest.split_first() {
             // Places with the same sides lie together.
             let count = others.iter().take_while(|place| same_sides(place, first)).count();
@@ -93,6 +101,11 @@ impl LevelChanges {
             let needed = self.needed.iter().filter(is_other_level).map(|place| place.location);
             if needed.clone().next().is_some() {
                 bodies.move_spring_forces(first.object, group.iter().map(|place| place.location), needed);
+                has_moved = true;
+            }
+            if has_moved && next.first().is_none_or(|place| place.object != first.object) {
+                bodies.read_state(first.object);
+                has_moved = false;
             }
         }
     }

@@ -7,7 +7,7 @@ use super::contact_cache::LevelChanges;
 use super::level_of_detail::Levels;
 use super::node_cache::NodePositionCache;
 use super::proximity::ProximityQuery;
-use super::triangle_cache::TriangleCache;
+use super::triangle_cache::TriangleCaches;
 use crate::bounded_vec::BoundedVec;
 use crate::device::DeviceParameters;
 use crate::object::{Object, ObjectState};
@@ -30,9 +30,11 @@ pub(crate) struct CollisionWorkspace {
     pub(crate) query: ProximityQuery,
     /// Node positions, per object.
     pub(crate) positions: Vec<NodePositionCache>,
-    /// Triangles near each device: devices × objects.
-    pub(crate) triangles: Vec<TriangleCache>,
+    /// Triangles near each device.
+    pub(crate) triangles: Vec<TriangleCaches>,
     pub(crate) sweep: SweepAndPrune,
+    /// Objects near a device.
+    pub(crate) near_objects: BoundedVec<u32>,
     /// Surface nodes that the broad phase leaves.
     pub(crate) near_nodes: BoundedVec<u32>,
     /// Modal coordinates at a time within the step.
@@ -47,14 +49,15 @@ impl CollisionWorkspace {
         let CollisionScene { objects, devices, .. } = scene;
         let modes = |object: &Object| object.response.modes();
         let nodes = |object: &Object| object.body.recording.surface.positions.len();
-        let per_device = devices.iter().flat_map(|_| objects.iter().map(|o| TriangleCache::new(modes(o))));
+        let max_modes = objects.iter().map(modes).max().unwrap_or(0);
         Self {
             query: ProximityQuery::new(),
             positions: objects.iter().map(|o| NodePositionCache::new(&o.body)).collect(),
-            triangles: per_device.collect(),
+            triangles: devices.iter().map(|_| TriangleCaches::new(objects.len(), max_modes)).collect(),
             sweep: SweepAndPrune::new(objects),
+            near_objects: BoundedVec::new(objects.len()),
             near_nodes: BoundedVec::new(objects.iter().map(nodes).max().unwrap_or(0)),
-            coordinates: vec![0.0; objects.iter().map(modes).max().unwrap_or(0)],
+            coordinates: vec![0.0; max_modes],
             candidates: CandidateList::new(contacts),
             level_changes: LevelChanges::new(contacts),
         }
@@ -71,11 +74,4 @@ pub(crate) struct CollisionContext<'a> {
     pub(crate) workspace: &'a mut CollisionWorkspace,
     /// Number of the step.
     pub(crate) step: u64,
-}
-
-impl CollisionContext<'_> {
-    /// Index of the triangle cache of a device on an object.
-    pub(super) fn triangle_cache(&self, device: usize, object: usize) -> usize {
-        device * self.scene.objects.len() + object
-    }
 }

@@ -56,7 +56,7 @@ pub(super) fn deformation_bound(
     DeformationBound {
         modal: body.band_norms(q),
         residual: state.residual_norm(),
-        max_residual: state.max_residual(),
+        max_residual: state.max_residual(body.is_tip(footprint)),
         slope: body.residual_slope(footprint),
     }
 }
@@ -71,6 +71,7 @@ pub(crate) struct DeformedSurface<'a> {
     free: &'a [f64],
     /// Spring forces of the residual compliance, and those of them that act at points, by nodes.
     spring_forces: &'a [SpringForce],
+    tip_springs: &'a [u32],
     nodal: Option<&'a NodalForces>,
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
     own: OwnContacts,
@@ -108,6 +109,7 @@ impl<'a> DeformedSurface<'a> {
             q,
             free,
             spring_forces: state.spring_forces(),
+            tip_springs: state.tip_springs(),
             nodal: state.nodal(),
             own: [None; MAX_TIP_CONTACTS],
             flat_radius: 0.0,
@@ -225,27 +227,30 @@ impl<'a> DeformedSurface<'a> {
     /// Position with the residual displacement of a node added [m], that of excluded contacts left out.
     fn add_residual(&self, node: usize, modal: DVec3) -> DVec3 {
         let own = || self.own.iter().flatten();
-        let at = (self.footprint, node);
+        if self.body.is_tip(self.footprint) {
+            let of_tips = self.tip_springs.iter().map(|&at| &self.spring_forces[at as usize]);
+            let coupled = of_tips.filter(|force| force.location.footprint == self.footprint);
+            let forces = coupled.map(|force| {
+                let is_own = own().any(|(own, _)| *own == force.location);
+                (force, if is_own { self.flat_radius } else { 0.0 })
+            });
+            return modal + self.body.tip_displacement(self.footprint, node, forces);
+        }
+        let displacement = |force: &SpringForce| self.body.residual_displacement(self.footprint, node, force);
         if self.footprint != Footprint::Point {
-            let flat = |force: &SpringForce| {
-                if own().any(|(own, _)| *own == force.location) { self.flat_radius } else { 0.0 }
-            };
-            let couples = |force: &&SpringForce| self.body.couples(self.footprint, force.location.footprint);
-            let forces = self.spring_forces.iter().filter(couples);
-            let displacement = |force: &SpringForce| self.body.residual_displacement(at, force, flat(force));
-            return modal + forces.map(displacement).sum::<DVec3>();
+            return modal + self.spring_forces.iter().map(displacement).sum::<DVec3>();
         }
         let mut position = modal;
         if let Some(nodal) = self.nodal {
             position += nodal.residual_displacement(self.body, self.spring_forces, node);
         }
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
-        for (own, displacement) in own() {
+        for (own, own_displacement) in own() {
             let is_beside = |force: &&SpringForce| {
                 force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
             };
             if let Some(force) = self.spring_forces.iter().find(is_beside) {
-                position += *displacement - self.body.residual_displacement(at, force, 0.0);
+                position += *own_displacement - displacement(force);
             }
         }
         position

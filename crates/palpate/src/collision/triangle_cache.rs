@@ -65,6 +65,43 @@ pub(crate) struct TriangleCache {
     seed_above: usize,
 }
 
+/// Triangle caches of one device: on the objects that it was near last.
+#[derive(Debug, Clone)]
+pub(crate) struct TriangleCaches {
+    /// Caches with the object and the last step of each.
+    slots: Vec<(Option<usize>, u64, TriangleCache)>,
+}
+
+/// Upper limit of objects whose triangles near a device are kept.
+const OBJECTS_PER_DEVICE: usize = 4;
+
+impl TriangleCaches {
+    /// Caches for a number of objects with so many modes at most.
+    pub(crate) fn new(objects: usize, modes: usize) -> Self {
+        let slot = |_| (None, 0, TriangleCache::new(modes));
+        Self { slots: (0..objects.min(OBJECTS_PER_DEVICE)).map(slot).collect() }
+    }
+
+    /// Cache on an object in a step: the one that it has, or the one that was used least recently, without its content.
+    pub(crate) fn of(&mut self, object: usize, step: u64) -> &mut TriangleCache {
+        let own = self.slots.iter().position(|slot| slot.0 == Some(object));
+        let age = |&at: &usize| (self.slots[at].0.is_some(), self.slots[at].1);
+        let at = own.or_else(|| (0..self.slots.len()).min_by_key(age)).unwrap_or(0);
+        let slot = &mut self.slots[at];
+        if slot.0 != Some(object) {
+            slot.2.clear();
+        }
+        (slot.0, slot.1) = (Some(object), step);
+        &mut slot.2
+    }
+
+    /// Caches that are being rebuilt, with their objects.
+    pub(crate) fn rebuilding(&mut self) -> impl Iterator<Item = (usize, &mut TriangleCache)> {
+        let slots = self.slots.iter_mut().filter(|slot| !slot.2.traversal.is_finished());
+        slots.filter_map(|(object, _, cache)| Some(((*object)?, cache)))
+    }
+}
+
 impl TriangleCache {
     pub(crate) fn new(modes: usize) -> Self {
         Self {
@@ -75,6 +112,11 @@ impl TriangleCache {
             last_visits: 0,
             seed_above: COLLISION.seed_above,
         }
+    }
+
+    /// Forget the lists.
+    fn clear(&mut self) {
+        (self.current.reach, self.traversal) = (0.0, Traversal::FINISHED);
     }
 
     /// Find the triangles within a reach [m] of a body point, or some more; of many only the local minima.
@@ -113,9 +155,9 @@ impl TriangleCache {
         sort_by_distance(found);
     }
 
-    /// Take the modal coordinates at which the next list is being built, if one is.
-    pub(crate) fn take_rebuild_coordinates(&mut self) -> Option<Vec<f64>> {
-        (!self.traversal.is_finished()).then(|| core::mem::take(&mut self.next.q))
+    /// Take the modal coordinates at which the next list is being built.
+    pub(crate) fn take_rebuild_coordinates(&mut self) -> Vec<f64> {
+        core::mem::take(&mut self.next.q)
     }
 
     /// Continue an incremental rebuild, on the surface at the coordinates of its beginning with the present residual
@@ -273,7 +315,8 @@ mod tests {
                     );
                     (counts[1], counts[2]) = (counts[1] + 1, counts[2] + u32::from(off < 1e-9));
                 }
-                if let Some(moment) = triangles.take_rebuild_coordinates() {
+                if !triangles.traversal.is_finished() {
+                    let moment = triangles.take_rebuild_coordinates();
                     let mut surface = DeformedSurface::new(
                         &body,
                         footprint,
@@ -299,6 +342,16 @@ mod tests {
             let [_, some, nearest, ..] = follow(|_| footprint, 4, 1e-2);
             assert!(some > 3000 && 100 * nearest > 99 * some, "{nearest} of {some}");
         }
+    }
+
+    #[test]
+    fn an_object_that_was_near_least_recently_gives_its_cache_away() {
+        let mut caches = TriangleCaches::new(9, 3);
+        for (step, object) in [(1, 0), (2, 1), (3, 2), (4, 3), (5, 0)] {
+            caches.of(object, step).current.reach = 1.0 + object as f64;
+        }
+        assert_eq!(caches.of(7, 6).current.reach, 0.0, "of object 1, and empty");
+        assert_eq!([0, 2, 3].map(|object| caches.of(object, 7).current.reach), [1.0, 3.0, 4.0]);
     }
 
     #[test]

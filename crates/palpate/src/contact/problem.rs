@@ -212,6 +212,46 @@ impl ContactProblem<'_> {
         pairs.map(|(constraint, contact)| constraint.dissipated(contact)).sum()
     }
 
+    /// Block products that a change of a contact's force costs: the contact points of its objects.
+    pub(super) fn products_of(&self, contact: &Contact) -> u64 {
+        let of = |object: usize| self.states[object].points.points.len() as u64;
+        let other = if let OtherSide::Object { number, .. } = contact.other { of(number) } else { 0 };
+        of(contact.object()) + other
+    }
+
+    /// Work [J] that losses pay for pushing penetrations of an island out.
+    pub(super) fn paid(&self, members: &[u32]) -> f64 {
+        let of = |&at: &u32| {
+            let (contact, constraint) = (&self.contacts[at as usize], &self.constraints[at as usize]);
+            let pushed = constraint.min_gap - contact.gap(constraint.start).min(0.0);
+            if contact.is_held() { 0.0 } else { (-contact.force.dot(contact.normal) * pushed).max(0.0) }
+        };
+        members.iter().map(of).sum()
+    }
+
+    /// Work [J] that an island's present forces dissipate on the motion without them: to first order in their scale.
+    pub(super) fn dissipated_without_forces(&self, members: &[u32]) -> f64 {
+        let free = |object: usize, slot: usize| {
+            let (own, point) = (&self.states[object], self.states[object].points.of(slot));
+            let pose = &own.free.end.pose;
+            pose.world_from_body(point.rest + point.free)
+        };
+        let of = |&at: &u32| {
+            let (contact, constraint) = (&self.contacts[at as usize], &self.constraints[at as usize]);
+            let other = match contact.other {
+                OtherSide::Device(device) => {
+                    let device = &self.devices[device];
+                    device.proxy_under_force() + device.force * device.compliance
+                }
+                OtherSide::Obstacle { end, .. } | OtherSide::Clamp { end, .. } => end,
+                OtherSide::Object { number, slot } => free(number, slot),
+            };
+            let apart = other - free(contact.object(), contact.slot);
+            if contact.is_held() { 0.0 } else { contact.force.dot(apart - constraint.start) }
+        };
+        members.iter().map(of).sum()
+    }
+
     /// Write the ends of an island's contacts under the forces of the last evaluation. Gives the work [J] that they
     /// dissipate.
     pub(super) fn write_ends(&mut self, members: &[u32]) -> f64 {

@@ -10,7 +10,10 @@
 //! held points of an island are one block, solved by Cholesky factors. Between sweeps everything is evaluated exactly with
 //! the rotation that the forces cause, so that in the end the equations of motion are met, not their linearisation.
 //!
-//! Equations: docs/theory.md (C41), (C42), (C43).
+//! Work is counted in products of a 3×3 block of W and a force. A budget of it, shared by the islands in proportion to the cost of their
+//! sweeps, ends the sweeps of an island early: its forces are then scaled down as far as its contacts would give energy.
+//!
+//! Equations: docs/theory.md (C41), (C42), (C43), (C83).
 
 use super::bilateral::BilateralSystem;
 use super::islands::Islands;
@@ -29,8 +32,56 @@ pub(crate) struct SolverReport {
     pub(crate) iterations: u32,
     /// Held directions that depend on others.
     pub(crate) dependent_rows: u32,
-    /// Islands whose contacts were not solved.
+    /// Islands whose contacts were not solved, and those whose sweeps the budget ended.
     pub(crate) unsolved_islands: u32,
+    pub(crate) islands_out_of_budget: u32,
+}
+
+/// Scales of an island.
+#[derive(Debug, Clone, Copy)]
+struct Island {
+    /// Whether it has contacts, not held points alone.
+    touches: bool,
+    /// Radius of its smallest object, and the distance from the origin that its objects reach [m].
+    size: f64,
+    reach: f64,
+    /// Held directions that depend on others.
+    dependent: usize,
+}
+
+impl Island {
+    /// Round-off of a length [m].
+    fn round_off(&self) -> f64 {
+        ROUND_OFF * self.reach
+    }
+}
+
+/// Outcome of the iteration of an island.
+#[derive(Debug, Clone, Copy)]
+struct Outcome {
+    /// Residual of the contacts' laws and of the rotations [m].
+    residual: f64,
+    is_solved: bool,
+    is_out_of_budget: bool,
+}
+
+/// Progress of an island's solution.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    /// Block products of a sweep, those so far, and their upper limit.
+    per_sweep: u64,
+    done: u64,
+    limit: u64,
+    /// Contact visits, sweeps and exact evaluations.
+    visits: u32,
+    sweeps: u32,
+    iterations: u32,
+}
+
+impl Progress {
+    fn is_out_of_budget(&self) -> bool {
+        self.done + self.per_sweep > self.limit
+    }
 }
 
 /// Solver with its buffers, made once.
@@ -64,9 +115,10 @@ impl Solver {
     ///
     /// # Real time
     /// Costs sweeps × contacts × contact points of an object.
-    pub(crate) fn solve(&mut self, problem: &mut ContactProblem) -> SolverReport {
+    pub(crate) fn solve(&mut self, problem: &mut ContactProblem, budget: u64) -> SolverReport {
         let mut report = SolverReport::default();
         self.islands.find(problem.contacts, problem.devices);
+        let per_sweep: u64 = problem.contacts.iter().map(|contact| problem.products_of(contact)).sum();
         problem.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
         for root in 0..problem.objects.len() {
             if !self.islands.is_root(root) {
@@ -81,7 +133,13 @@ impl Solver {
                 let own = &mut problem.states[root];
                 own.end = own.free;
             } else {
-                self.solve_island(problem, &mut report);
+                let of_island =
+                    self.members.iter().map(|&at| problem.products_of(&problem.contacts[at as usize]));
+                let own = of_island.sum::<u64>();
+                let limit = (u128::from(budget) * u128::from(own) / u128::from(per_sweep.max(1))) as u64;
+                let progress =
+                    Progress { per_sweep: own, done: 0, limit, visits: 0, sweeps: 0, iterations: 0 };
+                self.solve_island(problem, progress, &mut report);
             }
         }
         problem.sum_on_devices();
@@ -95,17 +153,22 @@ impl Solver {
         }
     }
 
-    fn solve_island(&mut self, problem: &mut ContactProblem, report: &mut SolverReport) {
+    fn solve_island(
+        &mut self,
+        problem: &mut ContactProblem,
+        mut progress: Progress,
+        report: &mut SolverReport,
+    ) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
         // Held points alone are solved to round-off, and their stiff rows would turn what is not propagated into forces.
         let is_exact = self.members.len() <= SOLVER.few_contacts || !touches;
         let min_change = if is_exact { 0.0 } else { SOLVER.min_change };
-        let (mut reach, mut size) = (0.0_f64, f64::INFINITY);
+        let mut island = Island { touches, reach: 0.0, size: f64::INFINITY, dependent: 0 };
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
             problem.states[at].points.least_move = min_change * radius;
-            reach = reach.max(problem.states[at].reach(&problem.objects[at]));
-            size = size.min(radius);
+            island.reach = island.reach.max(problem.states[at].reach(&problem.objects[at]));
+            island.size = island.size.min(radius);
         }
         self.start(problem);
         self.linearise(problem);
@@ -113,56 +176,21 @@ impl Solver {
             let contact = problem.contacts[at];
             problem.apply(&contact, contact.force);
         }
-        let dependent = self.factorise_held(problem);
-        report.dependent_rows += dependent as u32;
+        island.dependent = self.factorise_held(problem);
+        report.dependent_rows += island.dependent as u32;
 
-        let round_off = ROUND_OFF * reach;
-        let mut first_residual = f64::INFINITY;
-        let (mut iterations, mut visits, mut sweeps) = (0, 0, 0);
-        let count = self.members.len() as u32;
-        let (is_solved, last_residual) = loop {
-            let rotation = self.evaluate(problem);
-            if rotation > SOLVER.relinearise * size {
-                self.linearise(problem);
-            }
-            iterations += 1;
-            let residual = larger(rotation, self.sweep(problem, SOLVER.skip * self.tolerance(visits) * size));
-            visits += count;
-            if iterations == 1 {
-                first_residual = residual;
-            }
-            let tolerance = if touches { self.tolerance(visits) * size } else { 8.0 * round_off };
-            let is_last =
-                iterations == SOLVER.max_evaluations || sweeps >= SOLVER.max_sweeps || !residual.is_finite();
-            if residual <= tolerance || is_last {
-                report.iterations = report.iterations.max(iterations);
-                report.residual_m =
-                    report.residual_m.max(if residual.is_finite() { residual } else { reach });
-                let allowed = if touches { SOLVER.rough_tolerance * size } else { UNSOLVED * reach };
-                // Dependent held points can't be met where their devices differ, and need not be.
-                let is_solved = residual <= allowed || dependent > 0 && residual <= first_residual;
-                break (is_solved, residual);
-            }
-            // Held points alone are solved by one sweep.
-            let goal = round_off.max(SOLVER.sweep_goal * residual);
-            while touches && sweeps < SOLVER.max_sweeps {
-                sweeps += 1;
-                let moved = self.sweep(problem, SOLVER.skip * goal);
-                visits += count;
-                if moved <= goal.max(0.3 * self.tolerance(visits) * size) {
-                    break;
-                }
-                // Sweeps that move contacts farther than the objects reach diverge; their forces would leave round-off behind.
-                if !moved.is_finite() || moved > reach {
-                    sweeps = SOLVER.max_sweeps;
-                }
-            }
-        };
+        let Outcome { residual, is_solved, is_out_of_budget } = self.iterate(problem, &island, &mut progress);
+        report.iterations = report.iterations.max(progress.iterations);
+        let finite = if residual.is_finite() { residual } else { island.reach };
+        report.residual_m = report.residual_m.max(finite);
+        report.islands_out_of_budget += u32::from(is_out_of_budget);
+        let round_off = island.round_off();
         // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
-        let is_solved = is_solved && {
+        let is_solved = (is_solved || is_out_of_budget) && {
             problem.project_forces(&self.members);
-            self.evaluate_to(problem, round_off) <= UNSOLVED * reach
+            self.evaluate_to(problem, round_off) <= UNSOLVED * island.reach
         };
+        let is_solved = is_solved && (!is_out_of_budget || self.make_passive(problem, round_off));
         if !is_solved {
             report.unsolved_islands += 1;
             if !(touches && self.solve_scaled(problem, round_off)) {
@@ -176,8 +204,79 @@ impl Solver {
         problem.write_ends(&self.members);
         // A rough solution is used, and reported as unsolved: by its residual, or by what the last sweep moved.
         let is_rough =
-            last_residual.max(0.5 * problem.max_open_gap(&self.members)) > SOLVER.loose_tolerance * size;
-        report.unsolved_islands += u32::from(is_solved && touches && is_rough);
+            residual.max(0.5 * problem.max_open_gap(&self.members)) > SOLVER.loose_tolerance * island.size;
+        report.unsolved_islands += u32::from(is_solved && touches && !is_out_of_budget && is_rough);
+    }
+
+    /// Alternate exact evaluations and sweeps until the contacts meet their laws, a limit is reached, or the budget is used up.
+    fn iterate(&mut self, problem: &mut ContactProblem, island: &Island, progress: &mut Progress) -> Outcome {
+        let Island { touches, size, reach, dependent } = *island;
+        let round_off = island.round_off();
+        let mut first_residual = f64::INFINITY;
+        loop {
+            let rotation = self.evaluate(problem);
+            if rotation > SOLVER.relinearise * size {
+                self.linearise(problem);
+            }
+            progress.iterations += 1;
+            let enough = SOLVER.skip * self.tolerance(progress.visits) * size;
+            let residual = larger(rotation, self.counted_sweep(problem, enough, progress));
+            if progress.iterations == 1 {
+                first_residual = residual;
+            }
+            let tolerance = if touches { self.tolerance(progress.visits) * size } else { 8.0 * round_off };
+            let is_met = residual <= tolerance;
+            let is_out_of_budget = touches && !is_met && residual.is_finite() && progress.is_out_of_budget();
+            let is_last = progress.iterations == SOLVER.max_evaluations
+                || progress.sweeps >= SOLVER.max_sweeps
+                || !residual.is_finite();
+            if is_met || is_out_of_budget || is_last {
+                let allowed = if touches { SOLVER.rough_tolerance * size } else { UNSOLVED * reach };
+                // Dependent held points can't be met where their devices differ, and need not be.
+                let is_solved = residual <= allowed || dependent > 0 && residual <= first_residual;
+                return Outcome { residual, is_solved, is_out_of_budget };
+            }
+            // Held points alone are solved by one sweep.
+            let goal = round_off.max(SOLVER.sweep_goal * residual);
+            while touches && progress.sweeps < SOLVER.max_sweeps && !progress.is_out_of_budget() {
+                progress.sweeps += 1;
+                let moved = self.counted_sweep(problem, SOLVER.skip * goal, progress);
+                if moved <= goal.max(0.3 * self.tolerance(progress.visits) * size) {
+                    break;
+                }
+                // Sweeps that move contacts farther than the objects reach diverge; their forces would leave round-off behind.
+                if !moved.is_finite() || moved > reach {
+                    progress.sweeps = SOLVER.max_sweeps;
+                }
+            }
+        }
+    }
+
+    /// Scale the forces of an island down until its contacts give no energy. Says whether they don't.
+    ///
+    /// With the ends apart(s) of forces s·f, linear in s between those without forces and those of f, the contacts dissipate
+    ///
+    /// ```text
+    /// D(s) = s·((1 − s)·D₀ + s·D₁)        D₀ = f·(apart(0) − start),  D₁ = f·(apart(1) − start)
+    /// ```
+    fn make_passive(&self, problem: &mut ContactProblem, round_off: f64) -> bool {
+        let with_forces = problem.write_ends(&self.members) + problem.paid(&self.members);
+        if with_forces >= 0.0 {
+            return true;
+        }
+        let without = problem.dissipated_without_forces(&self.members);
+        let mut share = if without > 0.0 { without / (without - with_forces) } else { 0.0 };
+        for _ in 0..SOLVER.fallback_scales {
+            // The forces are those of the last attempt.
+            self.start(problem);
+            problem.scale_forces(&self.members, share);
+            let is_sound = self.evaluate_to(problem, round_off) <= round_off;
+            if is_sound && problem.write_ends(&self.members) + problem.paid(&self.members) >= 0.0 {
+                return true;
+            }
+            share = 0.5;
+        }
+        false
     }
 
     /// Scaled fallback solution: the forces that the linearisation about the free motion gives, scaled down until the
@@ -258,6 +357,13 @@ impl Solver {
             }
             w
         })
+    }
+
+    /// Sweep that counts towards the budget.
+    fn counted_sweep(&mut self, problem: &mut ContactProblem, enough: f64, progress: &mut Progress) -> f64 {
+        progress.visits += self.members.len() as u32;
+        progress.done += progress.per_sweep;
+        self.sweep(problem, enough)
     }
 
     /// Gauss-Seidel sweep: solve every contact once, where that moves its sides by more than `enough` [m]. Gives the

@@ -20,7 +20,7 @@ pub(crate) struct ObjectState {
     pub(crate) increment: RigidIncrement,
     /// Upper bound of the deformation of any surface node over the step without contact force [m].
     pub(crate) surface_motion: f64,
-    /// Largest displacement of a contact point by contact forces in the last step [m].
+    /// Largest displacement of a contact point by contact forces in the last step, but of patches of tips [m].
     pub(crate) contact_displacement: f64,
     /// Whether a device held a point of it in the last step.
     pub(crate) is_held: bool,

@@ -4,6 +4,7 @@
 //! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). The reader
 //! checks the hash, then every length, index and number, and allocates no more than the file's size.
 
+use super::residual::lower_triangle;
 use super::sample_levels::LevelLists;
 use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
 use crate::error::{Error, RecordingError};
@@ -111,8 +112,9 @@ impl Recording {
         ];
         match &self.residual {
             ResidualCompliance::None => {}
-            ResidualCompliance::Whole(packed) => {
-                tensors.push(("residual.packed", tensor_f32(&[packed.len()], packed)));
+            ResidualCompliance::Whole(blocks) => {
+                let packed = lower_triangle(blocks);
+                tensors.push(("residual.packed", tensor_f32(&[packed.len()], &packed)));
             }
             ResidualCompliance::NearField(near) => {
                 tensors.push(("residual.radius", tensor_f64(&[1], [near.radius].into_iter())));
@@ -204,7 +206,10 @@ impl Recording {
             mode_shapes: tensors.f64("modes.mode_shapes")?,
         };
         let residual = if tensors.has("residual.packed") {
-            ResidualCompliance::Whole(tensors.f32("residual.packed")?)
+            ResidualCompliance::from_lower_triangle(
+                surface.positions.len(),
+                &tensors.f32("residual.packed")?,
+            )?
         } else if tensors.has("residual.blocks") {
             ResidualCompliance::NearField(NearField {
                 radius: tensors.f64("residual.radius")?.first().copied().unwrap_or(f64::NAN),

@@ -8,7 +8,6 @@
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::vec::Vec;
-use core::cmp::Ordering;
 use glam::{DMat3, DVec3};
 
 /// Residual compliance between surface nodes.
@@ -16,7 +15,7 @@ use glam::{DMat3, DVec3};
 pub enum ResidualCompliance {
     /// Neglected: forces are then wrong by up to several times. For comparison only.
     None,
-    /// Lower triangle row by row, entry (i, j ≤ i) at i(i+1)/2 + j [m/N].
+    /// Node blocks of the lower triangle, block (i, j ≤ i) at i(i+1)/2 + j, nine numbers each, row by row [m/N].
     Whole(Vec<f32>),
     /// Node blocks near the diagonal.
     NearField(NearField),
@@ -42,22 +41,9 @@ impl ResidualCompliance {
     pub fn block(&self, i: usize, j: usize) -> DMat3 {
         match self {
             Self::None => DMat3::ZERO,
-            Self::Whole(packed) => {
-                // Three numbers in each of three rows lie side by side below the diagonal.
-                let (low, high) = (i.min(j), i.max(j));
-                let row = |axis: usize| {
-                    let at = 3 * high + axis;
-                    let numbers = &packed[at * (at + 1) / 2 + 3 * low..];
-                    let own = |k: usize| if low < high || k <= axis { f64::from(numbers[k]) } else { 0.0 };
-                    DVec3::new(own(0), own(1), own(2))
-                };
-                // The columns of the block of (low, high) are its rows.
-                let block = DMat3::from_cols(row(0), row(1), row(2));
-                match i.cmp(&j) {
-                    Ordering::Less => block,
-                    Ordering::Greater => block.transpose(),
-                    Ordering::Equal => block + block.transpose() - DMat3::from_diagonal(block.diagonal()),
-                }
+            Self::Whole(blocks) => {
+                let block = block_at(blocks, lower_block(i.max(j), i.min(j)));
+                if i >= j { block } else { block.transpose() }
             }
             Self::NearField(near) => {
                 let row = near.offsets[i] as usize..near.offsets[i + 1] as usize;
@@ -72,28 +58,55 @@ impl ResidualCompliance {
     /// Trace of a block [m/N].
     pub(crate) fn trace(&self, i: usize, j: usize) -> f64 {
         match self {
-            Self::Whole(packed) if i != j => {
-                let (low, high) = (i.min(j), i.max(j));
-                let row = |axis: usize| (3 * high + axis) * (3 * high + axis + 1) / 2 + 3 * low + axis;
-                (0..3).map(|axis| f64::from(packed[row(axis)])).sum()
+            Self::Whole(blocks) => {
+                let first = 9 * lower_block(i.max(j), i.min(j));
+                (0..3).map(|axis| f64::from(blocks[first + 4 * axis])).sum()
             }
             _ => self.block(i, j).diagonal().element_sum(),
         }
+    }
+
+    /// Whole S between a number of nodes from its lower triangle, entry (i, j ≤ i) at i(i+1)/2 + j [m/N], as files hold it.
+    ///
+    /// # Errors
+    /// [`RecordingError::Inconsistent`] when the entries are not that many.
+    pub fn from_lower_triangle(nodes: usize, entries: &[f32]) -> Result<Self, RecordingError> {
+        let needed = 3 * nodes * (3 * nodes + 1) / 2;
+        if entries.len() != needed {
+            let what =
+                format!("residual compliance holds {} numbers, {nodes} nodes need {needed}", entries.len());
+            return Err(RecordingError::Inconsistent { part: RecordingPart::Residual, what });
+        }
+        let mut blocks = Vec::with_capacity(9 * nodes * (nodes + 1) / 2);
+        for (i, j) in (0..nodes).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            for (row, column) in (0..9).map(|at| (3 * i + at / 3, 3 * j + at % 3)) {
+                let (row, column) = (row.max(column), row.min(column));
+                blocks.push(entries[row * (row + 1) / 2 + column]);
+            }
+        }
+        Ok(Self::Whole(blocks))
     }
 
     pub(super) fn validate(&self, nodes: usize) -> Result<(), RecordingError> {
         let fail = |what| Err(RecordingError::Inconsistent { part: RecordingPart::Residual, what });
         let values: &[f32] = match self {
             Self::None => &[],
-            Self::Whole(packed) => {
-                let needed = 3 * nodes * (3 * nodes + 1) / 2;
-                if packed.len() != needed {
+            Self::Whole(blocks) => {
+                let needed = 9 * nodes * (nodes + 1) / 2;
+                if blocks.len() != needed {
                     return fail(format!(
                         "residual compliance holds {} numbers, {nodes} nodes need {needed}",
-                        packed.len()
+                        blocks.len()
                     ));
                 }
-                packed
+                let is_symmetric = |node: &usize| {
+                    let block = self.block(*node, *node);
+                    block == block.transpose() || block.is_nan()
+                };
+                if let Some(node) = (0..nodes).find(|node| !is_symmetric(node)) {
+                    return fail(format!("residual compliance of surface node {node} is not symmetric"));
+                }
+                blocks
             }
             Self::NearField(near) => {
                 let blocks = near.nodes.len();
@@ -147,6 +160,23 @@ impl NearField {
         let square = (1.0 - s) * (1.0 - s);
         square * square * (4.0 * s + 1.0)
     }
+}
+
+/// Number of the block (i, j ≤ i) in a lower triangle.
+fn lower_block(i: usize, j: usize) -> usize {
+    i * (i + 1) / 2 + j
+}
+
+/// Lower triangle of whole blocks, entry (i, j ≤ i) at i(i+1)/2 + j.
+pub(super) fn lower_triangle(blocks: &[f32]) -> Vec<f32> {
+    let mut entries = Vec::with_capacity(blocks.len());
+    let mut row = 0;
+    while 9 * lower_block(row / 3, 0) < blocks.len() {
+        let of = |column: usize| blocks[9 * lower_block(row / 3, column / 3) + 3 * (row % 3) + column % 3];
+        entries.extend((0..=row).map(of));
+        row += 1;
+    }
+    entries
 }
 
 /// Block of a list of blocks, each row by row.

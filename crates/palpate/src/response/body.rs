@@ -3,6 +3,7 @@
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
 use super::dot_products::{dot3, dot3_single};
+use super::level_residual::{LevelPair, LevelResidual};
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
 use super::residual_kernel::ResidualKernel;
@@ -93,10 +94,14 @@ pub(crate) struct Body {
     /// Number of patches of devices, and of levels.
     device_patches: usize,
     levels: usize,
+    /// Residual compliance between the contact samples of two levels, level by level.
+    between_levels: Vec<LevelResidual>,
     tree: SphereTree,
     bounds: Bounds,
     /// Mean edge length of the triangles at rest [m].
     pub(crate) edge: f64,
+    /// Characteristic length of the surface at rest [m].
+    pub(crate) characteristic_length: f64,
     /// Triangles around every surface node, node after node, and the index of each node's first.
     around: Vec<u32>,
     first_around: Vec<u32>,
@@ -126,6 +131,7 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
+        let characteristic_length = recording.surface.characteristic_length();
         let normals = node_normals(&recording.surface);
         let heights = smooth_heights(&recording.surface, recording.metadata.mesh.order);
         let max_height = heights.iter().copied().fold(0.0, f64::max);
@@ -133,6 +139,7 @@ impl Body {
             patches.push(PatchField::at_samples(&recording, level, &normals, &heights));
         }
         let levels = patches.len() - radii.len();
+        let between_levels = LevelResidual::of_pairs(&patches[radii.len()..]);
         if !cells.is_empty() {
             patches.push(PatchField::at_cells(&recording, cells));
         }
@@ -148,9 +155,11 @@ impl Body {
             patches,
             device_patches,
             levels,
+            between_levels,
             tree,
             bounds,
             edge,
+            characteristic_length,
             around,
             first_around,
             normals,
@@ -219,6 +228,17 @@ impl Body {
     /// Footprint of a level of detail: all nodes at level 0, then ever fewer contact samples.
     pub(crate) fn footprint_at_level(&self, level: usize) -> Footprint {
         if level == 0 { Footprint::Point } else { Footprint::Patch((self.device_patches + level - 1) as u32) }
+    }
+
+    /// Level of detail of a footprint; none of a device's patch and of a clamp's cells.
+    pub(crate) fn level_of(&self, footprint: Footprint) -> Option<usize> {
+        match footprint {
+            Footprint::Point => Some(0),
+            Footprint::Patch(index) => {
+                let level = (index as usize + 1).checked_sub(self.device_patches)?;
+                (1..=self.levels).contains(&level).then_some(level)
+            }
+        }
     }
 
     /// Coarsest level of detail.
@@ -395,14 +415,17 @@ impl Body {
     /// # Real time
     /// Costs a few blocks; between samples of different levels a patch.
     pub(super) fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
-        let is_tip = |footprint: Footprint| self.kernel(footprint).is_some();
-        if is_tip(footprint) || is_tip(location.footprint) {
+        if self.is_tip(footprint) || self.is_tip(location.footprint) {
             return DMat3::ZERO;
         }
         match (self.samples(footprint), self.samples(location.footprint)) {
             (None, None) => self.residual_of_node(node, location),
             (Some(own), _) if footprint == location.footprint => own.residual_at(node, &location.point),
             (Some(own), _) => {
+                if let Some(known) = self.between_levels(footprint, location.footprint) {
+                    let of = |(sample, weight): (usize, f64)| known.between(node, sample) * weight;
+                    return used(self.corners(location)).map(of).sum();
+                }
                 let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
                     None => own.to_nodes.between(node, corner) * weight,
                     Some(patch) => {
@@ -419,9 +442,15 @@ impl Body {
         }
     }
 
-    /// Whether forces at one footprint displace another one by the residual compliance.
-    pub(crate) fn couples(&self, a: Footprint, b: Footprint) -> bool {
-        a == b || self.kernel(a).is_none() && self.kernel(b).is_none()
+    /// Residual compliance between the contact samples of two levels, if it is precomputed.
+    fn between_levels(&self, a: Footprint, b: Footprint) -> Option<LevelPair<'_>> {
+        let (a, b) = (self.level_of(a)?.checked_sub(1)?, self.level_of(b)?.checked_sub(1)?);
+        LevelPair::find(&self.between_levels, [a, b])
+    }
+
+    /// Whether a footprint is a patch of tips.
+    pub(crate) fn is_tip(&self, footprint: Footprint) -> bool {
+        matches!(footprint, Footprint::Patch(index) if (index as usize) < self.device_patches)
     }
 
     fn kernel(&self, footprint: Footprint) -> Option<&ResidualKernel> {
@@ -448,22 +477,31 @@ impl Body {
         SpringForce { location, memory, force, rest, factor, factored: factor * force }
     }
 
-    /// Residual displacement of a footprint's node under a force [m, body]. That of a tip's patch is constant up to a distance
-    /// `flat_radius` [m] from the force.
+    /// Residual displacement of a node or contact sample under a force [m, body].
     ///
     /// # Real time
     pub(crate) fn residual_displacement(
         &self,
-        (footprint, node): (Footprint, usize),
+        footprint: Footprint,
+        node: usize,
         applied: &SpringForce,
-        flat_radius: f64,
     ) -> DVec3 {
-        match self.kernel(footprint) {
-            Some(kernel) if footprint == applied.location.footprint => {
-                kernel.displacement(&self.recording, node, (applied.rest, applied.factored), flat_radius)
-            }
-            _ => self.residual_at(footprint, node, &applied.location) * applied.force,
-        }
+        self.residual_at(footprint, node, &applied.location) * applied.force
+    }
+
+    /// Residual displacement of the patch of a tip about a node [m, body] under forces on patches of the same radius, each constant up to a
+    /// distance [m] from it.
+    ///
+    /// # Real time
+    pub(crate) fn tip_displacement<'s>(
+        &self,
+        footprint: Footprint,
+        node: usize,
+        forces: impl Iterator<Item = (&'s SpringForce, f64)>,
+    ) -> DVec3 {
+        let Some(kernel) = self.kernel(footprint) else { return DVec3::ZERO };
+        let forces = forces.map(|(force, flat_radius)| (force.rest, force.factored, flat_radius));
+        kernel.displacement(&self.recording, node, forces)
     }
 
     /// Distribution of a force at a location to nodes, with weights; a node may come more than once.

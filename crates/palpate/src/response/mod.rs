@@ -6,6 +6,7 @@ mod contact_points;
 mod dot_products;
 mod fir;
 mod force_history;
+mod level_residual;
 mod modal;
 mod modal_distances;
 mod nodal_compliance;
@@ -58,8 +59,8 @@ pub(crate) enum Response {
 /// State of a response between steps.
 #[derive(Debug, Clone)]
 pub(crate) enum ResponseState {
-    Modal(ModalState),
-    Fir(FirState),
+    Modal(Box<ModalState>),
+    Fir(Box<FirState>),
 }
 
 /// Energies of a response [J].
@@ -106,7 +107,7 @@ impl Response {
         }
     }
 
-    /// Precompute R[0] between all surface nodes and between the contact samples of each level, up to a number of nodes.
+    /// Precompute R[0] between all surface nodes and between contact samples, up to a number of nodes.
     /// `others` are earlier objects: those of the same recording share theirs.
     pub(crate) fn precompute_nodal_compliance<'r>(
         &mut self,
@@ -116,20 +117,20 @@ impl Response {
         let Self::Modal(modes) = self else { return };
         let same = others.filter(|(other, _)| Arc::ptr_eq(&other.recording, &body.recording));
         let precomputed = |response: &Self| match response {
-            Self::Modal(modes) => Some(modes.nodal_compliance.clone()),
+            Self::Modal(modes) => modes.nodal_compliance.clone(),
             Self::Fir(_) => None,
         };
-        let same = same.filter_map(|(_, response)| precomputed(response)).next();
-        let levels = (0..=body.coarsest_level()).map(|level| body.footprint_at_level(level));
-        let compute = |footprint| NodalCompliance::new(body, modes, footprint).map(Arc::new);
-        modes.nodal_compliance = same.unwrap_or_else(|| levels.filter_map(compute).collect());
+        let known = same.filter_map(|(_, response)| precomputed(response)).next();
+        modes.nodal_compliance = Some(known.unwrap_or_else(|| Arc::new(NodalCompliance::new(body, modes))));
     }
 
     /// State at rest, for the body's number of surface nodes and a capacity of contact points.
     pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => ResponseState::Modal(ModalState::new(modes.len(), nodes, capacity)),
-            Self::Fir(fir) => ResponseState::Fir(FirState::new(fir, capacity)),
+            Self::Modal(modes) => {
+                ResponseState::Modal(Box::new(ModalState::new(modes.len(), nodes, capacity)))
+            }
+            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, capacity))),
         }
     }
 }
@@ -286,6 +287,14 @@ impl ResponseState {
         }
     }
 
+    /// Indices of the spring forces on patches of tips.
+    pub(crate) fn tip_springs(&self) -> &[u32] {
+        match self {
+            Self::Modal(state) => &state.tip_springs,
+            Self::Fir(_) => &[],
+        }
+    }
+
     /// Spring forces at points, distributed to nodes; none with a table.
     pub(crate) fn nodal(&self) -> Option<&NodalForces> {
         match self {
@@ -302,10 +311,10 @@ impl ResponseState {
         }
     }
 
-    /// Upper bound of the residual displacement of any node [m].
-    pub(crate) fn max_residual(&self) -> f64 {
+    /// Upper bound of the residual displacement of any node [m]: at points and contact samples, or at patches of tips.
+    pub(crate) fn max_residual(&self, of_tips: bool) -> f64 {
         match self {
-            Self::Modal(state) => state.max_residual,
+            Self::Modal(state) => state.residual_bounds[usize::from(of_tips)].total,
             Self::Fir(_) => 0.0,
         }
     }

@@ -30,8 +30,8 @@ pub(crate) struct SampledModes {
     step_s: f64,
     pub(super) residual: SampledResidual,
     oscillators: Vec<SampledOscillator>,
-    /// Precomputed R[0] between nodes, by footprint.
-    pub(super) nodal_compliance: Vec<Arc<NodalCompliance>>,
+    /// Precomputed R[0] between nodes and contact samples.
+    pub(super) nodal_compliance: Option<Arc<NodalCompliance>>,
 }
 
 /// State of one object in modal form.
@@ -51,6 +51,8 @@ pub(crate) struct ModalState {
     weighted: Vec<f64>,
     /// Forces of the residual compliance with their locations.
     pub(super) spring_forces: BoundedVec<SpringForce>,
+    /// Indices of those on patches of tips, which displace nothing else.
+    pub(super) tip_springs: BoundedVec<u32>,
     /// Spring forces at points, distributed to nodes.
     pub(super) nodal: NodalForces,
     /// Products of the parts of the residual compliance's state, over all locations.
@@ -58,10 +60,28 @@ pub(crate) struct ModalState {
     /// Elastic energy of the residual compliance [J], and √(dᵀ·S·d) of the forces d whose static displacement it has [√J].
     pub(super) residual_energy: f64,
     pub(super) residual_norm: f64,
-    /// Upper bounds of the displacements of any node by the relaxed forces and by the held ones of the last step, and of its residual displacement [m].
-    max_relaxed: f64,
-    max_held: f64,
-    pub(super) max_residual: f64,
+    /// Upper bounds of the residual displacement of any node: at points and contact samples, and at patches of tips, which they do not couple to.
+    pub(super) residual_bounds: [ResidualBound; 2],
+}
+
+/// Upper bounds of the displacements of any node by relaxed forces, by the held ones of the last step, and in all [m].
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ResidualBound {
+    relaxed: f64,
+    held: f64,
+    pub(super) total: f64,
+}
+
+impl ResidualBound {
+    /// Advance over a step with the largest residual displacements of contact points, and those by held forces [m]. They are largest at
+    /// the contacts, and where they have been: twice theirs bounds that of all nodes.
+    fn advance(&mut self, (largest, largest_held): (f64, f64), has_left: bool, residual: &SampledResidual) {
+        let (decay, lead) = (residual.decay(), residual.lead());
+        let left = if has_left { decay * self.relaxed + lead * self.held } else { 0.0 };
+        self.total = 2.0 * largest + left;
+        self.relaxed = decay * self.relaxed + (1.0 - decay) * 2.0 * largest_held;
+        self.held = 2.0 * largest_held;
+    }
 }
 
 impl ModalState {
@@ -76,13 +96,12 @@ impl ModalState {
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
             spring_forces: BoundedVec::new(capacity + RELAXING),
+            tip_springs: BoundedVec::new(capacity + RELAXING),
             nodal: NodalForces::new(nodes),
             products: Products::default(),
             residual_energy: 0.0,
             residual_norm: 0.0,
-            max_relaxed: 0.0,
-            max_held: 0.0,
-            max_residual: 0.0,
+            residual_bounds: [ResidualBound::default(); 2],
         }
     }
 
@@ -121,7 +140,7 @@ impl SampledModes {
         let pairs = modes.angular_frequencies.iter().zip(&modes.damping_ratios);
         let oscillators = pairs.map(|(&omega, &zeta)| SampledOscillator::new(omega, zeta, step_s)).collect();
         let residual = SampledResidual::new(recording.residual_relaxation_s(), step_s);
-        Self { step_s, residual, oscillators, nodal_compliance: Vec::new() }
+        Self { step_s, residual, oscillators, nodal_compliance: None }
     }
 
     /// Share of the residual compliance that answers within a step.
@@ -184,12 +203,16 @@ impl SampledModes {
         let m = self.len();
         let ModalState { rows, weighted, .. } = state;
         let of = |slot: usize| &rows[3 * m * slot..3 * m * (slot + 1)];
-        let precomputed = self.nodal_compliance.iter().find(|nodal| nodal.footprint == location.footprint);
+        let level = body.level_of(location.footprint);
         let own = body.corners(location);
         let mut weighed = false;
         for (index, point) in points.iter().enumerate() {
-            if let Some(nodal) = precomputed.filter(|nodal| nodal.footprint == point.location.footprint) {
-                give(index, nodal.between(&own, &body.corners(&point.location)));
+            let known = self.nodal_compliance.as_deref().and_then(|nodal| {
+                let levels = [level, body.level_of(point.location.footprint)];
+                nodal.between(levels, [&own, &body.corners(&point.location)])
+            });
+            if let Some(block) = known {
+                give(index, block);
                 continue;
             }
             if !weighed {
@@ -263,7 +286,7 @@ impl SampledModes {
         // The residual compliance dissipates the work that it does not store.
         let residual_share = self.residual_share();
         let (mut work, mut products) = (0.0, [0.0; 3]);
-        let (mut largest, mut largest_held) = (0.0_f64, 0.0_f64);
+        let mut largest = [(0.0_f64, 0.0_f64); 2];
         state.relax(&self.residual);
         for point in points.iter_mut() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
@@ -280,8 +303,9 @@ impl SampledModes {
             self.residual.relax(memory);
             memory.add(&self.residual.of_force(held));
             point.free = free + *sag + self.residual.free(memory);
-            largest = largest.max((residual - *sag).length());
-            largest_held = largest_held.max(held.length());
+            let (of_total, of_held) = &mut largest[usize::from(body.is_tip(point.location.footprint))];
+            *of_total = of_total.max((residual - *sag).length());
+            *of_held = of_held.max(held.length());
             *start = residual;
             let sag = *sag;
             if let Some(node) = point.single_node() {
@@ -293,13 +317,11 @@ impl SampledModes {
                 state.add_at_nodes(body, &point.location, &memory, &self.residual);
             }
         }
-        // Residual displacement is largest at the contacts, and where they have been: twice theirs bounds that of all nodes.
-        let (decay, lead) = (self.residual.decay(), self.residual.lead());
+        state.index_tip_springs(body);
         let has_left = state.spring_forces.iter().any(|spring| spring.memory.held == DVec3::ZERO);
-        let left = if has_left { decay * state.max_relaxed + lead * state.max_held } else { 0.0 };
-        state.max_residual = 2.0 * largest + left;
-        state.max_relaxed = decay * state.max_relaxed + (1.0 - decay) * 2.0 * largest_held;
-        state.max_held = 2.0 * largest_held;
+        for (bound, largest) in state.residual_bounds.iter_mut().zip(largest) {
+            bound.advance(largest, has_left, &self.residual);
+        }
         let products = self.residual.advance(&state.products, products);
         let before = state.residual_energy;
         state.set_products(products, &self.residual);

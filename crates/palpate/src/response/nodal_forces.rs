@@ -118,8 +118,8 @@ impl NodalForces {
             let at_nodes = self.loaded.iter();
             let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
             let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
-            let point = (Footprint::Point, node);
-            at_nodes.chain(of_samples.map(|spring| body.residual_displacement(point, spring, 0.0))).sum()
+            let by_sample = |spring| body.residual_displacement(Footprint::Point, node, spring);
+            at_nodes.chain(of_samples.map(by_sample)).sum()
         };
         self.displacements[node].unwrap_or_else(sum)
     }

@@ -85,19 +85,27 @@ impl ResidualKernel {
         used.map(|&(node, w)| self.factors[node] * w).fold(DMat3::ZERO, |a, b| a + b)
     }
 
-    /// Residual displacement K·f of the patch about a node [m, body] under a force with its rest position and Aᵀ·f [√J], constant within
-    /// `flat_radius` [m] of the force.
+    /// Residual displacement Σ K·f of the patch about a node [m, body] under forces with their rest positions and Aᵀ·f [√J], each constant
+    /// within a radius [m] of the force.
     ///
     /// # Real time
     pub(super) fn displacement(
         &self,
         recording: &Recording,
         node: usize,
-        (rest, factored): (DVec3, DVec3),
-        flat_radius: f64,
+        forces: impl Iterator<Item = (DVec3, DVec3, f64)>,
     ) -> DVec3 {
-        let distance = ((recording.surface.positions[node] - rest).length() - flat_radius).max(0.0);
-        self.factors[node] * factored * NearField::taper(distance / self.range)
+        let position = recording.surface.positions[node];
+        let mut sum = DVec3::ZERO;
+        for (rest, factored, flat_radius) in forces {
+            let square = (position - rest).length_squared();
+            let reach = self.range + flat_radius;
+            if square < reach * reach {
+                let distance = (libm::sqrt(square) - flat_radius).max(0.0);
+                sum += factored * NearField::taper(distance / self.range);
+            }
+        }
+        self.factors[node] * sum
     }
 
     /// Steepest slope of ψ(r/L) [1/m].

@@ -161,6 +161,15 @@ impl SampleSurface {
         self.used_corners(point).map(|(other, weight)| between(other) * weight).sum()
     }
 
+    /// Residual compliance of a vertex per force that nodes share by weights [m/N].
+    pub(super) fn averaged_residual(
+        &self,
+        vertex: usize,
+        nodes: impl Iterator<Item = (usize, f64)>,
+    ) -> DMat3 {
+        self.to_nodes.averaged(vertex, nodes)
+    }
+
     fn used_corners(&self, point: &SurfacePoint) -> impl Iterator<Item = (usize, f64)> {
         self.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0)
     }
@@ -195,19 +204,14 @@ fn averaged(
     match residual {
         ResidualCompliance::None => ResidualCompliance::None,
         ResidualCompliance::Whole(_) => {
-            let mut packed = vec![0.0; 3 * count * (3 * count + 1) / 2];
-            for (c, d) in (0..count).flat_map(|c| (0..=c).map(move |d| (c, d))) {
+            let pairs = (0..count).flat_map(|c| (0..=c).map(move |d| (c, d)));
+            let block = |(c, d): (usize, usize)| {
                 let block = to_nodes.averaged(c, weights.of(d));
-                for axis in 0..3 {
-                    let row = 3 * c + axis;
-                    let width = if c == d { axis + 1 } else { 3 };
-                    let at = row * (row + 1) / 2 + 3 * d;
-                    for (out, x) in packed[at..at + width].iter_mut().zip(block.row(axis).to_array()) {
-                        *out = x as f32;
-                    }
-                }
-            }
-            ResidualCompliance::Whole(packed)
+                // Exactly symmetric where a patch meets itself.
+                let block = if c == d { (block + block.transpose()) * 0.5 } else { block };
+                block.transpose().to_cols_array().map(|x| x as f32)
+            };
+            ResidualCompliance::Whole(pairs.flat_map(block).collect())
         }
         ResidualCompliance::NearField(near) => {
             ResidualCompliance::NearField(averaged_near_field(near.radius, to_nodes, weights))

@@ -60,6 +60,14 @@ impl ModalState {
         springs.push(spring);
     }
 
+    /// Index the spring forces on patches of tips, after the list has changed.
+    pub(super) fn index_tip_springs(&mut self, body: &Body) {
+        self.tip_springs.clear();
+        let of_tips =
+            self.spring_forces.iter().enumerate().filter(|(_, s)| body.is_tip(s.location.footprint));
+        of_tips.for_each(|(at, _)| self.tip_springs.push(at as u32));
+    }
+
     /// Move the spring forces of locations to others, near ones above all, without a gain of energy (C61). Gives
     /// the energy [J] that is lost.
     pub(super) fn move_spring_forces(
@@ -100,6 +108,8 @@ impl ModalState {
                 count += 1;
             }
         }
+        self.index_tip_springs(body);
+        let springs = &self.spring_forces;
         // Products, and with them the energy, of the moved memories, of the others, and between them.
         let [mut moved_products, mut between_products, mut other_products] = [Products::default(); 3];
         for (at, a) in springs.iter().enumerate() {

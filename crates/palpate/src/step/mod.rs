@@ -170,6 +170,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     let scene = model.collision_scene();
     let mut context =
         CollisionContext { scene, states: objects, contacts, levels, workspace: collision, step };
+    context.begin_broad_phase();
     let touchable = || (0..model.objects.len()).filter(|&at| model.objects[at].is_touchable());
     for (number, device) in devices.iter_mut().enumerate() {
         let is_asked = input.devices.get(number).is_some_and(|d| d.mode.is_active());
@@ -193,6 +194,8 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             device.may_be_inside = touches;
         }
         device.begin(&model.parameters.devices[number], model.parameters.step_s, device_input.position);
+        let last = context.contacts.iter().filter(|c| c.other == OtherSide::Device(number));
+        device.predict(last.map(|contact| contact.force).sum());
         if let DeviceMode::Held(grasp) = device_input.mode {
             let collider = Collider::Device(number);
             context.workspace.candidates.push(ContactCandidate {
@@ -213,10 +216,13 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             }
             // Again, where it is found inside without contact.
             context.workspace.candidates.rewind(before);
-            let mut find = |object| context.find_tip_contacts(TipPair { number, device, object });
-            let inside = touchable().filter(|&object| find(object)).count();
-            device.may_be_inside = inside > 0;
-            if inside == 0 {
+            context.find_near_objects(number, device);
+            device.may_be_inside = false;
+            for near in 0..context.workspace.near_objects.len() {
+                let object = context.workspace.near_objects[near] as usize;
+                device.may_be_inside |= context.find_tip_contacts(TipPair { number, device, object });
+            }
+            if !device.may_be_inside {
                 break;
             }
         }
@@ -229,9 +235,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     }
     context.find_pair_contacts();
     // Last, since it looks at the surface of another moment.
-    for (number, object) in (0..devices.len()).flat_map(|n| touchable().map(move |object| (n, object))) {
-        context.rebuild_ahead(number, object);
-    }
+    (0..devices.len()).for_each(|number| context.rebuild_ahead(number));
     let bodies = (&*model.objects, gravity);
     output.status.dropped_contacts += match_contacts(
         bodies,
@@ -303,16 +307,18 @@ fn solve(model: &Model, state: &mut State) {
     let State { objects, devices, contacts, workspace, output, .. } = state;
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
+    let budget = model.parameters.solver_budget;
     let mut problem =
         ContactProblem { objects: &model.objects, rules, states: objects, devices, contacts, constraints };
     for attempt in 0..3 {
-        let SolverReport { residual_m, iterations, dependent_rows, unsolved_islands } =
-            solver.solve(&mut problem);
+        let SolverReport { residual_m, iterations, dependent_rows, unsolved_islands, islands_out_of_budget } =
+            solver.solve(&mut problem, budget);
         if problem.dissipated() + paid >= -problem.rounding() || attempt == 2 {
             let status = &mut output.status;
             (status.solver_residual_m, status.iterations) = (residual_m, iterations);
             status.dependent_rows = dependent_rows;
             status.unsolved_islands += unsolved_islands;
+            status.islands_out_of_budget = islands_out_of_budget;
             return;
         }
         let pairs = problem.contacts.iter_mut().zip(&mut *problem.constraints);
@@ -345,7 +351,9 @@ fn integrate(model: &Model, state: &mut State) {
     for (object, own) in model.objects.iter().zip(&mut *objects) {
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
-        let displaced = own.points.points.iter().map(|point| (point.displacement - point.free).length());
+        // The indentation by a tip's patch moves no other contact.
+        let coupled = own.points.points.iter().filter(|p| !object.body.is_tip(p.location.footprint));
+        let displaced = coupled.map(|point| (point.displacement - point.free).length());
         own.contact_displacement = displaced.fold(0.0, f64::max);
         own.rigid = own.end.end;
         let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);

@@ -67,6 +67,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
         "force_process": timing(&report.force),
         "deformation_process": timing(&report.deformation),
         "unsolved_steps": report.unsolved_steps,
+        "steps_out_of_budget": report.steps_out_of_budget,
         "max_contact_samples": scene.model.parameters().max_contact_samples,
         "devices": devices.collect::<Vec<_>>(),
         "objects": objects.collect::<Vec<_>>(),
@@ -133,6 +134,12 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
         out += &format!(
             "  contacts     at most {} contact samples of an object on an obstacle (max_contact_samples)\n",
             parameters.max_contact_samples
+        );
+    }
+    if report.steps_out_of_budget > 0 {
+        out += &format!(
+            "  solver       left early in {} steps, with its budget used up (solver_budget = {})\n",
+            report.steps_out_of_budget, parameters.solver_budget
         );
     }
     out += &super::warnings::text(&warnings(scene, report));

@@ -2,7 +2,7 @@
 
 use super::warnings;
 use glam::DVec3;
-use palpate::{ClampOutput, Collider, Input, Output, State, StepStatus};
+use palpate::{ClampOutput, Collider, Input, Output, ResidualFieldCache, State, StepStatus};
 use palpate_export::ProbeReading;
 use palpate_haptics::percentile_us;
 use palpate_scene::{Scene, SceneClamp, Warning, WarningKind};
@@ -25,8 +25,9 @@ pub struct Summary {
     probes: Vec<ProbeReading>,
     /// Maxima over all steps.
     status: StepStatus,
-    /// Steps with unsolved islands, and steps with dropped contacts.
+    /// Steps with unsolved islands, with islands out of budget, and with dropped contacts.
     unsolved_steps: usize,
+    steps_out_of_budget: usize,
     dropping_steps: usize,
     /// Largest number of contacts in a step, and largest contact force [N].
     max_contacts: usize,
@@ -35,8 +36,9 @@ pub struct Summary {
     /// Compute time of each step [ns], sorted.
     times_ns: Vec<u32>,
     index: Option<PathBuf>,
-    /// Largest sampled displacement of the surface, by object [m].
+    /// Largest sampled displacement of the surface, by object [m], and the fields that its samples share.
     deformation: Vec<f64>,
+    residual_fields: Vec<ResidualFieldCache>,
     /// Largest penetration by object [m]: of its contacts in every step, of all its nodes in obstacles in sampled steps.
     penetration: Vec<f64>,
     /// Whether each device has touched something, and its least sampled distance from the surfaces until then [m].
@@ -54,6 +56,7 @@ impl Summary {
             probes: Vec::new(),
             status: StepStatus::default(),
             unsolved_steps: 0,
+            steps_out_of_budget: 0,
             dropping_steps: 0,
             max_contacts: 0,
             max_contact_force: 0.0,
@@ -61,6 +64,7 @@ impl Summary {
             times_ns: Vec::with_capacity(steps),
             index: None,
             deformation: vec![0.0; scene.object_names.len()],
+            residual_fields: vec![ResidualFieldCache::default(); scene.object_names.len()],
             penetration: vec![0.0; scene.object_names.len()],
             touched: vec![(false, f64::INFINITY); scene.devices.len()],
         }
@@ -90,6 +94,7 @@ impl Summary {
         all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
         all.dropped_contacts = all.dropped_contacts.max(now.dropped_contacts);
         self.unsolved_steps += usize::from(now.unsolved_islands > 0);
+        self.steps_out_of_budget += usize::from(now.islands_out_of_budget > 0);
         self.dropping_steps += usize::from(now.dropped_contacts > 0);
         self.max_contacts = self.max_contacts.max(output.contacts.len());
         let forces = output.contacts.iter().map(|contact| contact.force.length());
@@ -110,7 +115,8 @@ impl Summary {
         let output = state.output();
         for (object, recording) in scene.model.recordings().enumerate() {
             let mut displacement = vec![DVec3::ZERO; recording.surface.positions.len()];
-            state.surface_displacement(&scene.model, object, &mut displacement);
+            let (deformation, fields) = (state.deformation(object), &mut self.residual_fields[object]);
+            deformation.surface_displacement_cached(&scene.model, fields, &mut displacement);
             let largest = &mut self.deformation[object];
             *largest = displacement.iter().map(|u| u.length()).fold(*largest, f64::max);
             let pose = output.objects[object].pose;
@@ -241,6 +247,7 @@ impl Summary {
                 "dependent_rows": self.status.dependent_rows,
                 "dropped_contacts": self.status.dropped_contacts,
                 "unsolved_steps": self.unsolved_steps,
+                "steps_out_of_budget": self.steps_out_of_budget,
             },
             "warnings": warnings::json(scene, &self.warnings(scene)),
         })

@@ -20,7 +20,7 @@ impl ObstacleQuery<'_> {
     pub(super) fn refine(&self, context: &mut CollisionContext, known: &[Contact], first: usize) {
         let max_added = context.scene.max_contact_samples.saturating_mul(2);
         let CollisionWorkspace { positions, near_nodes, candidates, .. } = &mut *context.workspace;
-        let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
+        let depth = COLLISION.sample_tolerance * self.body.characteristic_length;
         let mut added = 0;
         for contact in known {
             if !matches!(contact.id.feature, FeatureId::Node(_)) {
@@ -35,6 +35,9 @@ impl ObstacleQuery<'_> {
             }
         }
         // Nodes that are too deep.
+        if !context.levels.is_turn_of(self.object, self.number, context.step) {
+            return;
+        }
         let cache = &mut positions[self.object];
         let search = &mut context.levels.against_obstacle(self.object, self.number).search;
         if search.is_finished() {

@@ -9,13 +9,14 @@
 use super::phong_projection::phong_project;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
-use crate::collision::context::CollisionContext;
+use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{
     DeformedSurface, MAX_TIP_CONTACTS, SurfaceTime, TriangleProjection,
 };
 use crate::collision::parameters::{COLLISION, MAX_ITERATIONS};
 use crate::collision::proximity::ProximityQuery;
 use crate::device::{DeviceParameters, DeviceState};
+use crate::object::ObjectState;
 use crate::response::{Body, ContactLocation, Footprint};
 use crate::surface::SurfacePoint;
 use glam::DVec3;
@@ -35,7 +36,7 @@ pub(crate) struct TipPair<'a> {
 struct Path {
     object: usize,
     footprint: Footprint,
-    /// Proxy at the start, and at the end without contact force [m, body].
+    /// Proxy at the start, and at the end as predicted [m, body].
     start: DVec3,
     free: DVec3,
     /// Bound of the relative motion of proxy and surface [m].
@@ -54,12 +55,11 @@ impl CollisionContext<'_> {
         let footprint = body.footprint(parameters.patch_radius);
         let tip = parameters.ball_radius(body);
         let start = own.rigid.pose.body_from_world(device.proxy);
-        let free = own.free.end.pose.body_from_world(device.proxy_under_force());
+        let free = own.free.end.pose.body_from_world(device.predicted);
         let travel = (free - start).length();
         let motion = travel + own.surface_motion;
 
-        let own_contacts = self.own_locations(number, at);
-        let triangle_cache = self.triangle_cache(number, at);
+        let own_contacts = own_locations((self.states, self.contacts), number, at);
         let workspace = &mut *self.workspace;
         let positions = &mut workspace.positions[at];
         let moment = SurfaceTime::StepStart(self.step);
@@ -70,8 +70,11 @@ impl CollisionContext<'_> {
         }
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
-        let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
-        let triangles = &mut workspace.triangles[triangle_cache];
+        // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
+        let slow = COLLISION.max_depth * tip.max(0.5 * body.edge);
+        let ahead = if travel > slow { COLLISION.tip_margin * tip } else { COLLISION.motion_factor * travel };
+        let reach = tip + ahead + 10.0 * COLLISION.margin * body.edge;
+        let triangles = workspace.triangles[number].of(at, self.step);
         triangles.find(query, &mut surface, start, reach);
         // The surface here moves about as its nearest nodes do.
         let mut motion = motion;
@@ -79,8 +82,7 @@ impl CollisionContext<'_> {
             let local = COLLISION.motion_factor * surface.predicted_motion(nearest.triangle);
             motion = motion.min(travel + local + 5.0 * COLLISION.margin * body.edge);
         }
-        // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
-        let is_fast = motion > COLLISION.max_depth * tip.max(0.5 * body.edge);
+        let is_fast = motion > slow;
         let needed =
             if is_fast { (1.0 + COLLISION.tip_margin) * tip } else { tip + COLLISION.motion_factor * motion };
         if needed > reach {
@@ -100,33 +102,26 @@ impl CollisionContext<'_> {
         is_inside && contacts.count == 0
     }
 
-    /// Continue the incremental rebuild of a device's triangle cache on an object.
+    /// Continue the incremental rebuilds of a device's triangle caches.
     ///
     /// # Real time
-    pub(crate) fn rebuild_ahead(&mut self, number: usize, at: usize) {
-        let cache = self.triangle_cache(number, at);
-        let Some(coordinates) = self.workspace.triangles[cache].take_rebuild_coordinates() else { return };
-        let own_contacts = self.own_locations(number, at);
-        let (body, own) = (&self.scene.objects[at].body, &self.states[at]);
+    pub(crate) fn rebuild_ahead(&mut self, number: usize) {
         let parameters = &self.scene.devices[number];
-        let footprint = body.footprint(parameters.patch_radius);
-        let positions = &mut self.workspace.positions[at];
-        let moment = SurfaceTime::Coordinates(&coordinates[..own.response.coordinates().len()]);
-        let mut surface =
-            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
-        surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
-        self.workspace.triangles[cache].continue_rebuild(&mut surface);
-        self.workspace.triangles[cache].return_rebuild_coordinates(coordinates, body);
-    }
-
-    /// Locations at which a device is in contact with an object: their residual displacement is its own.
-    fn own_locations(&self, number: usize, at: usize) -> [Option<ContactLocation>; MAX_TIP_CONTACTS] {
-        let mut locations = [None; MAX_TIP_CONTACTS];
-        let contacts = contacts_between(self.contacts, Collider::Device(number), at);
-        for (location, contact) in locations.iter_mut().zip(contacts) {
-            *location = Some(self.states[at].points.of(contact.slot).location);
+        let Self { scene, states, contacts, .. } = *self;
+        let CollisionWorkspace { triangles, positions, .. } = &mut *self.workspace;
+        for (at, cache) in triangles[number].rebuilding() {
+            let (body, own) = (&scene.objects[at].body, &states[at]);
+            let coordinates = cache.take_rebuild_coordinates();
+            let footprint = body.footprint(parameters.patch_radius);
+            let moment = SurfaceTime::Coordinates(&coordinates[..own.response.coordinates().len()]);
+            let (response, points) = (&own.response, &own.points);
+            let mut surface =
+                DeformedSurface::new(body, footprint, response, points, &mut positions[at], moment);
+            let own_contacts = own_locations((states, contacts), number, at);
+            surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
+            cache.continue_rebuild(&mut surface);
+            cache.return_rebuild_coordinates(coordinates, body);
         }
-        locations
     }
 
     /// Sweep a fast proxy: add the faces that it meets first on its path.
@@ -254,6 +249,21 @@ impl CollisionContext<'_> {
             });
         }
     }
+}
+
+/// Locations at which a device is in contact with an object: their residual displacement is its own.
+fn own_locations(
+    (states, contacts): (&[ObjectState], &[Contact]),
+    number: usize,
+    at: usize,
+) -> [Option<ContactLocation>; MAX_TIP_CONTACTS] {
+    let mut locations = [None; MAX_TIP_CONTACTS];
+    for (location, contact) in
+        locations.iter_mut().zip(contacts_between(contacts, Collider::Device(number), at))
+    {
+        *location = Some(states[at].points.of(contact.slot).location);
+    }
+    locations
 }
 
 /// Number of a tip contact; none for a held point.
