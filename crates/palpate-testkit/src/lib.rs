@@ -6,11 +6,14 @@
 mod allocations;
 mod once_per_run;
 mod random;
+mod random_pointer;
 mod sample_recordings;
 mod scenes;
 mod subdivision;
 mod waiting;
 
+#[cfg(feature = "record")]
+mod body_set;
 #[cfg(feature = "record")]
 mod material;
 #[cfg(feature = "record")]
@@ -19,6 +22,7 @@ mod recording_cache;
 pub use allocations::{CountingAllocator, allocations};
 pub use once_per_run::made_once_per_run;
 pub use random::Random;
+pub use random_pointer::RandomPointer;
 pub use sample_recordings::{
     FIXED_BLOCK_FILE, FREE_BLOCK_FILE, fixed_block, free_block, with_stiffness_damping,
 };
@@ -29,6 +33,8 @@ pub use scenes::{
 pub use subdivision::{subdivided, subdivided_near_field};
 pub use waiting::wait_until;
 
+#[cfg(feature = "record")]
+pub use body_set::{BodyShape, Fineness};
 #[cfg(feature = "record")]
 pub use material::{ElasticMaterial, PAPER_MATERIAL, isotropic, nodes_where, undamped};
 #[cfg(feature = "record")]

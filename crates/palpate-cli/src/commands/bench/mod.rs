@@ -1,11 +1,15 @@
 //! `palpate bench`: percentiles of step times.
 
+mod baseline;
 mod frames;
+mod many;
+mod rough;
 mod touch;
 
 use crate::commands::demo::cached_cube;
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
+use baseline::PERCENTILES;
 use clap::Args;
 use glam::DVec3;
 use palpate::{
@@ -18,7 +22,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time a step: against the mesh, the modes, held points and objects, touching fingers, contacts with a floor; and the encoding of frames
+/// Time a step: against the mesh, the modes, held points and objects; fingers, floors, rough motion, many bodies; and the encoding of frames
 ///
 /// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
 /// for another machine. Recording the largest cube takes about a minute the first time.
@@ -39,6 +43,13 @@ pub struct Arguments {
     /// Cache folder of recordings [default: $XDG_CACHE_HOME/palpate or ~/.cache/palpate]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
+    /// Save the times as a baseline, to compare with later
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+    /// Compare with a baseline that --save wrote: ratios now/then of each row, and what got slower. Compare two builds on one machine that
+    /// does nothing else, with --runs 3 or more
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -63,6 +74,7 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.runs == 0 {
         return Err(Failure("--runs is 0, expected 1 or more".into()));
     }
+    let before = arguments.against.as_deref().map(baseline::read).transpose()?.unwrap_or_default();
     let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
         Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?))
     };
@@ -90,26 +102,28 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
         let label = case.label.clone();
         (label, Box::new(move |steps| held_steps(&case, steps)))
     });
-    let mut rows = Vec::new();
-    if !arguments.json {
-        print(&format!("{:<70}{:>8}{:>8}{:>8}{:>9}\n", "step time [µs]", "p50", "p99", "p99.9", "max"))?;
-    }
+    let touch = touch::cases(usual.clone(), cube(16, 200)?);
+    let rough = rough::cases(usual, arguments.cache.as_deref());
     let wanted = |label: &str| arguments.only.as_deref().is_none_or(|text| label.contains(text));
-    for (label, measure) in held.chain(touch::cases(usual, cube(16, 200)?)).filter(|(label, _)| wanted(label))
-    {
-        let mut times = measure(arguments.steps)?;
-        for _ in 1..arguments.runs {
-            times
-                .iter_mut()
-                .zip(measure(arguments.steps)?)
-                .for_each(|(least, time)| *least = time.min(*least));
-        }
-        times.sort_unstable();
-        let [p50, p99, p999, max] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile_us(&times, share));
-        rows.push(json!({ "case": label, "p50": p50, "p99": p99, "p999": p999, "max": max }));
+    let cases = held.chain(touch).chain(rough).chain(many::cases()).filter(|(label, _)| wanted(label));
+    if !arguments.json {
+        let ratios = if arguments.against.is_some() { "  now/then" } else { "" };
+        print(&format!(
+            "{:<70}{:>8}{:>8}{:>8}{:>9}{ratios}\n",
+            "step time [µs]", "p50", "p99", "p99.9", "max"
+        ))?;
+    }
+    let mut rows = Vec::new();
+    for (label, measure) in cases {
+        let row = measured_row(&label, &measure, arguments)?;
         if !arguments.json {
-            print(&format!("{:<70}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}\n", label))?;
+            let [p50, p99, p999, max] = PERCENTILES.map(|(name, _)| row[name].as_f64().unwrap_or(f64::NAN));
+            let ratios =
+                baseline::ratios(&row, &before).map(|ratios| ratios.map(|ratio| format!("{ratio:6.2}")));
+            let ratios = ratios.map(|ratios| format!("  {}", ratios.join(""))).unwrap_or_default();
+            print(&format!("{label:<70}{p50:>8.2}{p99:>8.2}{p999:>8.2}{max:>9.2}{ratios}\n"))?;
         }
+        rows.push(row);
     }
     if rows.is_empty() {
         let text = arguments.only.as_deref().unwrap_or_default();
@@ -117,7 +131,31 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
             "no row's name contains '{text}'; palpate bench --steps 1 shows them all"
         )));
     }
-    if arguments.json { print_json(&json!({ "step_time_us": Value::Array(rows) })) } else { Ok(()) }
+    if let Some(path) = &arguments.save {
+        baseline::save(path, &rows)?;
+    }
+    if arguments.json {
+        return print_json(&json!({ "step_time_us": rows }));
+    }
+    if arguments.against.is_some() { print(&baseline::summary(&rows, &before)) } else { Ok(()) }
+}
+
+/// Percentiles of a case: of each step, the least time over the runs.
+fn measured_row(
+    label: &str,
+    measure: &dyn Fn(usize) -> Result<Vec<u32>, Failure>,
+    arguments: &Arguments,
+) -> Result<Value, Failure> {
+    let mut times = measure(arguments.steps)?;
+    for _ in 1..arguments.runs {
+        times.iter_mut().zip(measure(arguments.steps)?).for_each(|(least, time)| *least = time.min(*least));
+    }
+    times.sort_unstable();
+    let mut row = json!({ "case": label });
+    for (name, share) in PERCENTILES {
+        row[name] = json!(percentile_us(&times, share));
+    }
+    Ok(row)
 }
 
 /// Compute times of steps with moving held points [ns].

@@ -133,13 +133,13 @@ fn floor_steps(
 }
 
 /// Parameters with gravity and a floor.
-fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
+pub fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     let gravity = DVec3::Y * -GRAVITY_M_S2;
     ModelParameters {
         gravity,
         obstacles: vec![floor(0.5)],
         max_contact_samples,
-        ..ModelParameters::default()
+        ..ModelParameters::for_real_time()
     }
 }
 

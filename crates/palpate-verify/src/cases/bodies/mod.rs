@@ -2,14 +2,12 @@
 //! weights, a contact at rest takes no energy, and samples press as nodes do.
 
 mod motions;
-mod shapes;
 
 use crate::check::Check;
 use crate::error::VerifyError;
 use motions::{ALL_NODES, Motion, Outcome};
 use palpate::Recording;
-use palpate_testkit::GRAVITY_M_S2;
-use shapes::{BodyShape, Fineness};
+use palpate_testkit::{BodyShape, Fineness, GRAVITY_M_S2};
 use std::sync::Arc;
 
 /// Contact samples of a run in real time.

@@ -1,6 +1,5 @@
 //! Motions of the set: rest, slide, roll, land, punch, pinch and stack, each with the largest penetration of all surface nodes.
 
-use super::shapes::turned;
 use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
@@ -35,6 +34,11 @@ pub struct Outcome {
     /// Kinetic energy at the end [J].
     pub kinetic: f64,
     pub invariants: RunInvariants,
+}
+
+/// Turn about an axis by an angle in degrees.
+fn turned(axis: DVec3, degrees: f64) -> DQuat {
+    DQuat::from_axis_angle(axis.normalize(), degrees.to_radians())
 }
 
 /// Scene that runs and is observed.

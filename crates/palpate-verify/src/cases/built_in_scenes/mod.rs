@@ -11,7 +11,6 @@
 //! Equations: docs/theory.md (C38), (C47).
 
 mod observer;
-mod random_pointer;
 
 use crate::check::Check;
 use crate::error::VerifyError;
@@ -19,8 +18,7 @@ use glam::DVec3;
 use observer::Observer;
 use palpate::{DeviceInput, State, step};
 use palpate_scene::{OpenedScene, SceneLibrary, SilentProgress};
-use palpate_testkit::Random;
-use random_pointer::RandomPointer;
+use palpate_testkit::{Random, RandomPointer};
 use rayon::prelude::*;
 
 /// Time without anybody [s]: a whole number of periods of all paths, so that fingers are open at the end.

@@ -1,9 +1,10 @@
 //! Pointers that touch as somebody at the page does, but faster and deeper: press on a surface that is seen, push in along the view, drag
 //! aside, release.
 
+use crate::random::Random;
+use crate::scenes::smoothstep;
 use glam::DVec3;
 use palpate::{DeviceInput, Model, Output};
-use palpate_testkit::{Random, smoothstep};
 
 /// Angular frequency of the page's tracking filter [rad/s].
 const TRACKING_FREQUENCY: f64 = 120.0;

@@ -1,12 +1,11 @@
-//! Bodies of the set: meshes of about 10 cm, each coarse and fine.
+//! Set of bodies: meshes of about 10 cm, each coarse and fine.
 
-use crate::error::VerifyError;
+use crate::material::ElasticMaterial;
 use glam::{DMat3, DVec3};
 use palpate::Recording;
-use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
-use palpate_testkit::ElasticMaterial;
-use std::f64::consts::{PI, TAU};
+use palpate_fem::{ElementOrder, RecordError};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Soft silicone, damped so that it comes to rest within a second.
@@ -19,28 +18,38 @@ const MODES: usize = 200;
 /// Shape of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BodyShape {
+    /// Cube of 10 cm.
     Cube,
+    /// Ball of 10 cm.
     Ball,
+    /// Ring of round section.
     Torus,
+    /// Liver-like blob, flat below.
     Blob,
+    /// Plate of 12 × 12 × 0.8 cm.
     Sheet,
+    /// Round rod of 16 cm.
     Rod,
+    /// Rod bent to three quarters of a circle.
     Horseshoe,
 }
 
 /// Fineness of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fineness {
+    /// Some hundred nodes.
     Coarse,
+    /// About a thousand nodes and more.
     Fine,
 }
 
 impl BodyShape {
+    /// All shapes.
     pub const ALL: [Self; 7] =
         [Self::Cube, Self::Ball, Self::Torus, Self::Blob, Self::Sheet, Self::Rod, Self::Horseshoe];
 
     /// Mesh about its centre, with the axis of symmetry along y.
-    fn mesh(self, fineness: Fineness) -> Result<Mesh, VerifyError> {
+    fn mesh(self, fineness: Fineness) -> Result<Mesh, RecordError> {
         let n = |coarse: u32, fine: u32| if fineness == Fineness::Coarse { coarse } else { fine };
         let mesh = match self {
             Self::Cube => box_mesh([0.1; 3], [n(4, 6); 3])?,
@@ -61,8 +70,11 @@ impl BodyShape {
     }
 
     /// Recording of the body.
-    pub fn recording(self, fineness: Fineness) -> Result<Arc<Recording>, VerifyError> {
-        Ok(SOFT.free_body(self.mesh(fineness)?, ElementOrder::Quadratic, MODES)?)
+    ///
+    /// # Errors
+    /// As [`palpate_fem::record`].
+    pub fn recording(self, fineness: Fineness) -> Result<Arc<Recording>, RecordError> {
+        SOFT.free_body(self.mesh(fineness)?, ElementOrder::Quadratic, MODES)
     }
 }
 
@@ -108,9 +120,4 @@ fn joined(mesh: Mesh) -> Mesh {
     }
     let tets = mesh.tets.iter().map(|tet| tet.map(|n| number[n as usize])).collect();
     Mesh { nodes: kept, tets, ..mesh }
-}
-
-/// Turn about an axis by an angle in degrees.
-pub fn turned(axis: DVec3, degrees: f64) -> glam::DQuat {
-    glam::DQuat::from_axis_angle(axis.normalize(), degrees * PI / 180.0)
 }

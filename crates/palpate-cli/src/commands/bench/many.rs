@@ -1,0 +1,82 @@
+//! Steps of many bodies: apart, a tenth of them touched; and at rest on a floor.
+
+use super::{Case, timed_step};
+use crate::failure::Failure;
+use glam::DVec3;
+use palpate::{DeviceInput, Input, Model, ModelObject, ModelParameters, State};
+use palpate_testkit::{GRAVITY_M_S2, finger, floor, free_block, half_extent, start_at};
+use std::f64::consts::TAU;
+
+/// Steps that are timed, and steps in which bodies come to rest.
+const STEPS: usize = 300;
+const SETTLING: usize = 700;
+
+/// Numbers of bodies.
+const APART: [usize; 3] = [10, 100, 1000];
+const AT_REST: [usize; 3] = [100, 1000, 10_000];
+
+/// Cases of many bodies.
+pub fn cases() -> Vec<Case> {
+    let apart = APART.map(|bodies| -> Case {
+        let touched = bodies / 10;
+        let label = format!("many: {bodies} bodies apart, {touched} touched");
+        (label, Box::new(move |steps| apart_steps(bodies, touched, steps)))
+    });
+    let at_rest = AT_REST.map(|bodies| -> Case {
+        let label = format!("many: {bodies} bodies at rest on a floor");
+        (label, Box::new(move |steps| resting_steps(bodies, steps)))
+    });
+    apart.into_iter().chain(at_rest).collect()
+}
+
+/// Places of bodies on a grid in x and z [m].
+fn place(number: usize, bodies: usize, spacing: f64) -> DVec3 {
+    let columns = (bodies as f64).sqrt().ceil() as usize;
+    DVec3::new((number % columns) as f64, 0.0, (number / columns) as f64) * spacing
+}
+
+fn apart_steps(bodies: usize, touched: usize, steps: usize) -> Result<Vec<u32>, Failure> {
+    let block = free_block();
+    let (radius, half) = (block.surface.radius(), half_extent(&block, 0));
+    let tip = 0.1 * radius;
+    let parameters = ModelParameters {
+        devices: vec![finger(tip, 0.1 * radius, 0.5); touched],
+        ..ModelParameters::default()
+    };
+    let at = |number| place(number, bodies, 4.0 * radius);
+    let objects = (0..bodies).map(|number| ModelObject::new(block.clone(), start_at(at(number))));
+    let model = Model::new(parameters, objects.collect())?;
+    let mut state = State::new(&model);
+    let mut times = Vec::new();
+    for number in 0..steps.min(STEPS) {
+        let time = number as f64 * model.parameters().step_s;
+        let press = 0.03 * radius * (TAU * 4.0 * time).sin().abs();
+        let finger = |touched| DeviceInput::touching(at(touched) - DVec3::X * (half + tip - press));
+        let input = Input { devices: (0..touched).map(finger).collect(), ..Input::default() };
+        times.push(timed_step(&model, &mut state, &input));
+    }
+    Ok(times)
+}
+
+fn resting_steps(bodies: usize, steps: usize) -> Result<Vec<u32>, Failure> {
+    let block = free_block();
+    let (radius, half) = (block.surface.radius(), half_extent(&block, 1));
+    let parameters = ModelParameters {
+        gravity: DVec3::Y * -GRAVITY_M_S2,
+        obstacles: vec![floor(0.5)],
+        max_contact_samples: 12,
+        ..ModelParameters::default()
+    };
+    let at = |number| place(number, bodies, 4.0 * radius) + DVec3::Y * half;
+    let objects = (0..bodies).map(|number| ModelObject::new(block.clone(), start_at(at(number))));
+    let model = Model::new(parameters, objects.collect())?;
+    let mut state = State::new(&model);
+    let mut times = Vec::new();
+    for number in 0..SETTLING + steps.min(STEPS) {
+        let time = timed_step(&model, &mut state, &Input::default());
+        if number >= SETTLING {
+            times.push(time);
+        }
+    }
+    Ok(times)
+}
