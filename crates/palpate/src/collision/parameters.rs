@@ -40,7 +40,7 @@ pub(super) struct CollisionParameters {
     /// The next finer level of detail is tried after this many steps, and kept with at most this share of the allowed samples near.
     pub(super) refine_after_steps: u64,
     pub(super) refine_below: f64,
-    /// Depth of a node between contact samples from which it is added, as a share of the object's characteristic length (volume over area).
+    /// Depth of a node between contact samples from which it is added, as a share of the object's radius.
     pub(super) sample_tolerance: f64,
     /// Spheres and triangles that a step visits to find such nodes.
     pub(super) search_visits: usize,
@@ -63,7 +63,7 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     seed_above: 48,
     refine_after_steps: 50,
     refine_below: 0.8,
-    sample_tolerance: 5e-3,
+    sample_tolerance: 3e-4,
     search_visits: 64,
 };
 

@@ -100,8 +100,6 @@ pub(crate) struct Body {
     bounds: Bounds,
     /// Mean edge length of the triangles at rest [m].
     pub(crate) edge: f64,
-    /// Characteristic length of the surface at rest [m].
-    pub(crate) characteristic_length: f64,
     /// Triangles around every surface node, node after node, and the index of each node's first.
     around: Vec<u32>,
     first_around: Vec<u32>,
@@ -131,7 +129,6 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
-        let characteristic_length = recording.surface.characteristic_length();
         let normals = node_normals(&recording.surface);
         let heights = smooth_heights(&recording.surface, recording.metadata.mesh.order);
         let max_height = heights.iter().copied().fold(0.0, f64::max);
@@ -159,7 +156,6 @@ impl Body {
             tree,
             bounds,
             edge,
-            characteristic_length,
             around,
             first_around,
             normals,

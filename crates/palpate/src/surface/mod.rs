@@ -82,18 +82,6 @@ impl Surface {
         (high - low).length()
     }
 
-    /// Characteristic length [m]: volume over area, half the thickness of a thin plate. 0 of a surface that encloses nothing.
-    pub fn characteristic_length(&self) -> f64 {
-        let (mut volume, mut area) = (0.0, 0.0);
-        for corners in &self.triangles {
-            let corners = corners.map(|node| self.positions[node as usize]);
-            let normal = area_normal(corners);
-            volume += corners[0].dot(normal) / 3.0;
-            area += normal.length();
-        }
-        if area > 0.0 { libm::fabs(volume) / area } else { 0.0 }
-    }
-
     /// Whether a point's triangle exists and its weights are barycentric.
     pub(crate) fn contains(&self, point: &SurfacePoint) -> bool {
         (point.triangle as usize) < self.triangles.len()
@@ -140,20 +128,6 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             source_nodes: vec![0, 1, 2, 3],
         }
-    }
-
-    #[test]
-    fn characteristic_length_of_a_box_is_that_of_its_sides() {
-        let sides = DVec3::new(0.4, 0.02, 0.3);
-        let positions: Vec<DVec3> = (0..8)
-            .map(|k| sides * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) - 0.1)
-            .collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-        let surface = Surface { positions, triangles, source_nodes: (0..8).collect() };
-        let expected = 0.5 / (1.0 / sides).element_sum();
-        assert!((surface.characteristic_length() - expected).abs() < 1e-15);
-        assert_eq!(square().characteristic_length(), 0.0);
     }
 
     #[test]

@@ -20,7 +20,7 @@ impl ObstacleQuery<'_> {
     pub(super) fn refine(&self, context: &mut CollisionContext, known: &[Contact], first: usize) {
         let max_added = context.scene.max_contact_samples.saturating_mul(2);
         let CollisionWorkspace { positions, near_nodes, candidates, .. } = &mut *context.workspace;
-        let depth = COLLISION.sample_tolerance * self.body.characteristic_length;
+        let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
         let mut added = 0;
         for contact in known {
             if !matches!(contact.id.feature, FeatureId::Node(_)) {
