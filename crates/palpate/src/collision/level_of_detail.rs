@@ -101,15 +101,6 @@ impl Levels {
         &mut self.of_obstacles[object * self.obstacles + obstacle]
     }
 
-    /// Whether an object's search for nodes that penetrate goes on in an obstacle in a step: those on which samples stand for nodes take turns.
-    pub(super) fn is_turn_of(&self, object: usize, obstacle: usize, step: u64) -> bool {
-        let of_object = &self.of_obstacles[object * self.obstacles..(object + 1) * self.obstacles];
-        let uses_samples = |level: &&ObstacleLevel| level.detail.level > 0;
-        let count = of_object.iter().filter(uses_samples).count() as u64;
-        let place = of_object[..obstacle].iter().filter(uses_samples).count() as u64;
-        step.checked_rem(count).is_none_or(|turn| turn == place)
-    }
-
     /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step.
     pub(super) fn of_pair(&self, objects: [usize; 2], step: u64) -> ObjectPair {
         let known = self.pairs.binary_search_by(|pair| pair.objects.cmp(&objects));

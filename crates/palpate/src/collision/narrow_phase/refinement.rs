@@ -35,9 +35,6 @@ impl ObstacleQuery<'_> {
             }
         }
         // Nodes that are too deep.
-        if !context.levels.is_turn_of(self.object, self.number, context.step) {
-            return;
-        }
         let cache = &mut positions[self.object];
         let search = &mut context.levels.against_obstacle(self.object, self.number).search;
         if search.is_finished() {
