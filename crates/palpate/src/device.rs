@@ -105,8 +105,6 @@ pub(crate) struct DeviceState {
     pub(crate) compliance: f64,
     /// Force on the objects [N, world].
     pub(crate) force: DVec3,
-    /// Proxy at the end of the step under the contact forces of the last one [m, world].
-    pub(crate) predicted: DVec3,
     /// Where its tip touched last, until it leaves the surface or the scene.
     pub(crate) last_touch: Option<LastTouch>,
     /// Where its prescribed force acts.
@@ -144,7 +142,6 @@ impl DeviceState {
             relaxed_stretch: zero,
             compliance: 0.0,
             force: zero,
-            predicted: zero,
             last_touch: None,
             prescribed: None,
         }
@@ -158,7 +155,7 @@ impl DeviceState {
 
     /// Move proxy and interface point out of an object in a step that has begun [m, world]: the stretch stays.
     pub(crate) fn let_out(&mut self, shift: DVec3) {
-        for point in [&mut self.start, &mut self.target, &mut self.proxy, &mut self.predicted] {
+        for point in [&mut self.start, &mut self.target, &mut self.proxy] {
             *point += shift;
         }
         self.offset.iter_mut().for_each(|offset| *offset += shift);
@@ -184,11 +181,6 @@ impl DeviceState {
             }
             None => (DVec3::ZERO, 0.0),
         };
-    }
-
-    /// Predict the proxy at the end of a step that has begun, under a force [N, world].
-    pub(crate) fn predict(&mut self, force: DVec3) {
-        self.predicted = self.proxy_under_force() - force * self.compliance;
     }
 
     /// Proxy at the end of the step under the present force [m, world].

@@ -120,7 +120,7 @@ impl CollisionContext<'_> {
 
     /// Objects that a device's tip can meet in the step, ascending; they stay in `near_objects` of the workspace.
     pub(crate) fn find_near_objects(&mut self, number: usize, device: &DeviceState) {
-        let travel = (device.predicted - device.proxy).length();
+        let travel = (device.proxy_under_force() - device.proxy).length();
         let reach = self.scene.devices[number].tip_radius + COLLISION.motion_factor * travel;
         let CollisionWorkspace { sweep, near_objects, .. } = &mut *self.workspace;
         sweep.overlapping((device.proxy, reach), near_objects);

@@ -194,8 +194,6 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             device.may_be_inside = touches;
         }
         device.begin(&model.parameters.devices[number], model.parameters.step_s, device_input.position);
-        let last = context.contacts.iter().filter(|c| c.other == OtherSide::Device(number));
-        device.predict(last.map(|contact| contact.force).sum());
         if let DeviceMode::Held(grasp) = device_input.mode {
             let collider = Collider::Device(number);
             context.workspace.candidates.push(ContactCandidate {

@@ -207,7 +207,9 @@ impl<'a> InvariantChecker<'a> {
         let apart = pushing.map(|contact| contact.gap).fold(0.0, f64::max);
         // What the last sweep changes comes on top of the residual that it reports.
         let violated = status.solver_residual_m.max(0.5 * apart) > LOOSE * self.size;
-        self.violations.unreported.count_if(violated && status.unsolved_islands == 0, at);
+        self.violations
+            .unreported
+            .count_if(violated && status.unsolved_islands + status.islands_out_of_budget == 0, at);
     }
 
     fn device(

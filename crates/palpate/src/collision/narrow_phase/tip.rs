@@ -36,7 +36,7 @@ pub(crate) struct TipPair<'a> {
 struct Path {
     object: usize,
     footprint: Footprint,
-    /// Proxy at the start, and at the end as predicted [m, body].
+    /// Proxy at the start, and at the end without contact force [m, body].
     start: DVec3,
     free: DVec3,
     /// Bound of the relative motion of proxy and surface [m].
@@ -55,7 +55,7 @@ impl CollisionContext<'_> {
         let footprint = body.footprint(parameters.patch_radius);
         let tip = parameters.ball_radius(body);
         let start = own.rigid.pose.body_from_world(device.proxy);
-        let free = own.free.end.pose.body_from_world(device.predicted);
+        let free = own.free.end.pose.body_from_world(device.proxy_under_force());
         let travel = (free - start).length();
         let motion = travel + own.surface_motion;
 
@@ -70,10 +70,7 @@ impl CollisionContext<'_> {
         }
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
-        // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
-        let slow = COLLISION.max_depth * tip.max(0.5 * body.edge);
-        let ahead = if travel > slow { COLLISION.tip_margin * tip } else { COLLISION.motion_factor * travel };
-        let reach = tip + ahead + 10.0 * COLLISION.margin * body.edge;
+        let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
         let triangles = workspace.triangles[number].of(at, self.step);
         triangles.find(query, &mut surface, start, reach);
         // The surface here moves about as its nearest nodes do.
@@ -82,7 +79,8 @@ impl CollisionContext<'_> {
             let local = COLLISION.motion_factor * surface.predicted_motion(nearest.triangle);
             motion = motion.min(travel + local + 5.0 * COLLISION.margin * body.edge);
         }
-        let is_fast = motion > slow;
+        // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
+        let is_fast = motion > COLLISION.max_depth * tip.max(0.5 * body.edge);
         let needed =
             if is_fast { (1.0 + COLLISION.tip_margin) * tip } else { tip + COLLISION.motion_factor * motion };
         if needed > reach {
