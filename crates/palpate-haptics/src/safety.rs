@@ -106,7 +106,8 @@ impl Safety {
     }
 
     /// Safe force [N] for a wanted force [N] of an age [s], at a speed of the hand [m/s], `dt_s` [s] after the last update.
-    /// The result is finite for any input, at most `force_n`, and within the slew-rate limit of the last one, unless it goes to zero.
+    /// The result is finite for any input, at most `force_n`, and within the slew-rate limit of the last one, unless it goes to zero. An update that
+    /// comes later after the last one than the watchdog allows is a fault: the device has held a force that was too old.
     ///
     /// # Real time
     /// No allocation, lock or system call.
@@ -120,7 +121,7 @@ impl Safety {
             ramp_down_s,
             recovery_s,
         } = self.limits;
-        let dt = if dt_s.is_finite() { dt_s.clamp(0.0, 0.1) } else { 0.0 };
+        let dt = if dt_s.is_finite() { dt_s.clamp(0.0, watchdog_s) } else { 0.0 };
         let mut well = true;
         if wanted.is_finite() {
             self.wanted = wanted.clamp_length_max(force_n);
@@ -129,7 +130,7 @@ impl Safety {
             self.counts.not_finite += 1;
             well = false;
         }
-        if age_s.is_nan() || age_s > watchdog_s {
+        if age_s.is_nan() || age_s.max(dt_s) > watchdog_s {
             self.counts.stale += 1;
             well = false;
         }
@@ -226,6 +227,19 @@ mod tests {
             assert_eq!(back[98], 0.0);
             assert!(back[120] > 0.0 && back[120] < 0.1 && back[699] == 1.0, "{} {}", back[120], back[699]);
         }
+    }
+
+    #[test]
+    fn a_stall_of_its_own_takes_the_force_away_at_once_and_ramps_it_up_again() {
+        let mut safety = armed();
+        let full = |safety: &mut Safety| (0..1000).map(|_| safety.limit(DVec3::X, 0.0, 0.0, DT)).last();
+        assert_eq!(full(&mut safety), Some(DVec3::X));
+        // The force itself is fresh, the one that the device has held is not.
+        assert_eq!(safety.limit(-DVec3::X, 0.0, 0.0, 0.5), DVec3::ZERO);
+        assert_eq!(safety.counts(), SafetyCounts { stale: 1, trips: 1, ..SafetyCounts::default() });
+        let next = safety.limit(-DVec3::X, 0.0, 0.0, DT);
+        assert_eq!(next, DVec3::ZERO);
+        assert_eq!(full(&mut safety), Some(DVec3::X));
     }
 
     #[test]

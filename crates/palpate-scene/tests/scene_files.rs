@@ -138,6 +138,7 @@ fn errors_have_kind_line_and_key_for_programs() {
         ("[[object]]\nname = \"cube\"\n".to_string(), Syntax, 1, Some("recording")),
         (format!("integrator = \"rough\"\n{OBJECT}"), UnknownValue, 1, Some("integrator")),
         (format!("max_contact_samples = 3\n{OBJECT}"), OutOfRange, 1, Some("max_contact_samples")),
+        (format!("sleep_after = 0.0\n{OBJECT}"), OutOfRange, 1, Some("sleep_after")),
         (format!("step = 2.0\n{OBJECT}"), Model, 1, Some("step")),
         (OBJECT.replace("cube.palp", "none.palp"), Recording, 3, Some("recording")),
         (format!("{OBJECT}friction = -1.0"), OutOfRange, 4, Some("friction")),

@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let parameters = ModelParameters {
                 obstacles: vec![floor(0.5)],
                 max_contact_samples: MAX_CONTACT_SAMPLES,
-                ..ModelParameters::default()
+                ..ModelParameters::for_reference()
             };
             let object = ModelObject::new(recording.clone(), start_at(DVec3::Y));
             Ok(Model::new(parameters, vec![object])?)

@@ -42,7 +42,8 @@ pub fn scene(
     devices: Vec<DeviceParameters>,
     objects: Vec<ModelObject>,
 ) -> Result<Model, Error> {
-    let parameters = ModelParameters { step_s, gravity, obstacles, devices, ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { step_s, gravity, obstacles, devices, ..ModelParameters::for_reference() };
     Model::new(parameters, objects)
 }
 

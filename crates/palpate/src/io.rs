@@ -170,6 +170,8 @@ pub struct ObjectOutput {
     /// Largest penetration of the object's contacts at the end of the step [m], not negative; 0 without contact. Between
     /// contact locations an object may be deeper.
     pub penetration_m: f64,
+    /// Whether it is asleep: still, and left as it is with its contacts until something comes near.
+    pub is_asleep: bool,
 }
 
 /// Status of a step. A step cannot fail; the status reports rejected inputs and unsolved contacts.
@@ -206,7 +208,7 @@ pub struct Output {
     pub objects: Vec<ObjectOutput>,
     /// Clamps, in the model's order.
     pub clamps: Vec<ClampOutput>,
-    /// Contacts that carry force, without held points.
+    /// Contacts that carry force, without held points; those of sleeping objects first, as they were.
     pub contacts: Vec<ContactOutput>,
     /// Energy ledger of the scene.
     pub energy: EnergyLedger,

@@ -53,10 +53,14 @@ pub struct ModelParameters {
     /// Budget of the contact solver in a step, in products of a 3×3 block and a force, each some nanoseconds: it leaves an island early when
     /// its share is used up (see [`StepStatus::islands_out_of_budget`](crate::StepStatus::islands_out_of_budget)).
     pub solver_budget: u64,
+    /// Time for which objects have to be still before they fall asleep [s]; infinite for never. A sleeping object costs no more than its
+    /// memory, until a device, a moving obstacle or another object comes near (see [`ObjectOutput::is_asleep`](crate::ObjectOutput::is_asleep)).
+    pub sleep_after_s: f64,
 }
 
 impl Default for ModelParameters {
-    /// 1 kHz, the rate of common haptic devices; no gravity; no device; room for one face of a cube of 20³ cells.
+    /// 1 kHz, the rate of common haptic devices; no gravity; no device; room for one face of a cube of 20³ cells; up to 128 contact
+    /// samples, which are all nodes of most contacts; sleep after half a second.
     fn default() -> Self {
         Self {
             step_s: 1e-3,
@@ -67,8 +71,9 @@ impl Default for ModelParameters {
             obstacles: Vec::new(),
             clamps: Vec::new(),
             max_contact_points: 512,
-            max_contact_samples: usize::MAX,
+            max_contact_samples: CONTACT_SAMPLES,
             solver_budget: u64::MAX,
+            sleep_after_s: SLEEP_AFTER_S,
         }
     }
 }
@@ -82,13 +87,23 @@ impl ModelParameters {
             ..Self::default()
         }
     }
+
+    /// Parameters for a reference to compare with: every surface node is a contact, and no object sleeps. A step costs up to a thousand times
+    /// as much.
+    pub fn for_reference() -> Self {
+        Self { max_contact_samples: usize::MAX, sleep_after_s: f64::INFINITY, ..Self::default() }
+    }
 }
 
-/// Contact samples in real time.
+/// Contact samples by default, and in real time.
+const CONTACT_SAMPLES: usize = 128;
 const REALTIME_CONTACT_SAMPLES: usize = 48;
 
 /// Budget of the solver in real time: about 0.3 ms on a core of 2024.
 const REALTIME_SOLVER_BUDGET: u64 = 100_000;
+
+/// Time for which objects are still before they fall asleep by default [s]: that of Box2D; some periods of a soft body.
+const SLEEP_AFTER_S: f64 = 0.5;
 
 /// Object to be put into a scene.
 #[derive(Debug, Clone)]
@@ -142,6 +157,13 @@ impl Model {
         }
         if !parameters.gravity.is_finite() {
             return fail("gravity", format!("gravity is {}, expected finite numbers", parameters.gravity));
+        }
+        if parameters.sleep_after_s.is_nan() || parameters.sleep_after_s <= 0.0 {
+            let given = parameters.sleep_after_s;
+            return fail(
+                "sleep_after_s",
+                format!("sleep_after_s is {given} s, expected a positive number, or infinity for never"),
+            );
         }
         if parameters.max_contact_samples < MIN_CONTACT_SAMPLES {
             let given = parameters.max_contact_samples;

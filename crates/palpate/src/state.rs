@@ -11,6 +11,7 @@ use crate::motion::{RigidState, RigidStep};
 use crate::object::ObjectState;
 use crate::response::OscillatorState;
 use crate::scene::Model;
+use crate::sleep::Sleepers;
 use crate::spatial::{Pose, Twist};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -29,7 +30,8 @@ pub struct ObjectSnapshot {
     pub modes: Vec<OscillatorState>,
 }
 
-/// State of a scene. A clone goes on as its original does; its output and some buffers grow in its first steps.
+/// State of a scene. A clone goes on as its original does; its output and some buffers grow in its first steps, and as objects wake for
+/// the first time.
 #[derive(Debug, Clone)]
 pub struct State {
     /// Steps since the start.
@@ -45,11 +47,48 @@ pub struct State {
     /// Contact cache, in the order of the ids.
     pub(crate) contacts: BoundedVec<Contact>,
     pub(crate) levels: Levels,
+    pub(crate) sleepers: Sleepers,
+    pub(crate) resting: Resting,
     /// Energy of the virtual couplings.
     pub(crate) couplings: EnergyLedger,
     pub(crate) recovery: RecoveryBudget,
     pub(crate) workspace: Workspace,
     pub(crate) output: Output,
+}
+
+/// Contacts and energy of sleeping objects; buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) struct Resting {
+    /// Contacts of each sleeping object.
+    pub(crate) contacts: Vec<BoundedVec<Contact>>,
+    /// Number of their contacts in the output, which are its first.
+    pub(crate) outputs: usize,
+    /// Sum of their energy ledgers.
+    energy: EnergyLedger,
+}
+
+impl Resting {
+    /// Sum up the ledgers of the sleeping objects.
+    pub(crate) fn update_energy(&mut self, objects: &[ObjectState], sleepers: &Sleepers) {
+        let asleep = objects.iter().enumerate().filter(|(at, _)| !sleepers.is_awake(*at));
+        self.energy = asleep.fold(EnergyLedger::default(), |sum, (_, own)| sum.plus(&own.ledger));
+    }
+
+    /// Energy that they have lost since the start [J].
+    pub(crate) fn lost(&self) -> f64 {
+        self.energy.lost()
+    }
+
+    /// Ledger of the scene, with that of the virtual couplings.
+    pub(crate) fn scene_energy(
+        &self,
+        couplings: &EnergyLedger,
+        objects: &[ObjectState],
+        sleepers: &Sleepers,
+    ) -> EnergyLedger {
+        let awake = sleepers.awake().iter().map(|&at| &objects[at as usize].ledger);
+        awake.fold(couplings.plus(&self.energy), |sum, own| sum.plus(own))
+    }
 }
 
 /// Buffers of a step, made once.
@@ -78,6 +117,7 @@ impl State {
             twist: object.start.twist,
             energy: state.ledger,
             penetration_m: 0.0,
+            is_asleep: false,
         });
         let contacts = objects.iter().map(|own| own.points.capacity()).sum();
         let output = Output {
@@ -89,6 +129,8 @@ impl State {
             energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
             status: StepStatus::default(),
         };
+        let never_sleeps = parameters.sleep_after_s == f64::INFINITY;
+        let resting_contacts = |own: &ObjectState| if never_sleeps { 0 } else { own.points.capacity() };
         let obstacles: Vec<Pose> = parameters.obstacles.iter().map(|obstacle| obstacle.pose).collect();
         Self {
             steps: 0,
@@ -97,6 +139,12 @@ impl State {
             clamps: parameters.clamps.iter().map(|clamp| ClampState::new(clamp.frame)).collect(),
             contacts: BoundedVec::new(contacts),
             levels: Levels::new(count, obstacles.len()),
+            sleepers: Sleepers::new(count),
+            resting: Resting {
+                contacts: objects.iter().map(|own| BoundedVec::new(resting_contacts(own))).collect(),
+                outputs: 0,
+                energy: EnergyLedger::default(),
+            },
             couplings: EnergyLedger::default(),
             recovery: RecoveryBudget::default(),
             workspace: Workspace {
@@ -134,7 +182,8 @@ impl State {
             (own.free, own.end) = (still, still);
             own.update_ledger(object, gravity);
             own.stored_at_start = own.ledger.stored();
-            state.output.objects[at] = ObjectOutput { pose, twist, energy: own.ledger, penetration_m: 0.0 };
+            state.output.objects[at] =
+                ObjectOutput { pose, twist, energy: own.ledger, ..state.output.objects[at] };
         }
         state.output.energy =
             state.objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));

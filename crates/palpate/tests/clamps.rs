@@ -46,7 +46,7 @@ fn clamped(recording: &Arc<Recording>, clamps: Vec<Clamp>, devices: usize) -> (M
         gravity: DVec3::Y * -GRAVITY_M_S2,
         devices: vec![DeviceParameters::default(); devices],
         clamps,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     model_and_state(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])
 }
@@ -129,7 +129,7 @@ fn cells_follow_the_frame_and_the_energy_balance_closes() {
 fn clamps_out_of_range_are_refused_and_a_frame_that_is_no_number_stays() {
     let recording = free_block();
     let refuse = |clamp: Clamp| {
-        let parameters = ModelParameters { clamps: vec![clamp], ..ModelParameters::default() };
+        let parameters = ModelParameters { clamps: vec![clamp], ..ModelParameters::for_reference() };
         let object = ModelObject::new(recording.clone(), start_at(DVec3::ZERO));
         Model::new(parameters, vec![object]).expect_err("a bad clamp").to_string()
     };

@@ -38,7 +38,7 @@ fn on_a_floor(recording: &Arc<Recording>, max_contact_samples: usize, pose: Pose
         gravity: GRAVITY,
         obstacles: vec![floor(0.4)],
         max_contact_samples,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let start = ObjectStart { pose, twist: Twist::ZERO };
     model_and_state(parameters, vec![ModelObject::new(recording.clone(), start)])
@@ -123,7 +123,7 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
         obstacles,
         devices: vec![finger(0.01, 0.03, 0.5)],
         max_contact_samples: 8,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let (model, mut state) =
         model_and_state(parameters, vec![object_at(&recording, DVec3::ZERO, DVec3::ZERO)]);

@@ -41,7 +41,7 @@ fn scene(parameters: ModelParameters, body: &Arc<Recording>, starts: [ObjectStar
 
 fn on_a_floor(max_contact_samples: usize) -> ModelParameters {
     let obstacles = vec![floor(0.5)];
-    ModelParameters { gravity: GRAVITY, obstacles, max_contact_samples, ..ModelParameters::default() }
+    ModelParameters { gravity: GRAVITY, obstacles, max_contact_samples, ..ModelParameters::for_reference() }
 }
 
 fn between_objects(output: &Output) -> impl Iterator<Item = &palpate::ContactOutput> {
@@ -62,7 +62,7 @@ fn pairs_have_opposite_forces_and_dissipate_the_lost_energy() {
         upper.pose.orientation = orientation;
         upper.pose.position.y += if orientation == tilted { 0.06 } else { 0.0 };
         upper.twist = Twist { linear: DVec3::new(0.05, -0.6, 0.02), angular: DVec3::new(0.0, 0.4, 0.1) };
-        let parameters = ModelParameters { max_contact_samples, ..ModelParameters::default() };
+        let parameters = ModelParameters { max_contact_samples, ..ModelParameters::for_reference() };
         let (model, mut state) = scene(parameters, &body, [start_at(DVec3::ZERO), upper]);
         let start = state.output().energy.stored();
         let momentum = upper.twist.linear * mass;
@@ -150,7 +150,7 @@ fn few_nodes_in_contact_are_not_subsampled() {
         let mut upper = start_at(DVec3::Y * (HALF.y + HALF.length() + 1e-3));
         upper.pose.orientation = corner;
         upper.twist.linear = -DVec3::Y * 0.05;
-        let parameters = ModelParameters { max_contact_samples, ..ModelParameters::default() };
+        let parameters = ModelParameters { max_contact_samples, ..ModelParameters::for_reference() };
         let (model, mut state) = scene(parameters, &body, [start_at(DVec3::ZERO), upper]);
         (0..60)
             .map(|_| step(&model, &mut state, &Input::default()).contacts.iter().map(|c| c.force.y).sum())

@@ -37,7 +37,7 @@ fn lowest(turn: DQuat) -> f64 {
 
 fn block_in_floor(depth: f64) -> (palpate::Model, State) {
     let parameters =
-        ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::default() };
+        ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::for_reference() };
     let start = start_at(DVec3::Y * (-lowest(DQuat::IDENTITY) - depth));
     model_and_state(parameters, vec![ModelObject::new(free_block(), start)])
 }
@@ -91,7 +91,7 @@ fn what_overlaps_in_weightlessness_parts_without_velocity_or_energy() {
             object_at(&body, DVec3::new(0.197, 0.01, 0.02), DVec3::ZERO),
         ]
     };
-    let parted = part(ModelParameters::default(), pair());
+    let parted = part(ModelParameters::for_reference(), pair());
     let centre = 0.5 * (parted.objects[0].pose.position + parted.objects[1].pose.position);
     assert!(
         (centre - DVec3::new(0.0985, 0.005, 0.01)).length() < SLOP_M,
@@ -106,7 +106,7 @@ fn what_overlaps_in_weightlessness_parts_without_velocity_or_energy() {
         pose: Pose::IDENTITY,
         friction: 0.5,
     };
-    let parameters = ModelParameters { obstacles: vec![table], ..ModelParameters::default() };
+    let parameters = ModelParameters { obstacles: vec![table], ..ModelParameters::for_reference() };
     let out = part(parameters, vec![ModelObject::new(body.clone(), start)]);
     let moved = out.objects[0].pose.position - position;
     assert!((moved - DVec3::Y * 0.005).length() < SLOP_M, "straight up by its depth: {moved}");

@@ -109,7 +109,7 @@ fn differences(
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); 2],
         gravity,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let fir = ResponseForm::Fir(Arc::new(table(recording, samples, H)));
     let mut scenes = [ResponseForm::Modal, fir].map(|form| scene(recording, form, parameters.clone()));
@@ -176,7 +176,7 @@ fn prescribed_forces_displace_as_in_modal_form() {
         let devices = vec![DeviceParameters { patch_radius: 0.04, ..DeviceParameters::default() }; 2];
         let of_points = vec![DeviceParameters::default(); 2];
         let scene_of = |form, devices| {
-            scene(&recording, form, ModelParameters { devices, ..ModelParameters::default() })
+            scene(&recording, form, ModelParameters { devices, ..ModelParameters::for_reference() })
         };
         // A table knows points only: there a patch is its point.
         let mut scenes = [scene_of(ResponseForm::Modal, of_points), scene_of(fir, devices)];
@@ -239,7 +239,7 @@ fn forces_older_than_the_window_have_no_effect() {
     let (model, mut state) = scene(
         &recording,
         form,
-        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::default() },
+        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::for_reference() },
     );
     let rest = recording.surface.rest_position(&held[0]);
     step(&model, &mut state, &holding(rest + DVec3::X * 1e-3, Grasp { object: 0, point: held[0] }));
@@ -264,7 +264,7 @@ fn work_of_hands_is_stored_in_motion_and_deformation() {
     let (model, mut state) = scene(
         &recording,
         form,
-        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::default() },
+        ModelParameters { devices: vec![DeviceParameters::default(); 1], ..ModelParameters::for_reference() },
     );
     let rest = recording.surface.rest_position(&held[5]);
     for number in 1..400 {
@@ -293,7 +293,10 @@ fn tables_that_do_not_fit_are_refused() {
             response: ResponseForm::Fir(Arc::new(table)),
             ..ModelObject::new(recording.clone(), start_at(DVec3::ZERO))
         };
-        Model::new(ModelParameters::default(), vec![object]).err().map(|e| e.to_string()).unwrap_or_default()
+        Model::new(ModelParameters::for_reference(), vec![object])
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default()
     };
     assert_eq!(
         refusal(&|table| table.step_s = 2e-3),
@@ -345,13 +348,14 @@ fn a_table_of_a_fixed_body_knows_constant_gravity_alone_and_starts_undeformed() 
         response: ResponseForm::Fir(Arc::new(table(&recording, 5, H))),
         ..ModelObject::new(recording, start_at(DVec3::ZERO))
     };
-    let model = Model::new(ModelParameters::default(), vec![object.clone()]).expect("a good model");
+    let model = Model::new(ModelParameters::for_reference(), vec![object.clone()]).expect("a good model");
     let mut state = State::new(&model);
     let same = Input { gravity: Some(DVec3::ZERO), ..Input::default() };
     assert_eq!(step(&model, &mut state, &same).status.rejected_inputs, 0);
     let changed = Input { gravity: Some(DVec3::Y), ..Input::default() };
     assert_eq!(step(&model, &mut state, &changed).status.rejected_inputs, 1);
     let object = ModelObject { deformation: palpate::InitialDeformation::Equilibrium, ..object };
-    let refused = Model::new(ModelParameters::default(), vec![object]).expect_err("it starts undeformed");
+    let refused =
+        Model::new(ModelParameters::for_reference(), vec![object]).expect_err("it starts undeformed");
     assert_eq!(refused.to_string(), "object 0: uses a table, which starts undeformed: use the modal form");
 }

@@ -30,7 +30,7 @@ const SLIP_M: f64 = 1e-6;
 
 fn one(recording: &Arc<Recording>, gravity: DVec3) -> (Model, State) {
     let devices = vec![DeviceParameters::default()];
-    let parameters = ModelParameters { gravity, devices, ..ModelParameters::default() };
+    let parameters = ModelParameters { gravity, devices, ..ModelParameters::for_reference() };
     model_and_state(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])
 }
 
@@ -119,7 +119,7 @@ fn a_block_on_a_floor_carries_the_weight_of_the_moment_and_slides_beyond_the_ang
         let parameters = ModelParameters {
             gravity: DVec3::Y * -GRAVITY_M_S2,
             obstacles: vec![floor(friction)],
-            ..ModelParameters::default()
+            ..ModelParameters::for_reference()
         };
         let object = ModelObject::new(recording.clone(), start_at(DVec3::Y * height));
         let (model, mut state) = model_and_state(parameters, vec![object]);
@@ -173,7 +173,7 @@ fn gravity_that_is_not_finite_is_refused_and_the_old_one_stays() {
 #[test]
 fn a_fixed_body_that_starts_at_equilibrium_stays_there_and_a_free_one_has_none() {
     let gravity = DVec3::new(0.0, -GRAVITY_M_S2, 2.0);
-    let parameters = ModelParameters { gravity, ..ModelParameters::default() };
+    let parameters = ModelParameters { gravity, ..ModelParameters::for_reference() };
     let start = start_at(DVec3::ZERO);
     let object = |recording| ModelObject {
         deformation: InitialDeformation::Equilibrium,

@@ -57,7 +57,10 @@ fn one(recording: Arc<Recording>, parameters: ModelParameters) -> (Model, State)
 }
 
 fn parameters(devices: usize) -> ModelParameters {
-    ModelParameters { devices: vec![DeviceParameters::default(); devices], ..ModelParameters::default() }
+    ModelParameters {
+        devices: vec![DeviceParameters::default(); devices],
+        ..ModelParameters::for_reference()
+    }
 }
 
 /// Run with one hand on a path; `observe` takes every output.
@@ -278,7 +281,7 @@ fn parameters_out_of_range_are_refused() {
             .map(|e| e.to_string())
             .unwrap_or_default()
     };
-    let step_s = |step_s| ModelParameters { step_s, ..ModelParameters::default() };
+    let step_s = |step_s| ModelParameters { step_s, ..ModelParameters::for_reference() };
     assert_eq!(refused(step_s(0.0), free_block(), start), "step is 0 s, expected above 0 and at most 1");
     assert_eq!(
         refused(step_s(f64::NAN), free_block(), start),

@@ -30,7 +30,7 @@ fn way(t: f64) -> DVec3 {
 
 #[test]
 fn base_that_accelerates_is_gravity_less_acceleration() {
-    let parameters = ModelParameters { gravity: GRAVITY, ..ModelParameters::default() };
+    let parameters = ModelParameters { gravity: GRAVITY, ..ModelParameters::for_reference() };
     let place = DVec3::new(0.3, -0.2, 0.5);
     let (model, mut moving) = block(parameters.clone(), place);
     let (_, mut still) = block(parameters, place);
@@ -61,7 +61,7 @@ fn work_of_base_hands_forces_and_contacts_is_stored_or_lost_in_every_step() {
         gravity: GRAVITY,
         devices: vec![device; 2],
         obstacles: vec![floor(0.5)],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let place = DVec3::Y * 0.13;
     let (model, mut state) = block(parameters, place);
@@ -96,7 +96,7 @@ fn work_of_base_hands_forces_and_contacts_is_stored_or_lost_in_every_step() {
 
 #[test]
 fn base_that_stops_leaves_the_kinetic_energy_of_the_modes_alone() {
-    let (model, mut state) = block(ModelParameters::default(), DVec3::ZERO);
+    let (model, mut state) = block(ModelParameters::for_reference(), DVec3::ZERO);
     // A jerk to constant speed, and a stop: the impulses of the base.
     for number in 1..=200 {
         let given = DVec3::X * 0.1 * H * f64::from(number);
@@ -116,13 +116,13 @@ fn base_that_stops_leaves_the_kinetic_energy_of_the_modes_alone() {
 #[test]
 fn bases_of_free_bodies_and_positions_that_are_no_numbers_are_rejected() {
     let (model, mut state) = model_and_state(
-        ModelParameters::default(),
+        ModelParameters::for_reference(),
         vec![ModelObject::new(free_block(), start_at(DVec3::ZERO))],
     );
     let input = |position| Input { bases: vec![Some(position)], ..Input::default() };
     assert_eq!(step(&model, &mut state, &input(DVec3::X)).status.rejected_inputs, 1);
     assert_eq!(state.output().objects[0].pose.position, DVec3::ZERO);
-    let (model, mut state) = block(ModelParameters::default(), DVec3::ZERO);
+    let (model, mut state) = block(ModelParameters::for_reference(), DVec3::ZERO);
     assert_eq!(step(&model, &mut state, &input(DVec3::NAN)).status.rejected_inputs, 1);
     assert_eq!(state.output().objects[0].pose.position, DVec3::ZERO);
 }

@@ -39,7 +39,7 @@ fn point_moves_with_the_surface_and_a_held_point_with_its_hand() {
         let parameters = ModelParameters {
             gravity: DVec3::Y * -GRAVITY_M_S2,
             devices: vec![DeviceParameters::default()],
-            ..ModelParameters::default()
+            ..ModelParameters::for_reference()
         };
         let object = ModelObject::new(recording.clone(), start_at(DVec3::ZERO));
         let (model, mut state) = model_and_state(parameters, vec![object]);
@@ -69,7 +69,7 @@ fn point_moves_with_a_surface_that_lies_on_a_floor_and_is_touched() {
         gravity: DVec3::Y * -GRAVITY_M_S2,
         obstacles: vec![floor(0.5)],
         devices: vec![finger(0.01, 0.04, 0.5)],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let objects = vec![object_at(&recording, DVec3::Y * 0.051, DVec3::ZERO)];
     let (model, mut state) = model_and_state(parameters, objects);

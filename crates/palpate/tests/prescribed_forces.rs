@@ -39,7 +39,7 @@ fn force_at(t: f64) -> DVec3 {
 
 fn devices(count: usize, patch_radius: f64) -> ModelParameters {
     let device = DeviceParameters { patch_radius, ..DeviceParameters::default() };
-    ModelParameters { devices: vec![device; count], ..ModelParameters::default() }
+    ModelParameters { devices: vec![device; count], ..ModelParameters::for_reference() }
 }
 
 /// The free block, which turns by several radians a second.

@@ -7,8 +7,8 @@ use palpate::{
     ResponseForm, Sampling, Shape, State, Twist, step,
 };
 use palpate_testkit::{
-    CountingAllocator, GRAVITY_M_S2, allocations, finger, fixed_block, floor, free_block, start_at,
-    subdivided,
+    CountingAllocator, GRAVITY_M_S2, allocations, finger, fixed_block, floor, free_block, half_extent,
+    start_at, subdivided, with_stiffness_damping,
 };
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ fn step_makes_no_allocation() {
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); 4],
         gravity: DVec3::Y * -GRAVITY_M_S2,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let convolved = ModelObject {
         response: ResponseForm::Fir(Arc::new(table(&free))),
@@ -98,7 +98,7 @@ fn step_makes_no_allocation() {
     let parameters = ModelParameters {
         devices: vec![DeviceParameters { patch_radius: 0.03, ..DeviceParameters::default() }],
         clamps: vec![Clamp::new(0, end.collect(), Pose::IDENTITY)],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let objects =
         vec![ModelObject::new(free.clone(), start(0.0)), ModelObject::new(fixed_block(), start(1.0))];
@@ -133,7 +133,7 @@ fn step_makes_no_allocation() {
         devices: vec![DeviceParameters { patch_radius: 0.0, ..finger }, finger],
         obstacles: vec![plane, ball],
         gravity: DVec3::Y * -GRAVITY_M_S2,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let lying = |y: f64| ObjectStart {
         twist: Twist { linear: DVec3::X * 0.1, angular: DVec3::Z * 2.0 },
@@ -141,10 +141,41 @@ fn step_makes_no_allocation() {
     };
     let objects = [0.08, 0.2].map(|y| ModelObject::new(free.clone(), lying(y)));
     touch(&Model::new(parameters.clone(), objects.to_vec()).expect("a good model"), "of touching");
+    fall_asleep_and_wake(parameters.clone(), &free);
     let finer = Arc::new(subdivided(&free, 3));
     let objects = [0.08, 0.2].map(|y| ModelObject::new(finer.clone(), lying(y)));
     let parameters = ModelParameters { max_contact_samples: 12, ..parameters };
     touch(&Model::new(parameters, objects.to_vec()).expect("a good model"), "with contact samples");
+}
+
+/// Three blocks fall asleep, a finger wakes one of them, and it falls asleep again.
+fn fall_asleep_and_wake(parameters: ModelParameters, free: &Recording) {
+    let block = with_stiffness_damping(free, 1e-2);
+    let at = |x: f64| start_at(DVec3::new(x, half_extent(&block, 1), 0.0));
+    let objects = [0.0, 1.0, 2.0].map(|x| ModelObject::new(block.clone(), at(x)));
+    let mut parameters = ModelParameters { sleep_after_s: 0.05, ..parameters };
+    parameters.obstacles.truncate(1);
+    let model = Model::new(parameters, objects.to_vec());
+    let model = model.expect("a good model");
+    let input = |touches: bool| Input {
+        devices: vec![
+            if touches { DeviceInput::touching(DVec3::Y * 0.11) } else { DeviceInput::inactive() };
+            2
+        ],
+        obstacles: vec![Pose::IDENTITY],
+        ..Input::default()
+    };
+    let asleep = |state: &State| state.output().objects.iter().filter(|object| object.is_asleep).count();
+    let mut state = State::new(&model);
+    (0..3000).for_each(|_| _ = step(&model, &mut state, &input(false)));
+    assert_eq!(asleep(&state), 3);
+    let inputs = [input(false), input(true)];
+    let before = allocations();
+    (0..50).for_each(|_| _ = step(&model, &mut state, &inputs[1]));
+    let woken = asleep(&state);
+    (0..3000).for_each(|_| _ = step(&model, &mut state, &inputs[0]));
+    assert_eq!(allocations() - before, 0, "allocations while objects wake and fall asleep");
+    assert_eq!((woken, asleep(&state)), (2, 3));
 }
 
 /// Two fingers press the second of two objects that lie on one another while a ball comes.

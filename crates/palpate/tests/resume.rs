@@ -33,7 +33,7 @@ fn model(step_s: f64, gravity: DVec3) -> Model {
         step_s,
         gravity,
         devices: vec![DeviceParameters::default()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     Model::new(parameters, vec![ModelObject::new(free_block(), start)]).expect("a model")
 }
@@ -127,7 +127,7 @@ fn cached_residual_fields_give_equal_displacements() {
     let recording = free_block();
     let (surface, edge) = (&recording.surface, half_extent(&recording, 0));
     let fingers = vec![finger(0.01, 0.04, 0.0); 2];
-    let parameters = ModelParameters { devices: fingers, ..ModelParameters::default() };
+    let parameters = ModelParameters { devices: fingers, ..ModelParameters::for_reference() };
     let (model, mut state) =
         model_and_state(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))]);
     let mut cache = ResidualFieldCache::default();
@@ -160,7 +160,7 @@ fn a_clone_goes_on_as_its_original() {
         obstacles: vec![floor(0.4)],
         devices: vec![finger(0.01, 0.03, 0.5)],
         max_contact_samples: 12,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let start = start_at(DVec3::Y * 0.0505);
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start)]);

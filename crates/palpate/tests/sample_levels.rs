@@ -68,7 +68,7 @@ fn stored_levels_give_the_same_steps_as_levels_made_with_the_model() {
             gravity: DVec3::Y * -9.81,
             obstacles: vec![floor],
             max_contact_samples,
-            ..ModelParameters::default()
+            ..ModelParameters::for_reference()
         };
         let start = |height: f64| ObjectStart {
             pose: Pose { position: DVec3::new(0.01 * height, height, 0.0), ..Pose::IDENTITY },

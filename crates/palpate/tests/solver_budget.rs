@@ -22,7 +22,7 @@ fn tower(solver_budget: u64) -> (Model, State) {
         devices: vec![finger(0.1 * half, 0.1 * half, 0.5)],
         max_contact_samples: 12,
         solver_budget,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     model_and_state(parameters, vec![object_at(&block, DVec3::Y * (1.01 * half), DVec3::ZERO), upper])
 }
@@ -70,7 +70,7 @@ fn a_block_at_rest_is_carried_on_a_small_budget() {
         gravity: DVec3::Y * -GRAVITY_M_S2,
         obstacles: vec![floor(0.5)],
         solver_budget: 1,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let (model, mut state) =
         model_and_state(parameters, vec![object_at(&block, DVec3::Y * half, DVec3::ZERO)]);

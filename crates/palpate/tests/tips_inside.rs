@@ -34,7 +34,7 @@ const FIRST_STEP: f64 = 0.15;
 const COUPLING: Option<Coupling> = Some(Coupling { stiffness: 300.0, damping: 0.5 });
 
 fn scene(body: &Arc<Recording>, device: DeviceParameters) -> (Model, State) {
-    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::for_reference() };
     model_and_state(parameters, vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))])
 }
 
@@ -130,7 +130,8 @@ fn a_tip_at_the_interface_of_two_objects_finds_a_place_outside_both() {
     let body = free_block();
     let side = half_extent(&body, 0);
     let objects = [-1.0, 1.0].map(|at| object_at(&body, DVec3::X * (at * side), DVec3::ZERO));
-    let parameters = ModelParameters { devices: vec![finger(0.002, 0.0, 0.0)], ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![finger(0.002, 0.0, 0.0)], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, objects.to_vec());
     let output = step(&model, &mut state, &touching(&[DVec3::X * 0.001]));
     let proxy = output.devices[0].proxy;
@@ -176,7 +177,7 @@ fn random_starts_inside_extract_no_energy_and_leave_no_tip_inside() {
         // With one footprint, so that each feels where the others press.
         let device = |tip| DeviceParameters { coupling, ..finger(tip, 0.0, 0.5) };
         let devices = vec![device(0.0), device(0.005), device(0.01)];
-        let parameters = ModelParameters { devices, ..ModelParameters::default() };
+        let parameters = ModelParameters { devices, ..ModelParameters::for_reference() };
         let (model, mut state) =
             model_and_state(parameters, vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
         let start = state.output().energy.stored();

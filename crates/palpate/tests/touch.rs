@@ -59,7 +59,8 @@ fn sticking_tip_at_a_node_has_the_force_of_a_held_point() {
         body.surface.triangles.iter().position(|t| t.contains(&(node as u32))).expect("a triangle");
     let weights = body.surface.triangles[triangle].map(|n| if n as usize == node { 1.0 } else { 0.0 });
     let grasp = Grasp { object: 0, point: SurfacePoint { triangle: triangle as u32, weights } };
-    let parameters = ModelParameters { devices: vec![finger(0.0, 0.0, 5.0)], ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![finger(0.0, 0.0, 5.0)], ..ModelParameters::for_reference() };
     let (model, mut touched) =
         model_and_state(parameters.clone(), vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
     let (other, mut held) =
@@ -91,7 +92,7 @@ fn coupling_force_obeys_its_law() {
     let device = DeviceParameters { coupling: Some(coupling), ..finger(0.005, 0.0, 0.8) };
     let body = free_block();
     let side = half_extent(&body, 0);
-    let parameters = ModelParameters { devices: vec![device; 2], ..ModelParameters::default() };
+    let parameters = ModelParameters { devices: vec![device; 2], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let mut before = [DVec3::ZERO; 2];
     for number in 1..=600 {
@@ -120,7 +121,7 @@ fn contact_forces_on_a_floor_are_the_change_of_momentum() {
     let body = free_block();
     let mass = body.mass();
     let parameters =
-        ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::default() };
+        ModelParameters { gravity: GRAVITY, obstacles: vec![floor(0.4)], ..ModelParameters::for_reference() };
     let mut start = start_at(DVec3::Y * (half_extent(&body, 1) + 0.004));
     start.twist.linear = DVec3::X * 0.3;
     let low = -half_extent(&body, 1);
@@ -168,7 +169,7 @@ fn fast_tip_does_not_pass_through() {
         coupling: Some(Coupling { stiffness: 50.0, damping: 0.0 }),
         ..finger(0.002, 0.0, 0.0)
     };
-    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     step(&model, &mut state, &touching(&[DVec3::Y * 10.0 * side]));
     let output = step(&model, &mut state, &touching(&[-DVec3::Y * 10.0 * side]));
@@ -187,7 +188,7 @@ fn a_tip_that_falls_silent_comes_back_to_where_it_touched() {
     let top = half_extent(&body, 1);
     for mode in [DeviceMode::Suspended, DeviceMode::Inactive] {
         let devices = vec![DeviceParameters { coupling, ..finger(radius, 0.03, 0.0) }];
-        let parameters = ModelParameters { devices, ..ModelParameters::default() };
+        let parameters = ModelParameters { devices, ..ModelParameters::for_reference() };
         let (model, mut state) =
             model_and_state(parameters, vec![ModelObject::new(body.clone(), start_at(DVec3::ZERO))]);
         let start = state.output().energy.stored();
@@ -227,7 +228,7 @@ fn random_tips_extract_no_energy_and_the_state_stays_finite() {
         let mut random = Random::new(88_172_645 + 7919 * seed);
         let device = |tip, patch, friction| DeviceParameters { coupling, ..finger(tip, patch, friction) };
         let devices = vec![device(0.01, 0.03, 0.6), device(0.0, 0.0, 0.0), device(0.003, 0.0, 1.2)];
-        let parameters = ModelParameters { devices, ..ModelParameters::default() };
+        let parameters = ModelParameters { devices, ..ModelParameters::for_reference() };
         let (model, mut state) =
             model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
         let mut hands = [DVec3::ONE; 3];
@@ -281,7 +282,7 @@ fn colliding_objects_have_opposite_forces() {
     let mut right = start_at(DVec3::new(gap, 0.01, 0.0));
     (left.twist.linear, right.twist.linear) = (DVec3::X * 0.2, -DVec3::X * 0.3);
     let objects = vec![ModelObject::new(body.clone(), left), ModelObject::new(body, right)];
-    let (model, mut state) = model_and_state(ModelParameters::default(), objects);
+    let (model, mut state) = model_and_state(ModelParameters::for_reference(), objects);
     let start = state.output().energy.stored();
     let mut met = false;
     for _ in 0..400 {
@@ -308,7 +309,7 @@ fn work_of_a_moving_obstacle_is_counted() {
         pose: Pose { position: -DVec3::X * (half_extent(&body, 0) + 0.045), ..Pose::IDENTITY },
         friction: 0.3,
     };
-    let parameters = ModelParameters { obstacles: vec![ball.clone()], ..ModelParameters::default() };
+    let parameters = ModelParameters { obstacles: vec![ball.clone()], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     for number in 1..=400 {
         let position = ball.pose.position + DVec3::X * (0.2 * f64::from(number) * H);
@@ -328,7 +329,7 @@ fn numbers_out_of_range_are_refused_by_name() {
         let objects = vec![ModelObject::new(free_block(), start_at(DVec3::ZERO))];
         Model::new(parameters, objects).err().map(|e| e.to_string()).unwrap_or_default()
     };
-    let devices = |device| ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    let devices = |device| ModelParameters { devices: vec![device], ..ModelParameters::for_reference() };
     assert_eq!(
         refused(devices(finger(-1.0, 0.0, 0.0))),
         "device 0: tip_radius is -1 m, expected a number not below 0"
@@ -344,7 +345,7 @@ fn numbers_out_of_range_are_refused_by_name() {
     );
     let obstacles = |shape| ModelParameters {
         obstacles: vec![Obstacle { shape, pose: Pose::IDENTITY, friction: 0.1 }],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     assert_eq!(
         refused(obstacles(Shape::Plane { normal: DVec3::Y * 2.0 })),
@@ -361,7 +362,7 @@ fn body_with_fixed_nodes_has_contact_forces() {
     let body = fixed_block();
     let top = body.surface.positions.iter().copied().max_by(|a, b| a.y.total_cmp(&b.y)).expect("nodes");
     let parameters =
-        ModelParameters { devices: vec![finger(0.003, 0.02, 0.5)], ..ModelParameters::default() };
+        ModelParameters { devices: vec![finger(0.003, 0.02, 0.5)], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let mut last = 0.0;
     for number in 1..=300 {
@@ -378,7 +379,8 @@ fn body_with_fixed_nodes_has_contact_forces() {
 fn scaled_fallback_of_an_unsolved_contact_gives_no_energy() {
     let body = free_block();
     let side = half_extent(&body, 0);
-    let parameters = ModelParameters { devices: vec![finger(0.02, 0.0, 0.5)], ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![finger(0.02, 0.0, 0.5)], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let start = state.output().energy.stored();
     let beside = DVec3::new(side + 0.021, 0.03, 0.02);
@@ -404,7 +406,8 @@ fn tip_larger_than_the_body_touches_its_front_only() {
     let (side, thick) = (half_extent(&body, 0), 2.0 * half_extent(&body, 1));
     // The tip's centre is outside; the back of the block is within its radius.
     let tip = 4.0 * thick;
-    let parameters = ModelParameters { devices: vec![finger(tip, 0.0, 0.0)], ..ModelParameters::default() };
+    let parameters =
+        ModelParameters { devices: vec![finger(tip, 0.0, 0.0)], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start_at(DVec3::ZERO))]);
     let centre = DVec3::new(0.1 * side, 0.8 * thick, 0.0);
     step(&model, &mut state, &touching(&[centre]));
@@ -422,7 +425,7 @@ fn a_patch_touches_a_body_whose_residual_compliance_is_round_off() {
         let recording = Recording { residual, ..(*free_block()).clone() };
         let top = half_extent(&recording, 1);
         let parameters =
-            ModelParameters { devices: vec![finger(0.0, 0.03, 0.5)], ..ModelParameters::default() };
+            ModelParameters { devices: vec![finger(0.0, 0.03, 0.5)], ..ModelParameters::for_reference() };
         let object = ModelObject::new(Arc::new(recording), start_at(DVec3::ZERO));
         let (model, mut state) = model_and_state(parameters, vec![object]);
         let press = touching(&[DVec3::new(0.01, top - 1e-4, 0.02)]);

@@ -22,6 +22,8 @@ pub const FLOORS: &[&str] = &[
     "bounded_vec",
     "spatial",
     "energy",
+    "disjoint_sets",
+    "sleep",
     "surface",
     "recording",
     "response",

@@ -19,7 +19,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "step = 0.001",
             "stepp = 0.001",
             1,
-            "`step`, `gravity`, `integrator`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `solver_budget`, `object`, `plane`, `obstacle`, `device`, `probe`, `clamp`",
+            "`step`, `gravity`, `integrator`, `rigid_compliance`, `max_contact_points`, `max_contact_samples`, `solver_budget`, `sleep_after`, `object`, `plane`, `obstacle`, `device`, `probe`, `clamp`",
         ),
         (
             "recording = \"cube.palp\"",

@@ -1,6 +1,9 @@
 //! Runs in real time, their logs, and replays. No test here looks at how fast anything was.
 
 use crate::workplace::{Table, Workplace};
+use std::io::Read;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Two fingers on the cube of `Workplace::with_scene`, which lies on a floor; the right one in a simulated hand.
 pub fn workplace() -> Workplace {
@@ -133,6 +136,39 @@ fn the_paper_s_two_hands_run_in_real_time() {
     let text = workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05"]);
     for part in ["50 steps at 1000 Hz", "force: compute", "overruns", "left         path, "] {
         assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+/// SIGTERM and SIGHUP end a run as Ctrl-C does, with its report and a whole log; a device would be left without force.
+#[test]
+fn signals_end_a_run_in_good_order() {
+    let workplace = Workplace::with_scene();
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let log = format!("log{signal}.mcap");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["run", "scene.toml", "--realtime", "--duration", "600", "--json", "--log", &log])
+            .current_dir(workplace.path("."))
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        // The unfinished log has a hidden name.
+        let has_begun = || {
+            let entries = std::fs::read_dir(workplace.path(".")).expect("a folder").flatten();
+            entries.map(|entry| entry.file_name()).any(|name| {
+                let name = name.to_string_lossy().into_owned();
+                name.starts_with('.') && name.contains(&log)
+            })
+        };
+        palpate_testkit::wait_until("the log has begun", has_begun);
+        std::thread::sleep(Duration::from_millis(300));
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()));
+        let mut report = String::new();
+        child.stdout.take().expect("standard output").read_to_string(&mut report).expect("text");
+        assert_eq!(child.wait().expect("a child").code(), Some(0), "{signal}");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("a report");
+        assert!(report["steps"].as_u64() > Some(50), "{signal}: {report:#}");
+        workplace.succeed(&["replay", &log]);
     }
 }
 

@@ -24,7 +24,7 @@ pub fn model(fingers: usize, stiffness: f64) -> Arc<Model> {
         step_s: STEP_S,
         devices: vec![DeviceParameters { coupling, ..finger(0.004, 0.0, 0.5) }; fingers],
         obstacles: vec![Obstacle { pose: below, ..floor(0.5) }],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let body = ModelObject::new(free_block(), start_at(DVec3::ZERO));
     Arc::new(Model::new(parameters, vec![body]).expect("a good model"))

@@ -98,7 +98,7 @@ fn largest_force_difference(body: &RecordedBody, narrow: bool) -> Result<f64, Re
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); 2],
         step_s: STEP_S,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let mut scenes = Vec::new();
     for response in forms {

@@ -79,7 +79,7 @@ fn measure(body: &RecordedBody, held: usize, samples: usize, steps: usize) -> Re
     };
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); held.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object])?;
     let mut state = State::new(&model);

@@ -121,7 +121,7 @@ fn lies_still(steps: &[LoggedStep]) -> bool {
 
 /// Rebound [m] of the scene with contact samples at all nodes.
 fn rebound_of_every_node(options: &Options) -> Result<f64, ReproduceError> {
-    let scene = read_scene(&options.scenes().join(SCENE_NAME), RunMode::Offline)?;
+    let scene = read_scene(&options.scenes().join(SCENE_NAME), RunMode::Reference)?;
     let mut state = State::new(&scene.model);
     let mut steps = Vec::new();
     for number in 1..=(0.5 / STEP_S) as u64 {

@@ -26,6 +26,7 @@ pub(super) struct SceneFile {
     #[serde(alias = "most_places")]
     pub max_contact_samples: Option<Spanned<i64>>,
     pub solver_budget: Option<Spanned<i64>>,
+    pub sleep_after: Option<Spanned<f64>>,
     #[serde(default)]
     pub object: Vec<ObjectEntry>,
     #[serde(default)]

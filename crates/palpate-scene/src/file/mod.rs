@@ -36,9 +36,11 @@ const SOLVER_BUDGET: RangeInclusive<i64> = 1000..=i64::MAX;
 /// Purpose of a scene, which decides defaults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunMode {
-    /// Most accurate: contact samples at all nodes.
+    /// To compare with: every surface node is a contact, and no object sleeps.
+    Reference,
+    /// Steps without a deadline.
     Offline,
-    /// Steps with a deadline: fewer contact samples.
+    /// Steps with a deadline: a budget of the solver.
     RealTime,
 }
 
@@ -239,6 +241,7 @@ fn check_names(source: &Source, file: &SceneFile) -> Result<(), SceneError> {
 /// Parameters of the whole scene, without devices and obstacles.
 fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<ModelParameters, SceneError> {
     let usual = match mode {
+        RunMode::Reference => ModelParameters::for_reference(),
         RunMode::Offline => ModelParameters::default(),
         RunMode::RealTime => ModelParameters::for_real_time(),
     };
@@ -271,6 +274,17 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
     let usual_budget = usize::try_from(usual.solver_budget).unwrap_or(usize::MAX);
     let solver_budget = count("solver_budget", &file.solver_budget, usual_budget, SOLVER_BUDGET)? as u64;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
+    let sleep_after_s = match &file.sleep_after {
+        Some(given) if given.get_ref().is_nan() || *given.get_ref() <= 0.0 => {
+            return source.fail(
+                given.span(),
+                SceneErrorKind::OutOfRange,
+                "sleep_after",
+                format!("sleep_after is {} s, expected a positive number; inf for never", given.get_ref()),
+            );
+        }
+        given => given.as_ref().map_or(usual.sleep_after_s, |given| *given.get_ref()),
+    };
     Ok(ModelParameters {
         step_s,
         motion,
@@ -278,6 +292,7 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
         max_contact_points,
         max_contact_samples,
         solver_budget,
+        sleep_after_s,
         ..usual
     })
 }

@@ -63,7 +63,7 @@ fn pressed(
         step_s: STEP,
         obstacles: pair(0.0).to_vec(),
         max_contact_samples,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object_at(ball, DVec3::ZERO, DVec3::ZERO)])?;
     let (mut state, mut before) = (State::new(&model), 0.0);

@@ -126,7 +126,7 @@ fn held(
         Clamp { max_cells, ..Clamp::new(0, triangles, frame(side, 0.0)) }
     };
     let clamps = vec![clamp(-1.0), clamp(1.0)];
-    let parameters = ModelParameters { step_s: STEP, clamps, ..ModelParameters::default() };
+    let parameters = ModelParameters { step_s: STEP, clamps, ..ModelParameters::for_reference() };
     let model = Model::new(parameters, vec![object_at(bar, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     let (mut before, mut last) = (f64::NAN, f64::NAN);

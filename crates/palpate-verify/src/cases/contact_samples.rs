@@ -50,7 +50,7 @@ fn scene(
         gravity: DVec3::Y * -GRAVITY_M_S2,
         obstacles: vec![floor(friction)],
         max_contact_samples,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     Ok(Model::new(parameters, objects)?)
 }
@@ -136,7 +136,7 @@ fn pressed(name: &str, body: &Arc<Recording>, most: usize) -> Result<Vec<Check>,
             gravity: DVec3::Y * -GRAVITY_M_S2,
             obstacles: vec![floor(0.5), plate],
             max_contact_samples: most,
-            ..ModelParameters::default()
+            ..ModelParameters::for_reference()
         };
         let model = Model::new(parameters, vec![object_at(body, DVec3::Y * half, DVec3::ZERO)])?;
         let (mut state, mut invariants, mut force) = (State::new(&model), RunInvariants::default(), 0.0);

@@ -15,10 +15,10 @@ use crate::check::Check;
 use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
-use palpate::{Input, Obstacle, Pose, Recording, Shape, State, step};
+use palpate::{Input, Model, ModelParameters, Obstacle, Pose, Recording, Shape, State, step};
 use palpate_fem::ElementOrder;
 use palpate_fem::mesh::{Mesh, box_mesh};
-use palpate_testkit::{ElasticMaterial, object_at, scene, smoothstep};
+use palpate_testkit::{ElasticMaterial, object_at, smoothstep};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -57,14 +57,19 @@ fn hertz(depth: f64) -> f64 {
 /// Force [N] of a ball that is pressed in and at rest, and the number of contacts.
 fn pressed(
     body: &Arc<Recording>,
-    depth: f64,
+    (depth, max_contact_samples): (f64, usize),
     invariants: &mut RunInvariants,
 ) -> Result<(f64, usize), VerifyError> {
     let top = body.surface.positions.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
     let ball = |down: f64| Pose { position: DVec3::Y * (top + RADIUS - down), ..Pose::IDENTITY };
     let obstacle = Obstacle { shape: Shape::Sphere { radius: RADIUS }, pose: ball(-1e-4), friction: 0.0 };
     let objects = vec![object_at(body, DVec3::ZERO, DVec3::ZERO)];
-    let model = scene(1e-3, DVec3::ZERO, vec![obstacle], Vec::new(), objects)?;
+    let parameters = ModelParameters {
+        obstacles: vec![obstacle],
+        max_contact_samples,
+        ..ModelParameters::for_reference()
+    };
+    let model = Model::new(parameters, objects)?;
     let mut state = State::new(&model);
     invariants.observe(state.output());
     for number in 1..=800 {
@@ -84,13 +89,19 @@ pub fn indentation() -> Result<Vec<Check>, VerifyError> {
     const CELLS: u32 = 12;
     /// Discretisation with three to six edges per contact radius, and the inward motion that Hertz leaves out.
     const HERTZ: f64 = 0.05;
+    /// Contact samples in real time, and what they change: some ten of them are in contact.
+    const SAMPLES: usize = 48;
+    const BY_SAMPLES: f64 = 0.08;
     let body =
         GEL.fixed_body(graded(CELLS)?, ElementOrder::Quadratic, 60, |node| node.y < -0.499 * SIZE[1])?;
     let (mut checks, mut invariants) = (Vec::new(), RunInvariants::default());
     for depth in [0.15e-3, 0.3e-3, 0.6e-3] {
-        let (force, points) = pressed(&body, depth, &mut invariants)?;
+        let (force, points) = pressed(&body, (depth, usize::MAX), &mut invariants)?;
         let quantity = format!("force at depth {:.2} mm, {points} points [N]", depth * 1e3);
         checks.push(Check::new(quantity, force, hertz(depth), HERTZ));
+        let (by_samples, points) = pressed(&body, (depth, SAMPLES), &mut invariants)?;
+        let quantity = format!("the same with {SAMPLES} contact samples, {points} points, by all nodes [N]");
+        checks.push(Check::new(quantity, by_samples, force, BY_SAMPLES));
     }
     checks.extend(invariants.checks("ball"));
     Ok(checks)

@@ -86,7 +86,7 @@ fn inner_point(body: &Recording, random: &mut Random) -> DVec3 {
 
 /// Let one tip appear and stay.
 fn observe(body: &Arc<Recording>, device: DeviceParameters, hand: DVec3, findings: &mut Findings) {
-    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::default() };
+    let parameters = ModelParameters { devices: vec![device], ..ModelParameters::for_reference() };
     let (model, mut state) = model_and_state(parameters, vec![object_at(body, DVec3::ZERO, DVec3::ZERO)]);
     let (mut last, mut rise, mut has_left) = (DVec3::ZERO, 0.0_f64, false);
     let (mut offset, mut work) = (0.0, 0.0);

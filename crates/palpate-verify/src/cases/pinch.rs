@@ -38,7 +38,7 @@ fn pinched(recording: Recording, steps: usize) -> Result<Vec<f64>, VerifyError> 
     let grasps =
         [-REACH, REACH].map(|x| surface.nearest(DVec3::X * x).map(|(point, _)| Grasp { object: 0, point }));
     let parameters =
-        ModelParameters { devices: vec![DeviceParameters::default(); 2], ..ModelParameters::default() };
+        ModelParameters { devices: vec![DeviceParameters::default(); 2], ..ModelParameters::for_reference() };
     let model = Model::new(parameters, vec![object_at(&Arc::new(recording), DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     let forces = (1..=steps).map(|number| {

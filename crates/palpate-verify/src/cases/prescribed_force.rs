@@ -56,7 +56,7 @@ fn amplitude(cells: u32, omega: f64, invariants: &mut RunInvariants) -> Result<f
     let parameters = ModelParameters {
         step_s,
         devices: vec![DeviceParameters::default(); shares.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object_at(&body, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);

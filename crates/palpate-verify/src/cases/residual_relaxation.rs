@@ -42,7 +42,7 @@ fn forces(
         .collect::<Result<_, VerifyError>>()?;
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); hands.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object_at(body, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);

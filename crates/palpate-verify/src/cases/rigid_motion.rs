@@ -30,7 +30,7 @@ fn model(
         step_s,
         devices: vec![DeviceParameters::default(); devices],
         gravity,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     Ok(Model::new(parameters, vec![ModelObject::new(recording.clone(), start)])?)
 }

@@ -50,7 +50,7 @@ fn on_floor(
         gravity: DVec3::Y * -gravity,
         obstacles: vec![floor(friction)],
         max_contact_samples,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     Ok(Model::new(parameters, vec![object])?)
 }

@@ -49,7 +49,7 @@ fn transmissibility(cells: u32, omega: f64, invariants: &mut RunInvariants) -> R
     let (end, _) =
         body.surface.nearest(DVec3::X * 0.5 * LENGTH).ok_or(VerifyError::NotReached("no surface"))?;
     let step_s = TAU / omega / STEPS;
-    let parameters = ModelParameters { step_s, ..ModelParameters::default() };
+    let parameters = ModelParameters { step_s, ..ModelParameters::for_reference() };
     let model = Model::new(parameters, vec![object_at(&body, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);
     invariants.observe(state.output());

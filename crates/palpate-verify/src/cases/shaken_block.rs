@@ -54,7 +54,7 @@ fn amplitude(cells: u32, omega: f64) -> Result<f64, VerifyError> {
     let parameters = ModelParameters {
         step_s,
         devices: vec![DeviceParameters::default(); grasps.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object_at(&Arc::new(body.recording), DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);

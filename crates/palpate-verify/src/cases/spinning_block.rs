@@ -131,7 +131,7 @@ fn measured_period(block: &Arc<Recording>, spin: DVec3, step_s: f64, about: f64)
     let orientation = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.7);
     let twist = Twist { linear: DVec3::new(0.3, 0.0, -0.1), angular: orientation * spin };
     let start = ObjectStart { pose: Pose { orientation, ..Pose::IDENTITY }, twist };
-    let parameters = ModelParameters { step_s, ..ModelParameters::default() };
+    let parameters = ModelParameters { step_s, ..ModelParameters::for_reference() };
     let model = Model::new(parameters, vec![ModelObject::new(block.clone(), start)])?;
     let mut state = State::new(&model);
     let mut risings = Risings::new();

@@ -31,7 +31,7 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
         gravity,
         devices: vec![DeviceParameters { coupling, ..finger(0.1 * radius, 0.2 * radius, 0.5) }; 2],
         obstacles: vec![Obstacle { pose: below, ..floor(0.5) }],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let body = ModelObject::new(recording.clone(), start_at(DVec3::ZERO));
     let model = Model::new(parameters, vec![body]).expect("a model");

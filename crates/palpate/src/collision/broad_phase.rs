@@ -13,6 +13,8 @@ use super::parameters::COLLISION;
 use crate::device::DeviceState;
 use crate::object::Object;
 use crate::response::Footprint;
+use crate::sleep::Sleepers;
+use crate::spatial::Pose;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -36,11 +38,10 @@ impl SweepAndPrune {
         Self { order, boxes: vec![[DVec3::ZERO; 2]; objects.len()], axis: 0, widest: 0.0 }
     }
 
-    /// Set the boxes about spheres (centre, radius), and sort them.
-    fn set(&mut self, sphere: impl Fn(usize) -> (DVec3, f64)) {
-        for at in self.order.iter().map(|&at| at as usize) {
-            let (centre, radius) = sphere(at);
-            self.boxes[at] = [centre - radius, centre + radius];
+    /// Set the boxes of the objects that are awake about spheres (centre, radius), and sort all.
+    fn set(&mut self, sleepers: &Sleepers, sphere: impl Fn(usize) -> (DVec3, f64)) {
+        for at in sleepers.awake().iter().map(|&at| at as usize) {
+            self.boxes[at] = box_about(sphere(at));
         }
         self.axis = self.widest_axis();
         let Self { order, boxes, axis, .. } = self;
@@ -58,31 +59,39 @@ impl SweepAndPrune {
         (0..3).fold(0, |best, axis| if variance[axis] > variance[best] { axis } else { best })
     }
 
-    /// Pass all pairs of overlapping boxes to `found`, the lower number first.
-    fn overlaps(&self, mut found: impl FnMut([usize; 2])) {
+    /// Pass all pairs of overlapping boxes to `found`, the lower number first, where both objects are awake.
+    fn overlaps(&self, sleepers: &Sleepers, mut found: impl FnMut([usize; 2])) {
         let Self { order, boxes, axis, .. } = self;
-        for (place, &a) in order.iter().enumerate() {
+        for (place, &a) in order.iter().enumerate().filter(|(_, a)| sleepers.is_awake(**a as usize)) {
             let own = boxes[a as usize];
             let low = |b: &&u32| boxes[**b as usize][0][*axis] <= own[1][*axis];
             for &b in order[place + 1..].iter().take_while(low) {
-                if boxes_overlap(&own, &boxes[b as usize]) {
+                if boxes_overlap(&own, &boxes[b as usize]) && sleepers.is_awake(b as usize) {
                     found([a.min(b) as usize, a.max(b) as usize]);
                 }
             }
         }
     }
 
-    /// Objects whose boxes overlap one about a sphere (centre, radius), ascending.
-    fn overlapping(&self, (centre, radius): (DVec3, f64), found: &mut Vec<u32>) {
+    /// Objects whose boxes overlap one, by the lower ends of theirs.
+    fn overlapping(&self, own: [DVec3; 2]) -> impl Iterator<Item = u32> {
         let Self { order, boxes, axis, widest } = self;
-        let own = [centre - radius, centre + radius];
-        let low = |at: u32| boxes[at as usize][0][*axis];
+        let low = move |at: u32| boxes[at as usize][0][*axis];
         let first = order.partition_point(|&at| low(at) < own[0][*axis] - widest);
-        found.clear();
-        let along = order[first..].iter().take_while(|&&at| low(at) <= own[1][*axis]);
-        found.extend(along.filter(|&&at| boxes_overlap(&own, &boxes[at as usize])));
-        found.sort_unstable();
+        let along = order[first..].iter().copied().take_while(move |&at| low(at) <= own[1][*axis]);
+        along.filter(move |&at| boxes_overlap(&own, &boxes[at as usize]))
     }
+
+    /// Sleeping objects whose boxes overlap that of an object.
+    fn sleeping_neighbours(&self, sleepers: &Sleepers, object: usize) -> impl Iterator<Item = usize> {
+        let near = self.overlapping(self.boxes[object]).map(|at| at as usize);
+        near.filter(|&at| !sleepers.is_awake(at))
+    }
+}
+
+/// Box about a sphere (centre, radius).
+fn box_about((centre, radius): (DVec3, f64)) -> [DVec3; 2] {
+    [centre - radius, centre + radius]
 }
 
 fn boxes_overlap([low_a, high_a]: &[DVec3; 2], [low_b, high_b]: &[DVec3; 2]) -> bool {
@@ -103,7 +112,49 @@ impl CollisionContext<'_> {
     /// Costs the objects, times the logarithm of their number where they change places.
     pub(crate) fn begin_broad_phase(&mut self) {
         let mut sweep = core::mem::take(&mut self.workspace.sweep);
-        sweep.set(|at| self.bounding_sphere(at));
+        sweep.set(self.sleepers, |at| self.bounding_sphere(at));
+        self.workspace.sweep = sweep;
+    }
+
+    /// Mark the objects that could be moved by what comes near: devices that touch, obstacles that move, and, where they are asleep,
+    /// objects that are awake.
+    ///
+    /// # Real time
+    /// Costs the devices, the obstacles and the objects that are awake, with their neighbours.
+    pub(crate) fn mark_disturbed(&mut self, devices: &[DeviceState], (before, after): (&[Pose], &[Pose])) {
+        for (number, device) in devices.iter().enumerate().filter(|(_, device)| device.active) {
+            let own = box_about(self.tip_sphere(number, device));
+            let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
+            sweep.overlapping(own).for_each(|at| disturbed[at as usize] = true);
+        }
+        for ((obstacle, before), after) in self.scene.obstacles.iter().zip(before).zip(after) {
+            if before == after {
+                continue;
+            }
+            let radius = obstacle.shape.radius();
+            let own = box_about((before.position, radius + before.motion_bound(after, radius)));
+            let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
+            if radius.is_finite() {
+                sweep.overlapping(own).for_each(|at| disturbed[at as usize] = true);
+            } else {
+                disturbed.fill(true);
+            }
+        }
+        if !self.sleepers.any() {
+            return;
+        }
+        let sweep = core::mem::take(&mut self.workspace.sweep);
+        for awake in self.sleepers.awake().iter().map(|&at| at as usize) {
+            if !self.scene.objects[awake].is_touchable() {
+                continue;
+            }
+            for asleep in sweep.sleeping_neighbours(self.sleepers, awake) {
+                let pair = self.levels.of_pair([awake.min(asleep), awake.max(asleep)], self.step);
+                if !self.workspace.disturbed[asleep] && self.overlap(&pair).is_some() {
+                    self.workspace.disturbed[asleep] = true;
+                }
+            }
+        }
         self.workspace.sweep = sweep;
     }
 
@@ -113,17 +164,24 @@ impl CollisionContext<'_> {
     /// Costs the objects, the pairs whose boxes overlap along an axis, and the nodes that are near another object.
     pub(crate) fn find_pair_contacts(&mut self) {
         let sweep = core::mem::take(&mut self.workspace.sweep);
-        sweep.overlaps(|objects| self.find_contacts_of_pair(objects));
+        sweep.overlaps(self.sleepers, |objects| self.find_contacts_of_pair(objects));
         self.workspace.sweep = sweep;
-        self.levels.forget_pairs(self.step);
+        self.levels.forget_pairs(self.step, self.sleepers);
     }
 
     /// Objects that a device's tip can meet in the step, ascending; they stay in `near_objects` of the workspace.
     pub(crate) fn find_near_objects(&mut self, number: usize, device: &DeviceState) {
-        let travel = (device.proxy_under_force() - device.proxy).length();
-        let reach = self.scene.devices[number].tip_radius + COLLISION.motion_factor * travel;
+        let own = box_about(self.tip_sphere(number, device));
         let CollisionWorkspace { sweep, near_objects, .. } = &mut *self.workspace;
-        sweep.overlapping((device.proxy, reach), near_objects);
+        near_objects.clear();
+        near_objects.extend(sweep.overlapping(own).filter(|&at| self.sleepers.is_awake(at as usize)));
+        near_objects.sort_unstable();
+    }
+
+    /// Sphere that holds a device's tip over the step.
+    fn tip_sphere(&self, number: usize, device: &DeviceState) -> (DVec3, f64) {
+        let travel = (device.proxy_under_force() - device.proxy).length();
+        (device.proxy, self.scene.devices[number].tip_radius + COLLISION.motion_factor * travel)
     }
 
     /// Sphere that holds an object over the step, at all levels of detail, with its share of the slack of [`Self::overlap`].
@@ -214,9 +272,10 @@ mod tests {
             let order = (0..count as u32).collect();
             let boxes = vec![[DVec3::ZERO; 2]; count];
             let mut sweep = SweepAndPrune { order, boxes, ..SweepAndPrune::default() };
-            sweep.set(sphere);
+            let mut sleepers = Sleepers::new(count);
+            sweep.set(&sleepers, sphere);
             let mut found = Vec::new();
-            sweep.overlaps(|pair| found.push(pair));
+            sweep.overlaps(&sleepers, |pair| found.push(pair));
             found.sort_unstable();
             let overlaps = |&[a, b]: &[usize; 2]| {
                 let ((p, r), (q, s)) = (sphere(a), sphere(b));
@@ -224,13 +283,29 @@ mod tests {
             };
             let all = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
             assert_eq!(found, all.filter(overlaps).collect::<Vec<_>>());
-            let (probe, mut near) = ((DVec3::new(0.4, 0.1, -0.3), 0.3), Vec::new());
-            sweep.overlapping(probe, &mut near);
+            let probe = (DVec3::new(0.4, 0.1, -0.3), 0.3);
+            let mut near: Vec<u32> = sweep.overlapping(box_about(probe)).collect();
+            near.sort_unstable();
             let is_near = |&k: &u32| {
                 let (centre, radius) = sphere(k as usize);
                 (centre - probe.0).abs().max_element() <= radius + probe.1
             };
             assert_eq!(near, (0..count as u32).filter(is_near).collect::<Vec<_>>());
+
+            // Pairs of one that is awake with one that sleeps.
+            let is_still = |at: usize| at % 3 != 1;
+            (0..count).for_each(|at| _ = sleepers.count(at, is_still(at)));
+            sleepers.begin_groups();
+            sleepers.fall_asleep(1, |_| {});
+            let mut mixed: Vec<[usize; 2]> = Vec::new();
+            for awake in (0..count).filter(|&at| !is_still(at)) {
+                let pair = |asleep: usize| [awake.min(asleep), awake.max(asleep)];
+                mixed.extend(sweep.sleeping_neighbours(&sleepers, awake).map(pair));
+            }
+            mixed.sort_unstable();
+            let all = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
+            let expected = all.filter(overlaps).filter(|&[a, b]| is_still(a) != is_still(b));
+            assert_eq!(mixed, expected.collect::<Vec<_>>());
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::bounded_vec::BoundedVec;
 use crate::device::DeviceParameters;
 use crate::object::{Object, ObjectState};
 use crate::obstacle::Obstacle;
+use crate::sleep::Sleepers;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -35,6 +36,8 @@ pub(crate) struct CollisionWorkspace {
     pub(crate) sweep: SweepAndPrune,
     /// Objects near a device.
     pub(crate) near_objects: BoundedVec<u32>,
+    /// Whether something has come near each object that could move it.
+    pub(crate) disturbed: Vec<bool>,
     /// Surface nodes that the broad phase leaves.
     pub(crate) near_nodes: BoundedVec<u32>,
     /// Modal coordinates at a time within the step.
@@ -56,6 +59,7 @@ impl CollisionWorkspace {
             triangles: devices.iter().map(|_| TriangleCaches::new(objects.len(), max_modes)).collect(),
             sweep: SweepAndPrune::new(objects),
             near_objects: BoundedVec::new(objects.len()),
+            disturbed: vec![false; objects.len()],
             near_nodes: BoundedVec::new(objects.iter().map(nodes).max().unwrap_or(0)),
             coordinates: vec![0.0; max_modes],
             candidates: CandidateList::new(contacts),
@@ -70,6 +74,7 @@ pub(crate) struct CollisionContext<'a> {
     pub(crate) states: &'a [ObjectState],
     /// Contacts of the last step.
     pub(crate) contacts: &'a [Contact],
+    pub(crate) sleepers: &'a Sleepers,
     pub(crate) levels: &'a mut Levels,
     pub(crate) workspace: &'a mut CollisionWorkspace,
     /// Number of the step.

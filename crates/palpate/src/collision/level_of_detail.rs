@@ -7,6 +7,7 @@
 
 use super::parameters::COLLISION;
 use crate::bounded_vec::BoundedVec;
+use crate::sleep::Sleepers;
 use crate::surface::Traversal;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -75,8 +76,9 @@ pub(crate) struct ObstacleLevel {
 pub(super) struct ObjectPair {
     pub(super) objects: [usize; 2],
     pub(super) details: [LevelOfDetail; 2],
-    /// Last step in which they were near each other.
+    /// Last step in which their bounding boxes overlapped, and whether they could have met in it.
     step: u64,
+    pub(super) is_near: bool,
 }
 
 /// Levels of detail of a scene.
@@ -105,7 +107,7 @@ impl Levels {
     pub(super) fn of_pair(&self, objects: [usize; 2], step: u64) -> ObjectPair {
         let known = self.pairs.binary_search_by(|pair| pair.objects.cmp(&objects));
         let details = known.map_or([LevelOfDetail::default(); 2], |at| self.pairs[at].details);
-        ObjectPair { objects, details, step }
+        ObjectPair { objects, details, step, is_near: false }
     }
 
     /// Keep the levels of two objects. Without room the next step begins with the finest.
@@ -117,9 +119,25 @@ impl Levels {
         }
     }
 
-    /// Forget the pairs that were not near in a step.
-    pub(super) fn forget_pairs(&mut self, step: u64) {
-        self.pairs.retain(|pair| pair.step == step);
+    /// Forget the pairs that were not near in a step, but those of sleeping objects.
+    pub(super) fn forget_pairs(&mut self, step: u64, sleepers: &Sleepers) {
+        let rests = |pair: &ObjectPair| pair.objects.iter().all(|&at| !sleepers.is_awake(at));
+        self.pairs.retain(|pair| pair.step == step || rests(pair));
+    }
+
+    /// Keep the levels of an object that wakes in a step: what it has slept through is no reason to try finer ones at once.
+    pub(crate) fn keep_for_now(&mut self, object: usize, step: u64) {
+        let of_obstacles = &mut self.of_obstacles[object * self.obstacles..][..self.obstacles];
+        let of_obstacles = of_obstacles.iter_mut().map(|level| &mut level.detail);
+        let pairs = self.pairs.iter_mut().filter(|pair| pair.objects.contains(&object));
+        let of_pairs = pairs.flat_map(|pair| &mut pair.details);
+        of_obstacles.chain(of_pairs).for_each(|detail| detail.since = step);
+    }
+
+    /// Pairs that could have met in a step.
+    pub(crate) fn near_pairs(&self, step: u64) -> impl Iterator<Item = [usize; 2]> {
+        let pairs = self.pairs.iter().filter(move |pair| pair.step == step && pair.is_near);
+        pairs.map(|pair| pair.objects)
     }
 }
 

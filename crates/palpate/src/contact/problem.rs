@@ -34,6 +34,8 @@ pub(crate) struct StepRules {
 pub(crate) struct ContactProblem<'a> {
     pub(crate) objects: &'a [Object],
     pub(crate) rules: StepRules,
+    /// Objects that are awake, ascending: contacts are between them.
+    pub(crate) awake: &'a [u32],
     pub(crate) states: &'a mut [ObjectState],
     pub(crate) devices: &'a mut [DeviceState],
     pub(crate) contacts: &'a mut [Contact],

@@ -117,10 +117,11 @@ impl Solver {
     /// Costs sweeps × contacts × contact points of an object.
     pub(crate) fn solve(&mut self, problem: &mut ContactProblem, budget: u64) -> SolverReport {
         let mut report = SolverReport::default();
-        self.islands.find(problem.contacts, problem.devices);
+        let awake = problem.awake;
+        self.islands.find(awake, problem.contacts, problem.devices);
         let per_sweep: u64 = problem.contacts.iter().map(|contact| problem.products_of(contact)).sum();
         problem.devices.iter_mut().for_each(|device| device.force = DVec3::ZERO);
-        for root in 0..problem.objects.len() {
+        for &root in awake {
             if !self.islands.is_root(root) {
                 continue;
             }
@@ -130,7 +131,7 @@ impl Solver {
             self.members.clear();
             self.members.extend_from_slice(members);
             if self.members.is_empty() {
-                let own = &mut problem.states[root];
+                let own = &mut problem.states[root as usize];
                 own.end = own.free;
             } else {
                 let of_island =

@@ -49,6 +49,11 @@ impl ObjectState {
         gravity - self.base.acceleration
     }
 
+    /// Whether a base would have to move to a position [m, world].
+    pub(crate) fn base_is_elsewhere(&self, object: &Object, position: DVec3) -> bool {
+        position - object.start.pose.position != self.base.given
+    }
+
     /// Begin a step of h [s] in which the base goes on to a given position [m, world]; it stays at rest or stops without one.
     pub(crate) fn begin_base_motion(&mut self, object: &Object, given: Option<DVec3>, h: f64) {
         let start = object.start.pose.position;

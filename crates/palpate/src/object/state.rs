@@ -81,6 +81,15 @@ impl ObjectState {
         self.ledger.potential = self.potential(object, gravity);
     }
 
+    /// Stop all motion, under a gravity [m/s², world]. What it stored is dissipated.
+    pub(crate) fn stop(&mut self, object: &Object, gravity: DVec3) {
+        let stored = self.ledger.stored();
+        (self.rigid.velocity, self.rigid.angular_momentum) = (DVec3::ZERO, DVec3::ZERO);
+        self.response.stop();
+        self.update_ledger(object, gravity);
+        self.ledger.dissipated += stored - self.ledger.stored();
+    }
+
     /// Potential energy of the state in a gravity field [J].
     pub(crate) fn potential(&self, object: &Object, gravity: DVec3) -> f64 {
         let mut potential = -object.body.recording.mass() * gravity.dot(self.rigid.pose.position);

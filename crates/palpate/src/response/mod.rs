@@ -344,6 +344,13 @@ impl ResponseState {
         }
     }
 
+    /// Stop the modes; a table has none.
+    pub(crate) fn stop(&mut self) {
+        if let Self::Modal(state) = self {
+            state.stop();
+        }
+    }
+
     /// Modal states; none with a table.
     pub(crate) fn modes(&self) -> &[OscillatorState] {
         match self {

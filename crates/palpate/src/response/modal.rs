@@ -111,6 +111,12 @@ impl ModalState {
         self.q.iter_mut().zip(modes).for_each(|(q, mode)| *q = mode.q);
     }
 
+    /// Set the rates of all modes to zero.
+    pub(super) fn stop(&mut self) {
+        self.modes.iter_mut().for_each(|mode| mode.v = 0.0);
+        self.predicted = None;
+    }
+
     /// Set the modal states to the static equilibrium with a gravity, q = p/ω² [m/s², body].
     pub(super) fn start_at_equilibrium(&mut self, recording: &Recording, gravity: DVec3) {
         recording.add_gravity_load(gravity, &mut self.forces);

@@ -3,10 +3,7 @@
 //! Equations: docs/theory.md (C35), (C63).
 
 use super::moved;
-use crate::clamp::ClampState;
-use crate::collision::{
-    CandidateSide, Collider, CollisionWorkspace, ContactCandidate, ContactId, ContactLaw, FeatureId,
-};
+use crate::collision::{CandidateSide, Collider, ContactCandidate, ContactId, ContactLaw, FeatureId};
 use crate::io::Input;
 use crate::scene::Model;
 use crate::state::State;
@@ -22,14 +19,15 @@ pub(super) fn move_frames(state: &mut State, input: &Input) {
 }
 
 /// Candidates of all cells: each is held at its point of the frame.
-pub(super) fn find_contacts(model: &Model, clamps: &[ClampState], workspace: &mut CollisionWorkspace) {
-    for (number, (placed, clamp)) in model.clamps.iter().zip(clamps).enumerate() {
+pub(super) fn find_contacts(model: &Model, state: &mut State) {
+    let State { clamps, workspace, .. } = state;
+    for (number, (placed, clamp)) in model.clamps.iter().zip(&*clamps).enumerate() {
         let object = placed.object;
         for (at, point) in placed.points.iter().enumerate() {
             let cell = placed.first_cell + at;
             let feature = FeatureId::ClampedCell(cell as u32);
             let (start, end) = (clamp.start.world_from_body(*point), clamp.end.world_from_body(*point));
-            workspace.candidates.push(ContactCandidate {
+            workspace.collision.candidates.push(ContactCandidate {
                 id: ContactId { collider: Collider::Object(object), object, feature },
                 location: model.objects[object].body.cell_location(cell),
                 other: CandidateSide::Clamp { number, start, end },

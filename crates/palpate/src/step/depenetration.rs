@@ -41,7 +41,6 @@ pub(super) fn depenetrate(
     contacts: &[Contact],
     constraints: &[Constraint],
 ) {
-    objects.iter_mut().for_each(|own| own.is_held = false);
     for contact in contacts.iter().filter(|contact| contact.is_held()) {
         objects[contact.object()].is_held = true;
     }

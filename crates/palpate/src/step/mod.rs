@@ -26,6 +26,7 @@ mod clamps;
 mod depenetration;
 mod output;
 mod prescribed_forces;
+mod sleep;
 
 use crate::collision::{
     CandidateSide, Collider, CollisionContext, Contact, ContactCandidate, ContactId, ContactLaw, FeatureId,
@@ -60,12 +61,16 @@ impl Model {
 /// No allocation, lock or system call. The cost grows with modes × contacts, not with the mesh.
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
     state.output.status = StepStatus::default();
+    sleep::wake_by_input(model, state, input);
     change_gravity(model, state, input);
     move_bases(model, state, input);
     prescribed_forces::place(model, state, input);
     predict(model, state);
     move_obstacles(state, input);
     clamps::move_frames(state, input);
+    begin_devices(model, state, input);
+    collision_context(model, state).0.begin_broad_phase();
+    sleep::wake_near(model, state);
     find_contacts(model, state, input);
     set_up_constraints(model, state);
     prescribed_forces::predict(model, state);
@@ -73,6 +78,7 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
     integrate(model, state);
     state.steps += 1;
     output::write(model, state, input);
+    sleep::fall_asleep(model, state);
     &state.output
 }
 
@@ -80,7 +86,7 @@ pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Outpu
 /// beyond their modes follows at once.
 fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     let Some(gravity) = input.gravity.filter(|&gravity| gravity != state.gravity) else { return };
-    if !(gravity.is_finite() && model.objects.iter().all(Object::allows_gravity_change)) {
+    if !accepts_gravity(model, gravity) {
         state.output.status.rejected_inputs += 1;
         return;
     }
@@ -94,10 +100,16 @@ fn change_gravity(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
+/// Whether gravity may change to a value [m/s², world].
+fn accepts_gravity(model: &Model, gravity: DVec3) -> bool {
+    gravity.is_finite() && model.objects.iter().all(Object::allows_gravity_change)
+}
+
 /// Begin the motion of bases. Bodies with fixed nodes feel their acceleration as gravity.
 fn move_bases(model: &Model, state: &mut State, input: &Input) {
     let (gravity, h) = (state.gravity, model.parameters.step_s);
-    for (number, (object, own)) in model.objects.iter().zip(&mut state.objects).enumerate() {
+    for number in state.sleepers.awake().iter().map(|&at| at as usize) {
+        let (object, own) = (&model.objects[number], &mut state.objects[number]);
         let given = input.bases.get(number).copied().flatten();
         let usable = given.filter(|position| position.is_finite() && object.has_movable_base());
         state.output.status.rejected_inputs += u32::from(usable != given);
@@ -112,21 +124,26 @@ fn move_bases(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
-/// Predict every object at the end of the step without contact force; prescribed forces act with the arms at its start.
+/// Predict every object at the end of the step without contact force.
 fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
-    for (object, own) in model.objects.iter().zip(&mut state.objects) {
-        let mut view = object.view(own.felt_gravity(rules.gravity), &own.rigid, &mut own.response);
-        // A step predicts the next one, if gravity and step size stay.
-        if !view.predict() {
-            own.points.predict(&mut view);
-        }
-        let motion = (rules.integrator, rules.step_s, rules.gravity);
-        own.free = object.advance_rigid(motion, &own.rigid, own.prescribed_wrench(), None);
-        own.carry_with_base();
-        own.surface_motion =
-            object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
+    for at in state.sleepers.awake().iter().map(|&at| at as usize) {
+        predict_object(&model.objects[at], &mut state.objects[at], &rules);
     }
+}
+
+/// Predict an object at the end of the step without contact force; prescribed forces act with the arms at its start.
+fn predict_object(object: &Object, own: &mut ObjectState, rules: &StepRules) {
+    let mut view = object.view(own.felt_gravity(rules.gravity), &own.rigid, &mut own.response);
+    // A step predicts the next one, if gravity and step size stay.
+    if !view.predict() {
+        own.points.predict(&mut view);
+    }
+    let motion = (rules.integrator, rules.step_s, rules.gravity);
+    own.free = object.advance_rigid(motion, &own.rigid, own.prescribed_wrench(), None);
+    own.carry_with_base();
+    own.surface_motion =
+        object.body.displacement_bound(own.response.coordinates(), own.response.free_coordinates());
 }
 
 /// Obstacle poses at the end of the step; unusable ones stay.
@@ -160,18 +177,29 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
     (is_allowed && device_input.position.is_finite()).then_some(device_input)
 }
 
-/// Collision detection: all contacts of the step.
-fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    let (step, gravity) = (state.steps, state.gravity);
-    let State { objects, devices, obstacles, clamps, contacts, levels, .. } = state;
-    let State { workspace, output, .. } = state;
-    let Workspace { collision, spare, next_obstacles, .. } = workspace;
-    collision.candidates.clear();
+/// Context of the step's collision detection; devices; and the poses of the obstacles before and after the step.
+fn collision_context<'a>(
+    model: &'a Model,
+    state: &'a mut State,
+) -> (CollisionContext<'a>, &'a mut [DeviceState], [&'a [Pose]; 2]) {
+    let State { steps, objects, devices, obstacles, contacts, levels, sleepers, workspace, .. } = state;
+    let Workspace { collision, next_obstacles, .. } = workspace;
     let scene = model.collision_scene();
-    let mut context =
-        CollisionContext { scene, states: objects, contacts, levels, workspace: collision, step };
-    context.begin_broad_phase();
-    let touchable = || (0..model.objects.len()).filter(|&at| model.objects[at].is_touchable());
+    let context = CollisionContext {
+        scene,
+        states: objects,
+        contacts,
+        sleepers,
+        levels,
+        workspace: collision,
+        step: *steps,
+    };
+    (context, devices, [obstacles, next_obstacles])
+}
+
+/// Devices that touch or hold begin the step; unusable ones become inactive.
+fn begin_devices(model: &Model, state: &mut State, input: &Input) {
+    let State { devices, contacts, output, .. } = state;
     for (number, device) in devices.iter_mut().enumerate() {
         let is_asked = input.devices.get(number).is_some_and(|d| d.mode.is_active());
         let Some(device_input) = usable(model, input, number) else {
@@ -186,7 +214,8 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             continue;
         }
         // A device that was inactive, or held a point, starts where it is.
-        let held = context.contacts.iter().any(|c| c.is_held() && c.other == OtherSide::Device(number));
+        let first = contacts.partition_point(|contact| contact.id.collider < Collider::Device(number));
+        let held = contacts.get(first).is_some_and(|c| c.is_held() && c.other == OtherSide::Device(number));
         let touches = device_input.mode == DeviceMode::Touch;
         device.active &= touches != held;
         if !device.active {
@@ -194,7 +223,17 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             device.may_be_inside = touches;
         }
         device.begin(&model.parameters.devices[number], model.parameters.step_s, device_input.position);
-        if let DeviceMode::Held(grasp) = device_input.mode {
+    }
+}
+
+/// Collision detection: all contacts of the step between objects that are awake.
+fn find_contacts(model: &Model, state: &mut State, input: &Input) {
+    state.workspace.collision.candidates.clear();
+    // First, so that they find room.
+    clamps::find_contacts(model, state);
+    let (mut context, devices, [before, after]) = collision_context(model, state);
+    for (number, device) in devices.iter_mut().enumerate().filter(|(_, device)| device.active) {
+        if let DeviceMode::Held(grasp) = input.devices[number].mode {
             let collider = Collider::Device(number);
             context.workspace.candidates.push(ContactCandidate {
                 id: ContactId { collider, object: grasp.object, feature: FeatureId::HeldPoint },
@@ -206,14 +245,14 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             });
             continue;
         }
-        let before = context.workspace.candidates.mark();
+        let mark = context.workspace.candidates.mark();
         for _ in 0..2 {
             if device.may_be_inside {
                 let Some(place) = context.place_outside(number, device) else { break };
                 device.let_out(place - device.proxy);
             }
             // Again, where it is found inside without contact.
-            context.workspace.candidates.rewind(before);
+            context.workspace.candidates.rewind(mark);
             context.find_near_objects(number, device);
             device.may_be_inside = false;
             for near in 0..context.workspace.near_objects.len() {
@@ -225,18 +264,19 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             }
         }
     }
-    clamps::find_contacts(model, clamps, context.workspace);
-    for object in touchable() {
-        for (number, (before, after)) in obstacles.iter().zip(&*next_obstacles).enumerate() {
+    let awake = context.sleepers.awake();
+    for object in awake.iter().map(|&at| at as usize).filter(|&at| model.objects[at].is_touchable()) {
+        for (number, (before, after)) in before.iter().zip(after).enumerate() {
             context.find_obstacle_contacts(object, number, *before, *after);
         }
     }
     context.find_pair_contacts();
     // Last, since it looks at the surface of another moment.
     (0..devices.len()).for_each(|number| context.rebuild_ahead(number));
-    let bodies = (&*model.objects, gravity);
+    let State { gravity, objects, contacts, workspace, output, .. } = state;
+    let Workspace { collision, spare, .. } = workspace;
     output.status.dropped_contacts += match_contacts(
-        bodies,
+        (&*model.objects, *gravity),
         objects,
         contacts,
         spare,
@@ -248,8 +288,9 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
 fn set_up_constraints(model: &Model, state: &mut State) {
     let gravity = state.gravity;
-    let State { steps, objects, devices, contacts, recovery, workspace, output, .. } = state;
-    for (object, own) in model.objects.iter().zip(&mut *objects) {
+    let State { steps, objects, devices, contacts, recovery, sleepers, workspace, output, .. } = state;
+    for at in sleepers.awake().iter().map(|&at| at as usize) {
+        let (object, own) = (&model.objects[at], &mut objects[at]);
         let orientation = own.rigid.pose.orientation;
         let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
         own.points.predict_new(&mut view);
@@ -302,12 +343,21 @@ fn set_up_constraints(model: &Model, state: &mut State) {
 /// they are, and in the last resort contacts carry no force.
 fn solve(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
-    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
+    let awake = sleepers.awake();
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
     let budget = model.parameters.solver_budget;
-    let mut problem =
-        ContactProblem { objects: &model.objects, rules, states: objects, devices, contacts, constraints };
+    let objects_of_model = &model.objects;
+    let mut problem = ContactProblem {
+        objects: objects_of_model,
+        rules,
+        awake,
+        states: objects,
+        devices,
+        contacts,
+        constraints,
+    };
     for attempt in 0..3 {
         let SolverReport { residual_m, iterations, dependent_rows, unsolved_islands, islands_out_of_budget } =
             solver.solve(&mut problem, budget);
@@ -337,6 +387,8 @@ fn solve(model: &Model, state: &mut State) {
 fn integrate(model: &Model, state: &mut State) {
     let gravity = state.gravity;
     let State { objects, devices, contacts, obstacles, workspace, couplings, recovery, output, .. } = state;
+    let (sleepers, resting) = (&state.sleepers, &state.resting);
+    let awake = || sleepers.awake().iter().map(|&at| at as usize);
     let mut given_back = 0.0;
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let given = accounting::contact(contact, constraint, objects);
@@ -346,7 +398,8 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::prescribed_force(device, objects);
     }
     remember_touches(objects, devices, contacts, &workspace.constraints);
-    for (object, own) in model.objects.iter().zip(&mut *objects) {
+    for at in awake() {
+        let (object, own) = (&model.objects[at], &mut objects[at]);
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
         // The indentation by a tip's patch moves no other contact.
@@ -358,8 +411,10 @@ fn integrate(model: &Model, state: &mut State) {
         own.ledger.dissipated += view.advance(&mut own.points.points);
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
     }
+    awake().for_each(|at| objects[at].is_held = false);
     depenetration::depenetrate((model, gravity), objects, contacts, &workspace.constraints);
-    for (object, own) in model.objects.iter().zip(&mut *objects) {
+    for at in awake() {
+        let (object, own) = (&model.objects[at], &mut objects[at]);
         own.ledger.input += own.base_work(object, gravity);
         own.update_ledger(object, gravity);
         own.ledger.defect =
@@ -369,7 +424,7 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::coupling(parameters, device, couplings);
     }
     obstacles.copy_from_slice(&workspace.next_obstacles);
-    let lost = objects.iter().fold(couplings.lost(), |sum, own| sum + own.ledger.lost());
+    let lost = awake().fold(couplings.lost() + resting.lost(), |sum, at| sum + objects[at].ledger.lost());
     recovery.close(model.parameters.step_s, lost - output.energy.lost(), given_back);
 }
 

@@ -10,9 +10,11 @@ use glam::DVec3;
 /// Write the output of a step from the state at its end.
 pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
     let State { steps, objects, devices, clamps, contacts, couplings, workspace, output, .. } = state;
+    let (sleepers, resting) = (&state.sleepers, &state.resting);
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;
-    for ((out, object), own) in output.objects.iter_mut().zip(&model.objects).zip(&*objects) {
+    for at in sleepers.awake().iter().map(|&at| at as usize) {
+        let (out, object, own) = (&mut output.objects[at], &model.objects[at], &objects[at]);
         out.pose = own.rigid.pose;
         if let Some(inertia) = &object.inertia {
             out.twist = inertia.twist(&own.rigid);
@@ -22,7 +24,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         out.energy = own.ledger;
         out.penetration_m = 0.0;
     }
-    output.energy = objects.iter().fold(*couplings, |sum, own| sum.plus(&own.ledger));
+    output.energy = resting.scene_energy(couplings, objects, sleepers);
     for (number, out) in output.devices.iter_mut().enumerate() {
         let device = &devices[number];
         out.force_on_hand = if device.active { -device.force } else { DVec3::ZERO };
@@ -37,7 +39,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
             out.proxy = given.position;
         }
     }
-    output.contacts.clear();
+    output.contacts.truncate(resting.outputs);
     output.clamps.fill(ClampOutput::default());
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let own = &objects[contact.object()];

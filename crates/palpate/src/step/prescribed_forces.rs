@@ -70,16 +70,18 @@ fn location(object: &Object, point: SurfacePoint, patch_radius: f64) -> ContactL
 /// Predict the objects that prescribed forces act on: their motion without contact force.
 pub(super) fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
-    let State { objects, devices, contacts, workspace, output, .. } = state;
+    let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
+    let awake = sleepers.awake();
     let mut problem = ContactProblem {
         objects: &model.objects,
         rules,
+        awake,
         states: objects,
         devices,
         contacts,
         constraints: &mut workspace.constraints,
     };
-    for at in 0..model.objects.len() {
+    for at in awake.iter().map(|&at| at as usize) {
         if problem.states[at].has_prescribed_forces() {
             let holds = problem.predict_under_prescribed_forces(at);
             output.status.unsolved_islands += u32::from(!holds);

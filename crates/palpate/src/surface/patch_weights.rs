@@ -15,6 +15,7 @@
 //! Equations: docs/theory.md (C26).
 
 use super::cells::Cell;
+use super::poisson_disk::covering_radii;
 use super::quadratic_face::QuadraticFaces;
 use super::smooth_parts::smooth_parts;
 use super::{Surface, area_normal, at_weights};
@@ -52,25 +53,28 @@ pub(crate) struct OneSidedPatch {
 impl PatchWeights {
     /// Patches of a radius [m] about nodes of a surface, with finite elements of an order.
     pub(crate) fn new(surface: &Surface, order: u32, radius: f64, centres: &[u32]) -> Self {
-        let mut integrator = Integrator::new(surface, order, radius);
+        let mut integrator = Integrator::new(surface, order);
         let mut patches = Self::empty();
-        centres.iter().for_each(|&node| patches.push(&integrator.patch(node, |_| true).weights));
+        centres.iter().for_each(|&node| patches.push(&integrator.patch((node, radius), |_| true).weights));
         patches
     }
 
-    /// Patches about samples, and after them the one-sided ones of samples on creases.
+    /// Patches about samples with a spacing [m], and after them the one-sided ones of samples on creases. A patch reaches to the next sample, so that
+    /// they cover the surface.
     pub(crate) fn of_samples(
         surface: &Surface,
         order: u32,
-        radius: f64,
+        spacing: f64,
         samples: &[u32],
     ) -> (Self, Vec<OneSidedPatch>) {
-        let mut integrator = Integrator::new(surface, order, radius);
+        let mut integrator = Integrator::new(surface, order);
         let mut patches = Self::empty();
-        samples.iter().for_each(|&node| patches.push(&integrator.patch(node, |_| true).weights));
+        let radii = covering_radii(surface, spacing, samples);
+        let of = || samples.iter().copied().zip(radii.iter().copied());
+        of().for_each(|centre| patches.push(&integrator.patch(centre, |_| true).weights));
         let parts = smooth_parts(surface);
         let mut one_sided = Vec::new();
-        for (sample, &node) in samples.iter().enumerate() {
+        for (sample, (node, radius)) in of().enumerate() {
             let mut around: Vec<u32> =
                 integrator.around[node as usize].iter().map(|&t| parts[t as usize]).collect();
             around.sort_unstable();
@@ -78,7 +82,7 @@ impl PatchWeights {
             if around.len() < 2 {
                 continue;
             }
-            let side = |part: &u32| integrator.patch(node, |t| parts[t as usize] == *part);
+            let side = |part: &u32| integrator.patch((node, radius), |t| parts[t as usize] == *part);
             let sides: Vec<Patch> = around.iter().map(side).collect();
             let total: f64 = sides.iter().map(|side| side.total).sum();
             for side in sides.iter().filter(|side| side.total > MIN_SIDE * total) {
@@ -131,7 +135,6 @@ struct Patch {
 /// Integration of the kernel about one node after another.
 struct Integrator<'a> {
     surface: &'a Surface,
-    radius: f64,
     faces: QuadraticFaces,
     /// Triangles around every node, and normals of all with twice the area as length [m²].
     around: Vec<Vec<u32>>,
@@ -144,10 +147,9 @@ struct Integrator<'a> {
 }
 
 impl<'a> Integrator<'a> {
-    fn new(surface: &'a Surface, order: u32, radius: f64) -> Self {
+    fn new(surface: &'a Surface, order: u32) -> Self {
         Self {
             surface,
-            radius,
             faces: QuadraticFaces::new(surface, order),
             around: triangles_around(surface),
             normals: (0..surface.triangles.len()).map(|t| area_vector(surface, t)).collect(),
@@ -158,9 +160,9 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Patch about a node, over the triangles that are connected with it and belong to the patch.
-    fn patch(&mut self, node: u32, belongs: impl Fn(u32) -> bool) -> Patch {
-        let Self { surface, radius, faces, around, normals, weight, seen, touched_by, number } = self;
+    /// Patch of a radius [m] about a node, over the triangles that are connected with it and belong to the patch.
+    fn patch(&mut self, (node, radius): (u32, f64), belongs: impl Fn(u32) -> bool) -> Patch {
+        let Self { surface, faces, around, normals, weight, seen, touched_by, number } = self;
         *number += 1;
         let centre = surface.positions[node as usize];
         let mut queue: Vec<u32> = around[node as usize].iter().copied().filter(|t| belongs(*t)).collect();
@@ -176,13 +178,13 @@ impl<'a> Integrator<'a> {
         while let Some(t) = queue.pop() {
             let corners = surface.triangles[t as usize];
             let facing = normals[t as usize].normalize_or_zero().dot(normal);
-            if facing <= 0.0 || *radius <= 0.0 {
+            if facing <= 0.0 || radius <= 0.0 {
                 continue;
             }
             let positions = corners.map(|node| surface.positions[node as usize]);
             let area = 0.5 * normals[t as usize].length() * facing;
             let mut reached = false;
-            integrate(positions, centre, *radius, |w, share| {
+            integrate(positions, centre, radius, |w, share| {
                 reached = true;
                 faces.shapes(surface, t as usize, w, |node, w| add(node, w * share * area));
             });

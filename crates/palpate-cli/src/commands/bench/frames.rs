@@ -37,7 +37,7 @@ fn frame_times(
     on_floor: bool,
     steps: usize,
 ) -> Result<Vec<u32>, Failure> {
-    let mut parameters = ModelParameters { devices: vec![FINGER; 2], ..ModelParameters::default() };
+    let mut parameters = ModelParameters { devices: vec![FINGER; 2], ..ModelParameters::for_reference() };
     if on_floor {
         parameters.gravity = DVec3::Y * -GRAVITY_M_S2;
         parameters.max_contact_samples = 48;

@@ -184,7 +184,7 @@ fn held_steps(case: &HeldCase, steps: usize) -> Result<Vec<u32>, Failure> {
     };
     let parameters = ModelParameters {
         devices: vec![DeviceParameters::default(); held.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let objects = (0..case.objects).map(|object| ModelObject::new(case.recording.clone(), start(object)));
     let model = Model::new(parameters, objects.collect())?;

@@ -78,7 +78,7 @@ fn finger_steps(recording: &Arc<Recording>, sliding: bool, steps: usize) -> Resu
             DeviceParameters { friction: if sliding { 0.1 } else { FINGER.friction }, ..FINGER };
             2
         ],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![ModelObject::new(recording.clone(), start_at(DVec3::ZERO))])?;
     let mut state = State::new(&model);

@@ -71,6 +71,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let scene = read_scene(&scene_path, RunMode::Offline)?;
     let options = run::Arguments {
         strict: false,
+        reference: false,
         scene: scene_path.clone(),
         duration: Some(DURATION_S),
         outputs: run::OutputArguments {

@@ -56,6 +56,9 @@ pub struct Arguments {
     /// Treat warnings as errors: end with status 1, before the first step if the scene has one
     #[arg(long)]
     pub strict: bool,
+    /// Every surface node as a contact, and no object asleep, where the scene does not say otherwise: slow, to compare with
+    #[arg(long, conflicts_with = "realtime")]
+    pub reference: bool,
     /// Outputs
     #[command(flatten)]
     pub outputs: OutputArguments,
@@ -75,7 +78,11 @@ const MAX_STEPS: f64 = 1e8;
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mode = if arguments.realtime.realtime { RunMode::RealTime } else { RunMode::Offline };
+    let mode = match (arguments.realtime.realtime, arguments.reference) {
+        (true, _) => RunMode::RealTime,
+        (false, true) => RunMode::Reference,
+        (false, false) => RunMode::Offline,
+    };
     let scene = read_scene(&arguments.scene, mode)?;
     scene.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
     scene.choices.iter().for_each(|choice| notify(choice));

@@ -56,6 +56,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "name": name,
             "position_m": object.pose.position.to_array(),
             "largest_penetration_m": penetration,
+            "is_asleep": object.is_asleep,
         })
     });
     json!({

@@ -182,6 +182,7 @@ impl Summary {
                     "angular_velocity_rad_s": object.twist.angular.to_array(),
                     "displacement_max_m": deformation,
                     "largest_penetration_m": penetration,
+                    "is_asleep": object.is_asleep,
                 })
             })
             .collect();
@@ -272,14 +273,15 @@ impl Summary {
             // Adding 0 turns −0 into 0.
             let (p, v) = (object.pose.position + DVec3::ZERO, object.twist.linear + DVec3::ZERO);
             out += &format!(
-                "  {name:<12} centre ({:.5}, {:.5}, {:.5}) m, velocity ({:.4}, {:.4}, {:.4}) m/s, deformed by up to {:.2} mm\n",
+                "  {name:<12} centre ({:.5}, {:.5}, {:.5}) m, velocity ({:.4}, {:.4}, {:.4}) m/s, deformed by up to {:.2} mm{}\n",
                 p.x,
                 p.y,
                 p.z,
                 v.x,
                 v.y,
                 v.z,
-                1000.0 * deformation
+                1000.0 * deformation,
+                if object.is_asleep { ", asleep" } else { "" }
             );
         }
         for (clamp, last) in scene.clamps.iter().zip(&self.last.clamps) {

@@ -103,8 +103,14 @@ fn random_model(
     let objects = (0..if random.chance(0.1) { 2 } else { 1 }).map(|at| random_object(body, at, random));
     let objects = objects.collect();
     let step_s = random.one_of([2e-3, 1e-3, 2.5e-4]);
-    let parameters =
-        ModelParameters { step_s, gravity, obstacles, devices, solver_budget, ..ModelParameters::default() };
+    let parameters = ModelParameters {
+        step_s,
+        gravity,
+        obstacles,
+        devices,
+        solver_budget,
+        ..ModelParameters::for_reference()
+    };
     Ok(Model::new(parameters, objects)?)
 }
 

@@ -82,7 +82,7 @@ fn model(
         devices,
         max_contact_samples: samples,
         max_contact_points: 2048,
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     Ok(Model::new(parameters, objects)?)
 }

@@ -158,7 +158,7 @@ fn forces(
     let parameters = ModelParameters {
         step_s: STEP_S / fraction as f64,
         devices: vec![device; motion.len()],
-        ..ModelParameters::default()
+        ..ModelParameters::for_reference()
     };
     let model = Model::new(parameters, vec![object_at(body, DVec3::ZERO, DVec3::ZERO)])?;
     let mut state = State::new(&model);

@@ -23,7 +23,9 @@ impl CollisionContext<'_> {
         let mut pair = self.levels.of_pair(objects, self.step);
         pair.details.iter_mut().for_each(|detail| detail.begin(self.step));
         loop {
-            let found = match self.overlap(&pair) {
+            let overlap = self.overlap(&pair);
+            pair.is_near |= overlap.is_some();
+            let found = match overlap {
                 Some(of) => [0, 1].map(|side| self.nodes_against(&pair, side, of[side], mark.len)),
                 None => [0; 2],
             };

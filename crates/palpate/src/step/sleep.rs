@@ -1,0 +1,146 @@
+//! Sleep of a step: what wakes objects, and which fall asleep.
+//!
+//! An object is still while its kinetic energy is below that of its mass at a small speed, nothing that moves is near it, and no device
+//! holds or pushes it. When all objects of a group have been still for the time that the model says, and each is carried by contacts or has
+//! fixed nodes, their velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated.
+//!
+//! Equations: docs/theory.md (C84).
+
+use super::{accepts_gravity, collision_context, predict_object, usable};
+use crate::collision::OtherSide;
+use crate::io::{DeviceMode, Input};
+use crate::object::{Object, ObjectState};
+use crate::scene::Model;
+use crate::spatial::Twist;
+use crate::state::State;
+use glam::DVec3;
+
+/// Speed of still objects, as a share of their radius per second: above what contact samples at rest move by, below what one sees or feels.
+const STILL_SPEED: f64 = 0.02;
+
+impl Model {
+    /// Steps for which objects are still before they fall asleep, two or more, so that none does in a step in which something disturbs it; none
+    /// when they never do.
+    fn steps_until_sleep(&self) -> Option<u32> {
+        let steps = self.parameters.sleep_after_s / self.parameters.step_s;
+        steps.is_finite().then_some((libm::ceil(steps) as u32).max(2))
+    }
+}
+
+/// Wake what the input of a step acts on: held points, prescribed forces, bases that move; all objects when gravity changes.
+pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
+    if model.steps_until_sleep().is_none() {
+        return;
+    }
+    let State { sleepers, objects, .. } = state;
+    for number in 0..input.devices.len().min(state.devices.len()) {
+        match usable(model, input, number).map(|given| given.mode) {
+            Some(DeviceMode::Held(grasp)) => sleepers.disturb(grasp.object),
+            Some(DeviceMode::Force(applied)) => sleepers.disturb(applied.grasp.object),
+            _ => {}
+        }
+    }
+    for (at, given) in input.bases.iter().enumerate().take(objects.len()) {
+        let object = &model.objects[at];
+        let given = given.filter(|given| given.is_finite() && object.has_movable_base());
+        if given.is_some_and(|given| objects[at].base_is_elsewhere(object, given)) {
+            sleepers.disturb(at);
+        }
+    }
+    if input.gravity.is_some_and(|gravity| gravity != state.gravity && accepts_gravity(model, gravity)) {
+        sleepers.disturb_all();
+    }
+    wake(state);
+}
+
+/// Wake what tips, moving obstacles and objects that are awake come near.
+pub(super) fn wake_near(model: &Model, state: &mut State) {
+    if model.steps_until_sleep().is_none() {
+        return;
+    }
+    let (mut context, devices, [before, after]) = collision_context(model, state);
+    context.mark_disturbed(devices, (before, after));
+    let State { sleepers, workspace, .. } = state;
+    for (at, is_disturbed) in workspace.collision.disturbed.iter_mut().enumerate() {
+        if core::mem::take(is_disturbed) {
+            sleepers.disturb(at);
+        }
+    }
+    wake(state);
+}
+
+/// Wake the groups that were disturbed: their contacts go on with the forces that they had.
+fn wake(state: &mut State) {
+    let State { steps, sleepers, resting, contacts, levels, output, objects, .. } = state;
+    let wakes = sleepers.wake(|at| {
+        levels.keep_for_now(at, *steps);
+        contacts.append(&mut resting.contacts[at]);
+        output.objects[at].is_asleep = false;
+    });
+    if wakes {
+        contacts.sort_unstable_by_key(|contact| contact.id);
+        resting.update_energy(objects, sleepers);
+        // Those of the last step are written again.
+        output.contacts.truncate(resting.outputs);
+        output.contacts.retain(|contact| !sleepers.is_awake(contact.object));
+        resting.outputs = output.contacts.len();
+    }
+}
+
+/// Let still groups fall asleep, at the end of a step whose output is written.
+pub(super) fn fall_asleep(model: &Model, state: &mut State) {
+    let Some(steps) = model.steps_until_sleep() else { return };
+    let rules = model.step_rules(state.gravity);
+    let State { sleepers, objects, contacts, levels, resting, couplings, output, .. } = state;
+    let mut could_sleep = false;
+    for index in 0..sleepers.awake().len() {
+        let at = sleepers.awake()[index] as usize;
+        let is_still = is_still(&model.objects[at], &objects[at]);
+        could_sleep |= sleepers.count(at, is_still) >= steps;
+    }
+    if !could_sleep {
+        return;
+    }
+    sleepers.begin_groups();
+    for contact in contacts.iter() {
+        if let OtherSide::Object { number, .. } = contact.other {
+            sleepers.connect(contact.object(), number);
+        }
+    }
+    levels.near_pairs(state.steps - 1).for_each(|[a, b]| sleepers.connect(a, b));
+    let mut fell_asleep = false;
+    sleepers.fall_asleep(steps, |at| {
+        fell_asleep = true;
+        let (object, own, out) = (&model.objects[at], &mut objects[at], &mut output.objects[at]);
+        own.stop(object, rules.gravity);
+        predict_object(object, own, &rules);
+        (out.twist, out.energy, out.is_asleep) = (Twist::ZERO, own.ledger, true);
+    });
+    if !fell_asleep {
+        return;
+    }
+    contacts.retain(|contact| {
+        let is_awake = sleepers.is_awake(contact.object());
+        if !is_awake {
+            resting.contacts[contact.object()].push(*contact);
+        }
+        is_awake
+    });
+    output
+        .contacts
+        .sort_unstable_by_key(|contact| (sleepers.is_awake(contact.object), contact.against, contact.object));
+    resting.outputs = output.contacts.partition_point(|contact| !sleepers.is_awake(contact.object));
+    output.contacts[..resting.outputs].iter_mut().for_each(|contact| contact.slip_speed = 0.0);
+    resting.update_energy(objects, sleepers);
+    output.energy = resting.scene_energy(couplings, objects, sleepers);
+}
+
+/// Whether an object is still at the end of a step, and carried. Objects with clamps, or with tables, never are.
+fn is_still(object: &Object, own: &ObjectState) -> bool {
+    let speed = STILL_SPEED * object.radius;
+    object.is_touchable()
+        && object.body.cells() == 0
+        && !own.base.moves()
+        && (object.inertia.is_none() || own.points.points.iter().any(|point| point.force != DVec3::ZERO))
+        && own.ledger.kinetic <= 0.5 * object.body.recording.mass() * speed * speed
+}
