@@ -180,18 +180,32 @@ fn obstacles_that_move_and_gravity_that_changes_wake() {
 }
 
 #[test]
-fn a_body_with_fixed_nodes_sleeps_sagged_and_wakes_with_its_base() {
+fn a_body_with_fixed_nodes_sleeps_on_a_floor_and_wakes_with_its_base() {
     let body = fixed_block();
-    let objects = vec![ModelObject::new(body, start_at(DVec3::ZERO))];
-    let parameters = ModelParameters { obstacles: Vec::new(), ..parameters() };
-    let (model, mut state) = model_and_state(parameters, objects);
+    let low = body.surface.positions.iter().map(|p| p.y).fold(0.0, f64::min);
+    let in_the_floor = DVec3::Y * (-low - 1e-4);
+    let (model, mut state) =
+        model_and_state(parameters(), vec![ModelObject::new(body, start_at(in_the_floor))]);
     (0..20 * SETTLING).for_each(|_| _ = step(&model, &mut state, &Input::default()));
-    assert!(state.output().objects[0].is_asleep, "{:?}", state.output().energy);
-    let base = |x: f64| Input { bases: vec![Some(DVec3::X * x)], ..Input::default() };
+    assert!(state.output().objects[0].is_asleep, "{:?}", state.output());
+    let base = |x: f64| Input { bases: vec![Some(in_the_floor + DVec3::X * x)], ..Input::default() };
     step(&model, &mut state, &base(0.0));
     assert!(state.output().objects[0].is_asleep);
     step(&model, &mut state, &base(1e-4));
     assert!(!state.output().objects[0].is_asleep);
+}
+
+#[test]
+fn bodies_that_nothing_touches_vibrate_and_drift_on_however_little() {
+    let (free, fixed) = (free_block(), fixed_block());
+    let drifting = object_at(&free, DVec3::ZERO, DVec3::X * 1e-6);
+    let objects = vec![drifting, ModelObject::new(fixed, start_at(DVec3::Y))];
+    let parameters = ModelParameters { gravity: DVec3::Y * 1e-6, obstacles: Vec::new(), ..parameters() };
+    let (model, mut state) = model_and_state(parameters, objects);
+    (0..SETTLING).for_each(|_| _ = step(&model, &mut state, &Input::default()));
+    let time = f64::from(SETTLING) * model.parameters().step_s;
+    assert_eq!(asleep(state.output()), [false; 2]);
+    assert!((state.output().objects[0].pose.position.x / (1e-6 * time) - 1.0).abs() < ROUND_OFF);
 }
 
 #[test]

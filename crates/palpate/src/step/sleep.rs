@@ -1,8 +1,9 @@
 //! Sleep of a step: what wakes objects, and which fall asleep.
 //!
 //! An object is still while its kinetic energy is below that of its mass at a small speed, nothing that moves is near it, and no device
-//! holds or pushes it. When all objects of a group have been still for the time that the model says, and each is carried by contacts or has
-//! fixed nodes, their velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated.
+//! holds or pushes it. When all objects of a group have been still for the time that the model says, and contacts press on each, their
+//! velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated. A body
+//! that nothing touches never sleeps: small vibrations and slow drift go on, and it costs little.
 //!
 //! Equations: docs/theory.md (C84).
 
@@ -135,12 +136,12 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
     output.energy = resting.scene_energy(couplings, objects, sleepers);
 }
 
-/// Whether an object is still at the end of a step, and carried. Objects with clamps, or with tables, never are.
+/// Whether an object is still at the end of a step, in contact. Objects with clamps, or with tables, never are.
 fn is_still(object: &Object, own: &ObjectState) -> bool {
     let speed = STILL_SPEED * object.radius;
     object.is_touchable()
         && object.body.cells() == 0
         && !own.base.moves()
-        && (object.inertia.is_none() || own.points.points.iter().any(|point| point.force != DVec3::ZERO))
+        && own.points.points.iter().any(|point| point.force != DVec3::ZERO)
         && own.ledger.kinetic <= 0.5 * object.body.recording.mass() * speed * speed
 }
