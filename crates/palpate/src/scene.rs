@@ -268,6 +268,13 @@ impl ModelParameters {
         self.max_contact_samples < usize::MAX && self.touches_surfaces(objects)
     }
 
+    /// Steps for which objects are still before they fall asleep, two or more, so that none does in a step in which something disturbs it; none
+    /// when they never do.
+    pub(crate) fn steps_until_sleep(&self) -> Option<u32> {
+        let steps = self.sleep_after_s / self.step_s;
+        steps.is_finite().then_some((libm::ceil(steps) as u32).max(2))
+    }
+
     /// Whether surfaces come into contact with obstacles or one another, by the number of objects.
     fn touches_surfaces(&self, objects: usize) -> bool {
         !self.obstacles.is_empty() || objects > 1

@@ -31,7 +31,7 @@ pub(crate) struct Sleepers {
 }
 
 impl Sleepers {
-    /// So many objects, all awake.
+    /// Sleepers of a scene with so many objects, all awake.
     pub(crate) fn new(objects: usize) -> Self {
         let mut all = BoundedVec::new(objects);
         all.extend(0..objects as u32);
@@ -49,6 +49,11 @@ impl Sleepers {
     /// Objects that are awake, ascending.
     pub(crate) fn awake(&self) -> &[u32] {
         &self.awake
+    }
+
+    /// Indices of the objects that are awake, ascending.
+    pub(crate) fn awake_indices(&self) -> impl Iterator<Item = usize> {
+        self.awake.iter().map(|&at| at as usize)
     }
 
     pub(crate) fn is_awake(&self, object: usize) -> bool {

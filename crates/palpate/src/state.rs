@@ -86,7 +86,7 @@ impl Resting {
         objects: &[ObjectState],
         sleepers: &Sleepers,
     ) -> EnergyLedger {
-        let awake = sleepers.awake().iter().map(|&at| &objects[at as usize].ledger);
+        let awake = sleepers.awake_indices().map(|at| &objects[at].ledger);
         awake.fold(couplings.plus(&self.energy), |sum, own| sum.plus(own))
     }
 }
@@ -129,8 +129,8 @@ impl State {
             energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
             status: StepStatus::default(),
         };
-        let never_sleeps = parameters.sleep_after_s == f64::INFINITY;
-        let resting_contacts = |own: &ObjectState| if never_sleeps { 0 } else { own.points.capacity() };
+        let can_sleep = parameters.steps_until_sleep().is_some();
+        let resting_contacts = |own: &ObjectState| if can_sleep { own.points.capacity() } else { 0 };
         let obstacles: Vec<Pose> = parameters.obstacles.iter().map(|obstacle| obstacle.pose).collect();
         Self {
             steps: 0,
@@ -185,8 +185,7 @@ impl State {
             state.output.objects[at] =
                 ObjectOutput { pose, twist, energy: own.ledger, ..state.output.objects[at] };
         }
-        state.output.energy =
-            state.objects.iter().fold(EnergyLedger::default(), |sum, own| sum.plus(&own.ledger));
+        state.output.energy = state.resting.scene_energy(&state.couplings, &state.objects, &state.sleepers);
         state
     }
 

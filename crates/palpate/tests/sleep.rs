@@ -166,7 +166,7 @@ fn obstacles_that_move_and_gravity_that_changes_wake() {
     settle(&model, &mut state);
     let floor_pose = model.parameters().obstacles[0].pose;
     let input = |x: f64| Input { obstacles: vec![floor_pose, place(x)], ..Input::default() };
-    // It moves far from all, then stays, then pushes the stack.
+    // The box moves far from all, then stays, then pushes the stack.
     (0..100).for_each(|number| _ = step(&model, &mut state, &input(-8.0 - 0.01 * f64::from(number))));
     assert_eq!(asleep(state.output()), [true; 3]);
     (0..1000).for_each(|number| _ = step(&model, &mut state, &input(-9.0 + 0.008 * f64::from(number))));

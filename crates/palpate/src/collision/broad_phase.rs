@@ -6,11 +6,11 @@
 //!
 //! Equations: docs/theory.md (C19).
 
-use super::context::{CollisionContext, CollisionWorkspace};
+use super::context::{CollisionContext, CollisionScene, CollisionWorkspace};
 use super::deformed_surface::{DeformedSurface, SurfaceTime, deformation_bound};
 use super::level_of_detail::ObjectPair;
 use super::parameters::COLLISION;
-use crate::device::DeviceState;
+use crate::device::{DeviceParameters, DeviceState};
 use crate::object::Object;
 use crate::response::Footprint;
 use crate::sleep::Sleepers;
@@ -40,7 +40,7 @@ impl SweepAndPrune {
 
     /// Set the boxes of the objects that are awake about spheres (centre, radius), and sort all.
     fn set(&mut self, sleepers: &Sleepers, sphere: impl Fn(usize) -> (DVec3, f64)) {
-        for at in sleepers.awake().iter().map(|&at| at as usize) {
+        for at in self.order.iter().map(|&at| at as usize).filter(|&at| sleepers.is_awake(at)) {
             self.boxes[at] = box_about(sphere(at));
         }
         self.axis = self.widest_axis();
@@ -89,6 +89,12 @@ impl SweepAndPrune {
     }
 }
 
+/// Sphere that holds a device's tip over the step.
+fn tip_sphere(parameters: &DeviceParameters, device: &DeviceState) -> (DVec3, f64) {
+    let travel = (device.proxy_under_force() - device.proxy).length();
+    (device.proxy, parameters.tip_radius + COLLISION.motion_factor * travel)
+}
+
 /// Box about a sphere (centre, radius).
 fn box_about((centre, radius): (DVec3, f64)) -> [DVec3; 2] {
     [centre - radius, centre + radius]
@@ -122,32 +128,25 @@ impl CollisionContext<'_> {
     /// # Real time
     /// Costs the devices, the obstacles and the objects that are awake, with their neighbours.
     pub(crate) fn mark_disturbed(&mut self, devices: &[DeviceState], (before, after): (&[Pose], &[Pose])) {
-        for (number, device) in devices.iter().enumerate().filter(|(_, device)| device.active) {
-            let own = box_about(self.tip_sphere(number, device));
-            let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
-            sweep.overlapping(own).for_each(|at| disturbed[at as usize] = true);
-        }
-        for ((obstacle, before), after) in self.scene.obstacles.iter().zip(before).zip(after) {
-            if before == after {
-                continue;
-            }
+        let CollisionScene { devices: parameters, obstacles, .. } = self.scene;
+        let touching = parameters.iter().zip(devices).filter(|(_, device)| device.active);
+        let tips = touching.map(|(parameters, device)| tip_sphere(parameters, device));
+        let moving =
+            obstacles.iter().zip(before.iter().zip(after)).filter(|(_, (before, after))| before != after);
+        let obstacles = moving.map(|(obstacle, (before, after))| {
             let radius = obstacle.shape.radius();
-            let own = box_about((before.position, radius + before.motion_bound(after, radius)));
-            let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
-            if radius.is_finite() {
-                sweep.overlapping(own).for_each(|at| disturbed[at as usize] = true);
-            } else {
-                disturbed.fill(true);
-            }
+            let motion = if radius.is_finite() { before.motion_bound(after, radius) } else { 0.0 };
+            (before.position, radius + motion)
+        });
+        let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
+        for near in tips.chain(obstacles).map(box_about) {
+            sweep.overlapping(near).for_each(|at| disturbed[at as usize] = true);
         }
         if !self.sleepers.any() {
             return;
         }
         let sweep = core::mem::take(&mut self.workspace.sweep);
-        for awake in self.sleepers.awake().iter().map(|&at| at as usize) {
-            if !self.scene.objects[awake].is_touchable() {
-                continue;
-            }
+        for awake in sweep.order.iter().map(|&at| at as usize).filter(|&at| self.sleepers.is_awake(at)) {
             for asleep in sweep.sleeping_neighbours(self.sleepers, awake) {
                 let pair = self.levels.of_pair([awake.min(asleep), awake.max(asleep)], self.step);
                 if !self.workspace.disturbed[asleep] && self.overlap(&pair).is_some() {
@@ -171,17 +170,11 @@ impl CollisionContext<'_> {
 
     /// Objects that a device's tip can meet in the step, ascending; they stay in `near_objects` of the workspace.
     pub(crate) fn find_near_objects(&mut self, number: usize, device: &DeviceState) {
-        let own = box_about(self.tip_sphere(number, device));
+        let own = box_about(tip_sphere(&self.scene.devices[number], device));
         let CollisionWorkspace { sweep, near_objects, .. } = &mut *self.workspace;
         near_objects.clear();
         near_objects.extend(sweep.overlapping(own).filter(|&at| self.sleepers.is_awake(at as usize)));
         near_objects.sort_unstable();
-    }
-
-    /// Sphere that holds a device's tip over the step.
-    fn tip_sphere(&self, number: usize, device: &DeviceState) -> (DVec3, f64) {
-        let travel = (device.proxy_under_force() - device.proxy).length();
-        (device.proxy, self.scene.devices[number].tip_radius + COLLISION.motion_factor * travel)
     }
 
     /// Sphere that holds an object over the step, at all levels of detail, with its share of the slack of [`Self::overlap`].

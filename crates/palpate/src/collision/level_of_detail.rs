@@ -103,10 +103,14 @@ impl Levels {
         &mut self.of_obstacles[object * self.obstacles + obstacle]
     }
 
-    /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step.
+    /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step, or have slept since then; what they have
+    /// slept through is no reason to try finer levels at once.
     pub(super) fn of_pair(&self, objects: [usize; 2], step: u64) -> ObjectPair {
         let known = self.pairs.binary_search_by(|pair| pair.objects.cmp(&objects));
-        let details = known.map_or([LevelOfDetail::default(); 2], |at| self.pairs[at].details);
+        let mut details = known.map_or([LevelOfDetail::default(); 2], |at| self.pairs[at].details);
+        if known.is_ok_and(|at| self.pairs[at].step + 1 < step) {
+            details.iter_mut().for_each(|detail| detail.since = step);
+        }
         ObjectPair { objects, details, step, is_near: false }
     }
 
@@ -125,13 +129,10 @@ impl Levels {
         self.pairs.retain(|pair| pair.step == step || rests(pair));
     }
 
-    /// Keep the levels of an object that wakes in a step: what it has slept through is no reason to try finer ones at once.
+    /// Keep the levels of an object against obstacles in the step in which it wakes, as those of pairs are.
     pub(crate) fn keep_for_now(&mut self, object: usize, step: u64) {
-        let of_obstacles = &mut self.of_obstacles[object * self.obstacles..][..self.obstacles];
-        let of_obstacles = of_obstacles.iter_mut().map(|level| &mut level.detail);
-        let pairs = self.pairs.iter_mut().filter(|pair| pair.objects.contains(&object));
-        let of_pairs = pairs.flat_map(|pair| &mut pair.details);
-        of_obstacles.chain(of_pairs).for_each(|detail| detail.since = step);
+        let of_object = &mut self.of_obstacles[object * self.obstacles..][..self.obstacles];
+        of_object.iter_mut().for_each(|level| level.detail.since = step);
     }
 
     /// Pairs that could have met in a step.

@@ -108,11 +108,11 @@ fn accepts_gravity(model: &Model, gravity: DVec3) -> bool {
 /// Begin the motion of bases. Bodies with fixed nodes feel their acceleration as gravity.
 fn move_bases(model: &Model, state: &mut State, input: &Input) {
     let (gravity, h) = (state.gravity, model.parameters.step_s);
-    for number in state.sleepers.awake().iter().map(|&at| at as usize) {
+    for number in state.sleepers.awake_indices() {
         let (object, own) = (&model.objects[number], &mut state.objects[number]);
-        let given = input.bases.get(number).copied().flatten();
-        let usable = given.filter(|position| position.is_finite() && object.has_movable_base());
-        state.output.status.rejected_inputs += u32::from(usable != given);
+        let usable = usable_base(object, input, number);
+        let is_given = input.bases.get(number).is_some_and(Option::is_some);
+        state.output.status.rejected_inputs += u32::from(is_given && usable.is_none());
         if object.has_movable_base() && (usable.is_some() || own.base.moves()) {
             let before = own.felt_gravity(gravity);
             own.begin_base_motion(object, usable, h);
@@ -124,10 +124,16 @@ fn move_bases(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
+/// Position [m, world] that a base is to go to, if it can be used.
+fn usable_base(object: &Object, input: &Input, number: usize) -> Option<DVec3> {
+    let given = input.bases.get(number).copied().flatten();
+    given.filter(|position| position.is_finite() && object.has_movable_base())
+}
+
 /// Predict every object at the end of the step without contact force.
 fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
-    for at in state.sleepers.awake().iter().map(|&at| at as usize) {
+    for at in state.sleepers.awake_indices() {
         predict_object(&model.objects[at], &mut state.objects[at], &rules);
     }
 }
@@ -264,8 +270,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             }
         }
     }
-    let awake = context.sleepers.awake();
-    for object in awake.iter().map(|&at| at as usize).filter(|&at| model.objects[at].is_touchable()) {
+    for object in context.sleepers.awake_indices().filter(|&at| model.objects[at].is_touchable()) {
         for (number, (before, after)) in before.iter().zip(after).enumerate() {
             context.find_obstacle_contacts(object, number, *before, *after);
         }
@@ -289,7 +294,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 fn set_up_constraints(model: &Model, state: &mut State) {
     let gravity = state.gravity;
     let State { steps, objects, devices, contacts, recovery, sleepers, workspace, output, .. } = state;
-    for at in sleepers.awake().iter().map(|&at| at as usize) {
+    for at in sleepers.awake_indices() {
         let (object, own) = (&model.objects[at], &mut objects[at]);
         let orientation = own.rigid.pose.orientation;
         let mut view = object.view(own.felt_gravity(gravity), &own.rigid, &mut own.response);
@@ -344,15 +349,13 @@ fn set_up_constraints(model: &Model, state: &mut State) {
 fn solve(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
     let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
-    let awake = sleepers.awake();
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
     let budget = model.parameters.solver_budget;
-    let objects_of_model = &model.objects;
     let mut problem = ContactProblem {
-        objects: objects_of_model,
+        objects: &model.objects,
         rules,
-        awake,
+        awake: sleepers.awake(),
         states: objects,
         devices,
         contacts,
@@ -388,7 +391,6 @@ fn integrate(model: &Model, state: &mut State) {
     let gravity = state.gravity;
     let State { objects, devices, contacts, obstacles, workspace, couplings, recovery, output, .. } = state;
     let (sleepers, resting) = (&state.sleepers, &state.resting);
-    let awake = || sleepers.awake().iter().map(|&at| at as usize);
     let mut given_back = 0.0;
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {
         let given = accounting::contact(contact, constraint, objects);
@@ -398,7 +400,7 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::prescribed_force(device, objects);
     }
     remember_touches(objects, devices, contacts, &workspace.constraints);
-    for at in awake() {
+    for at in sleepers.awake_indices() {
         let (object, own) = (&model.objects[at], &mut objects[at]);
         let is_unsolved = own.end.residual * object.radius > UNSOLVED * own.reach(object);
         output.status.unsolved_islands += u32::from(is_unsolved);
@@ -411,9 +413,9 @@ fn integrate(model: &Model, state: &mut State) {
         own.ledger.dissipated += view.advance(&mut own.points.points);
         own.points.points.iter_mut().for_each(|point| point.state.displacement = point.displacement);
     }
-    awake().for_each(|at| objects[at].is_held = false);
+    sleepers.awake_indices().for_each(|at| objects[at].is_held = false);
     depenetration::depenetrate((model, gravity), objects, contacts, &workspace.constraints);
-    for at in awake() {
+    for at in sleepers.awake_indices() {
         let (object, own) = (&model.objects[at], &mut objects[at]);
         own.ledger.input += own.base_work(object, gravity);
         own.update_ledger(object, gravity);
@@ -424,7 +426,8 @@ fn integrate(model: &Model, state: &mut State) {
         accounting::coupling(parameters, device, couplings);
     }
     obstacles.copy_from_slice(&workspace.next_obstacles);
-    let lost = awake().fold(couplings.lost() + resting.lost(), |sum, at| sum + objects[at].ledger.lost());
+    let of_awake = sleepers.awake_indices().map(|at| objects[at].ledger.lost());
+    let lost = of_awake.fold(couplings.lost() + resting.lost(), |sum, own| sum + own);
     recovery.close(model.parameters.step_s, lost - output.energy.lost(), given_back);
 }
 

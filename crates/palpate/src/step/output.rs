@@ -13,7 +13,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
     let (sleepers, resting) = (&state.sleepers, &state.resting);
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;
-    for at in sleepers.awake().iter().map(|&at| at as usize) {
+    for at in sleepers.awake_indices() {
         let (out, object, own) = (&mut output.objects[at], &model.objects[at], &objects[at]);
         out.pose = own.rigid.pose;
         if let Some(inertia) = &object.inertia {

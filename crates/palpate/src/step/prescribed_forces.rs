@@ -71,17 +71,16 @@ fn location(object: &Object, point: SurfacePoint, patch_radius: f64) -> ContactL
 pub(super) fn predict(model: &Model, state: &mut State) {
     let rules = model.step_rules(state.gravity);
     let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
-    let awake = sleepers.awake();
     let mut problem = ContactProblem {
         objects: &model.objects,
         rules,
-        awake,
+        awake: sleepers.awake(),
         states: objects,
         devices,
         contacts,
         constraints: &mut workspace.constraints,
     };
-    for at in awake.iter().map(|&at| at as usize) {
+    for at in sleepers.awake_indices() {
         if problem.states[at].has_prescribed_forces() {
             let holds = problem.predict_under_prescribed_forces(at);
             output.status.unsolved_islands += u32::from(!holds);

@@ -7,7 +7,7 @@
 //!
 //! Equations: docs/theory.md (C84).
 
-use super::{accepts_gravity, collision_context, predict_object, usable};
+use super::{accepts_gravity, collision_context, predict_object, usable, usable_base};
 use crate::collision::OtherSide;
 use crate::io::{DeviceMode, Input};
 use crate::object::{Object, ObjectState};
@@ -19,18 +19,9 @@ use glam::DVec3;
 /// Speed of still objects, as a share of their radius per second: above what contact samples at rest move by, below what one sees or feels.
 const STILL_SPEED: f64 = 0.02;
 
-impl Model {
-    /// Steps for which objects are still before they fall asleep, two or more, so that none does in a step in which something disturbs it; none
-    /// when they never do.
-    fn steps_until_sleep(&self) -> Option<u32> {
-        let steps = self.parameters.sleep_after_s / self.parameters.step_s;
-        steps.is_finite().then_some((libm::ceil(steps) as u32).max(2))
-    }
-}
-
 /// Wake what the input of a step acts on: held points, prescribed forces, bases that move; all objects when gravity changes.
 pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
-    if model.steps_until_sleep().is_none() {
+    if model.parameters.steps_until_sleep().is_none() {
         return;
     }
     let State { sleepers, objects, .. } = state;
@@ -41,10 +32,8 @@ pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
             _ => {}
         }
     }
-    for (at, given) in input.bases.iter().enumerate().take(objects.len()) {
-        let object = &model.objects[at];
-        let given = given.filter(|given| given.is_finite() && object.has_movable_base());
-        if given.is_some_and(|given| objects[at].base_is_elsewhere(object, given)) {
+    for (at, (object, own)) in model.objects.iter().zip(&*objects).enumerate().take(input.bases.len()) {
+        if usable_base(object, input, at).is_some_and(|given| own.base_is_elsewhere(object, given)) {
             sleepers.disturb(at);
         }
     }
@@ -56,7 +45,7 @@ pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
 
 /// Wake what tips, moving obstacles and objects that are awake come near.
 pub(super) fn wake_near(model: &Model, state: &mut State) {
-    if model.steps_until_sleep().is_none() {
+    if model.parameters.steps_until_sleep().is_none() {
         return;
     }
     let (mut context, devices, [before, after]) = collision_context(model, state);
@@ -81,7 +70,7 @@ fn wake(state: &mut State) {
     if wakes {
         contacts.sort_unstable_by_key(|contact| contact.id);
         resting.update_energy(objects, sleepers);
-        // Those of the last step are written again.
+        // Contacts of objects that are awake are written at the end of the step.
         output.contacts.truncate(resting.outputs);
         output.contacts.retain(|contact| !sleepers.is_awake(contact.object));
         resting.outputs = output.contacts.len();
@@ -90,7 +79,7 @@ fn wake(state: &mut State) {
 
 /// Let still groups fall asleep, at the end of a step whose output is written.
 pub(super) fn fall_asleep(model: &Model, state: &mut State) {
-    let Some(steps) = model.steps_until_sleep() else { return };
+    let Some(steps) = model.parameters.steps_until_sleep() else { return };
     let rules = model.step_rules(state.gravity);
     let State { sleepers, objects, contacts, levels, resting, couplings, output, .. } = state;
     let mut could_sleep = false;

@@ -61,12 +61,17 @@ fn apart_steps(bodies: usize, touched: usize, steps: usize) -> Result<Vec<u32>, 
     let mut times = Vec::new();
     for number in 0..steps.min(STEPS) {
         let time = number as f64 * model.parameters().step_s;
-        let press = 0.03 * radius * (TAU * 4.0 * time).sin().abs();
+        let press = press(radius, time);
         let finger = |touched| DeviceInput::touching(at(touched) - DVec3::X * (half + tip - press));
         let input = Input { devices: (0..touched).map(finger).collect(), ..Input::default() };
         times.push(timed_step(&model, &mut state, &input));
     }
     Ok(times)
+}
+
+/// Depth of a press at a time [s], at 4 Hz [m].
+fn press(radius: f64, time: f64) -> f64 {
+    0.03 * radius * (TAU * 4.0 * time).sin().abs()
 }
 
 fn resting_steps(
@@ -92,16 +97,11 @@ fn resting_steps(
     let mut state = State::new(&model);
     let mut times = Vec::new();
     for number in 0..SETTLING + steps.min(STEPS) {
-        let finger = |touched| {
-            let press = 0.03 * radius * (TAU * 4.0 * number as f64 * model.parameters().step_s).sin().abs();
-            DeviceInput::touching(at(touched) + DVec3::Y * (half + tip - press))
-        };
-        let time = if number < SETTLING {
-            timed_step(&model, &mut state, &Input::default())
-        } else {
-            let devices = (0..touched).map(|number| finger(number * bodies / touched)).collect();
-            timed_step(&model, &mut state, &Input { devices, ..Input::default() })
-        };
+        let press = press(radius, number as f64 * model.parameters().step_s);
+        let finger = |at: DVec3| DeviceInput::touching(at + DVec3::Y * (half + tip - press));
+        let touched = if number < SETTLING { 0 } else { touched };
+        let devices = (0..touched).map(|finger_of| finger(at(finger_of * bodies / touched))).collect();
+        let time = timed_step(&model, &mut state, &Input { devices, ..Input::default() });
         if number >= SETTLING {
             times.push(time);
         }
