@@ -3,7 +3,7 @@
 //! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
 
 mod bare;
-mod licences;
+mod dependencies;
 mod machine;
 mod process;
 mod tests;
@@ -49,10 +49,22 @@ const CHORES: &[Chore] = &[
         run: |_| viewer::build(),
     },
     Chore {
-        name: "licences",
-        summary: "check that every dependency's licence fits MIT OR Apache-2.0",
+        name: "dependencies",
+        summary: "check licences, duplicates and, where cargo-deny and its database are there, advisories (deny.toml)",
         flags: &[],
-        run: |_| licences::check(),
+        run: |_| dependencies::check(),
+    },
+    Chore {
+        name: "attack",
+        summary: "attack a running palpate on loopback: server, links, files, ends, numbers (SECURITY.md)",
+        flags: &[],
+        run: |_| attack(&[]),
+    },
+    Chore {
+        name: "soak",
+        summary: "30 minutes of fingers, a log, pages and a link, with one core hogged for a third of the time",
+        flags: &[],
+        run: |_| attack(&["--soak", SOAK_MINUTES]),
     },
     Chore {
         name: "layers",
@@ -122,7 +134,7 @@ fn main() -> ExitCode {
 fn list() -> String {
     let mut text = String::from("cargo xtask CHORE [--help]\n\n");
     for chore in CHORES {
-        text += &format!("  {:<10}{}\n", chore.name, chore.summary);
+        text += &format!("  {:<14}{}\n", chore.name, chore.summary);
     }
     text
 }
@@ -173,6 +185,16 @@ fn verify() -> Result<(), String> {
     run(Command::new(palpate()?).arg("verify"))
 }
 
+/// Duration of a soak [min].
+const SOAK_MINUTES: &str = "30";
+
+fn attack(arguments: &[&str]) -> Result<(), String> {
+    machine::need_c_compiler()?;
+    let palpate = palpate()?;
+    process::cargo(&["build", "--release", "--locked", "--package", "palpate-attack"])?;
+    run(Command::new(palpate.with_file_name("palpate-attack")).arg("--palpate").arg(&palpate).args(arguments))
+}
+
 fn check_layers(deep: bool) -> Result<(), String> {
     let report = layers::check(root(), deep)?;
     for text in report.circles.iter().chain(&report.against_floors) {
@@ -218,7 +240,7 @@ mod command_line_tests {
     #[test]
     fn the_list_has_a_line_for_every_chore() {
         assert!(
-            CHORES.iter().all(|chore| list().contains(&format!("\n  {:<10}{}\n", chore.name, chore.summary)))
+            CHORES.iter().all(|chore| list().contains(&format!("\n  {:<14}{}\n", chore.name, chore.summary)))
         );
     }
 

@@ -2,14 +2,12 @@
 //!
 //! A [`Case`] computes quantities and compares each with an analytic value, an identity, or an independent solution. A [`Check`] holds the
 //! measured and the expected value, the error and its tolerance, and, where meshes or steps are refined, the observed order of
-//! convergence. [`run`] runs cases and reports each as it ends.
+//! convergence. [`run`] computes cases on all cores and reports each as it ends.
 //!
 //! ```no_run
 //! let cases = palpate_verify::select(&["hertz", "press"])?;
-//! let results = palpate_verify::run(&cases, |event| {
-//!     if let palpate_verify::Event::CaseFinished(result) = event {
-//!         println!("{}: {}", result.case.name, if result.passed() { "passed" } else { "failed" });
-//!     }
+//! let results = palpate_verify::run(&cases, |result| {
+//!     println!("{}: {}", result.case.name, if result.passed() { "passed" } else { "failed" });
 //!     Ok::<(), palpate_verify::VerifyError>(())
 //! })?;
 //! assert!(results.iter().all(palpate_verify::CaseResult::passed));
@@ -30,4 +28,4 @@ pub use cases::CASES;
 pub use check::Check;
 pub use error::{UnknownCase, VerifyError};
 pub use reference::{UNREDUCED_REBOUND_M, UnreducedFallRow, unreduced_fall};
-pub use run::{CaseResult, Event, run, select};
+pub use run::{CaseResult, run, select};

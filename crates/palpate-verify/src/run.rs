@@ -4,6 +4,9 @@ use crate::case::Case;
 use crate::cases::CASES;
 use crate::check::Check;
 use crate::error::{UnknownCase, VerifyError};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 /// A case that was computed.
@@ -24,15 +27,6 @@ impl CaseResult {
     }
 }
 
-/// Progress of [`run`].
-#[derive(Debug)]
-pub enum Event<'a> {
-    /// A case begins.
-    CaseStarted(&'static Case),
-    /// A case has ended.
-    CaseFinished(&'a CaseResult),
-}
-
 /// The cases with these names, in the order of [`CASES`]; all of them where no name is given.
 ///
 /// # Errors
@@ -46,24 +40,51 @@ pub fn select<S: AsRef<str>>(names: &[S]) -> Result<Vec<&'static Case>, UnknownC
     Ok(CASES.iter().filter(wanted).collect())
 }
 
-/// Runs cases one after the other; `progress` hears of each when it begins and when it ends, or stops the run by its own error.
+/// Computes cases on all cores; `progress` hears of each in the given order, once it and those before it are there, or stops the run by its
+/// own error.
 ///
 /// # Errors
 /// The first case that can't be computed, or what `progress` returns.
 pub fn run<E: From<VerifyError>>(
     cases: &[&'static Case],
-    mut progress: impl FnMut(Event<'_>) -> Result<(), E>,
+    mut progress: impl FnMut(&CaseResult) -> Result<(), E>,
 ) -> Result<Vec<CaseResult>, E> {
-    let mut results = Vec::with_capacity(cases.len());
-    for &case in cases {
-        progress(Event::CaseStarted(case))?;
-        let before = Instant::now();
-        let checks = (case.compute)()?;
-        let result = CaseResult { case, checks, elapsed: before.elapsed() };
-        progress(Event::CaseFinished(&result))?;
-        results.push(result);
-    }
-    Ok(results)
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        let (sender, computed) = channel();
+        for _ in 0..workers {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || {
+                while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let before = Instant::now();
+                    let checks = (case.compute)();
+                    let result = checks.map(|checks| CaseResult { case, checks, elapsed: before.elapsed() });
+                    if sender.send((case.name, result)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut early = BTreeMap::new();
+        let mut results = Vec::with_capacity(cases.len());
+        let outcome = cases.iter().try_for_each(|case| {
+            while !early.contains_key(case.name) {
+                let Ok((name, result)) = computed.recv() else { break };
+                early.insert(name, result);
+            }
+            // A worker that has panicked sends nothing: the scope passes its panic on.
+            let Some(result) = early.remove(case.name) else { return Ok(()) };
+            let result = result?;
+            progress(&result)?;
+            results.push(result);
+            Ok(())
+        });
+        // After an error no further case begins.
+        next.store(cases.len(), Ordering::Relaxed);
+        outcome.map(|()| results)
+    })
 }
 
 #[cfg(test)]
@@ -85,16 +106,16 @@ mod tests {
     }
 
     #[test]
-    fn progress_hears_of_every_case_and_can_stop_the_run() {
-        let case = select(&["momentum"]).expect("it is there");
+    fn progress_hears_of_every_case_in_order_and_can_stop_the_run() {
+        let cases = select(&["flight", "momentum", "spin"]).expect("they are there");
         let mut heard = Vec::new();
-        let results = run(&case, |event| {
-            heard.push(matches!(event, Event::CaseStarted(_)));
+        let results = run(&cases, |result| {
+            heard.push(result.case.name);
             Ok::<(), VerifyError>(())
         });
-        assert_eq!(heard, [true, false]);
-        assert!(results.expect("it can be computed").iter().all(CaseResult::passed));
-        let stopped = run(&case, |_| Err(VerifyError::NotReached("stopped")));
+        assert_eq!(heard, ["flight", "momentum", "spin"]);
+        assert!(results.expect("they can be computed").iter().all(CaseResult::passed));
+        let stopped = run(&cases, |_| Err(VerifyError::NotReached("stopped")));
         assert_eq!(stopped.expect_err("stopped").to_string(), "stopped");
     }
 }

@@ -83,6 +83,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-render",
         ],
     ),
+    // Attacks see what strangers see.
+    ("palpate-attack", &[]),
     ("xtask", &[]),
 ];
 
