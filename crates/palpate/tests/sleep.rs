@@ -266,4 +266,5 @@ fn inputs_that_are_refused_wake_nothing() {
     let bases = vec![Some(DVec3::X); 3];
     step(&model, &mut state, &Input { bases, gravity: Some(DVec3::NAN), ..Input::default() });
     assert_eq!(asleep(state.output()), [true; 3]);
+    assert_eq!(state.output().status.rejected_inputs, 4, "three bases of free objects, and gravity");
 }

@@ -108,11 +108,13 @@ fn accepts_gravity(model: &Model, gravity: DVec3) -> bool {
 /// Begin the motion of bases. Bodies with fixed nodes feel their acceleration as gravity.
 fn move_bases(model: &Model, state: &mut State, input: &Input) {
     let (gravity, h) = (state.gravity, model.parameters.step_s);
+    for (number, object) in model.objects.iter().enumerate().take(input.bases.len()) {
+        let is_rejected = input.bases[number].is_some() && usable_base(object, input, number).is_none();
+        state.output.status.rejected_inputs += u32::from(is_rejected);
+    }
     for number in state.sleepers.awake_indices() {
         let (object, own) = (&model.objects[number], &mut state.objects[number]);
         let usable = usable_base(object, input, number);
-        let is_given = input.bases.get(number).is_some_and(Option::is_some);
-        state.output.status.rejected_inputs += u32::from(is_given && usable.is_none());
         if object.has_movable_base() && (usable.is_some() || own.base.moves()) {
             let before = own.felt_gravity(gravity);
             own.begin_base_motion(object, usable, h);
