@@ -4,6 +4,7 @@
 //! [`object_at`] build models from them. [`made_once_per_run`] keeps what takes long for all processes of a test run. With the feature `record`, [`ElasticMaterial`] records bodies from meshes, each once per process.
 
 mod allocations;
+mod editable_recording;
 mod once_per_run;
 mod random;
 mod random_pointer;
@@ -19,7 +20,8 @@ mod material;
 #[cfg(feature = "record")]
 mod recording_cache;
 
-pub use allocations::{CountingAllocator, allocations};
+pub use allocations::{CountingAllocator, allocations, largest_allocation};
+pub use editable_recording::{EditableRecording, EditableTensor};
 pub use once_per_run::made_once_per_run;
 pub use random::Random;
 pub use random_pointer::RandomPointer;

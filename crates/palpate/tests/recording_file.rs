@@ -91,14 +91,22 @@ fn inconsistent_recordings_are_refused_when_written() {
     };
     let mut massless = good.clone();
     massless.metadata.mass.mass_kg = 0.0;
-    let what = "mass is 0e0 kg, expected a positive number".into();
+    let what = "mass.mass_kg[0] is 0e0 kg, expected 1e-18 to 1e18".into();
     let kind = RecordingError::Inconsistent { part: RecordingPart::Mass, what };
     assert_eq!(massless.validate(), Err(Error::Recording(kind)));
-    assert!(refused(|r| r.modes.mode_shapes[3] = f64::NAN).ends_with("a mode shape is not finite"));
+    assert!(
+        refused(|r| r.modes.mode_shapes[3] = f64::NAN)
+            .ends_with("modes.mode_shapes[3] is NaN 1/√kg, expected -1e12 to 1e12")
+    );
     assert!(refused(|r| r.modes.angular_frequencies.reverse()).contains("ascending"));
-    assert!(refused(|r| r.modes.damping_ratios[0] = -0.1).contains("damping ratios"));
-    assert!(refused(|r| r.surface.triangles[4][1] = 12).contains("triangle 4 names a node beyond"));
-    assert!(refused(|r| r.metadata.mass.mass_kg = 0.0).contains("mass is 0e0 kg"));
-    assert!(refused(|r| r.metadata.mass.inertia_kg_m2[1][1] *= -1.0).contains("inertia tensor"));
+    assert!(
+        refused(|r| r.modes.damping_ratios[0] = -0.1).contains("modes.damping_ratios[0] is -1e-1, expected")
+    );
+    assert!(refused(|r| r.surface.triangles[4][1] = 12).contains("name node 12 in triangle 4, beyond"));
+    assert!(refused(|r| r.metadata.mass.mass_kg = 0.0).contains("mass.mass_kg[0] is 0e0 kg"));
+    assert!(
+        refused(|r| r.metadata.mass.inertia_kg_m2[1][1] *= -1.0)
+            .contains("mass.inertia_kg_m2 is not one of a body")
+    );
     assert!(refused(|r| r.metadata.units = "mm".into()).contains("in units \"mm\""));
 }

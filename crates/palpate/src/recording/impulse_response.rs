@@ -7,9 +7,9 @@
 use crate::error::{Error, ModelError};
 use crate::surface::{Surface, SurfacePoint};
 use alloc::boxed::Box;
+use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::String;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt::Debug;
 
@@ -76,9 +76,6 @@ pub struct ColumnsInMemory {
     bytes: Vec<u8>,
     column_bytes: usize,
 }
-
-/// Index of a surface degree of freedom that a table does not hold.
-const NONE: u32 = u32::MAX;
 
 impl Column<'_> {
     /// Number [m/N] at an index, sample·observed + dof.
@@ -148,17 +145,9 @@ impl ImpulseColumns for ColumnsInMemory {
 impl ImpulseResponse {
     /// Indices of the three axes of each surface node in `dofs`; none for nodes that lack an axis.
     pub(crate) fn dof_indices(surface: &Surface, dofs: &[u32]) -> Vec<Option<[u32; 3]>> {
-        let largest = surface.source_nodes.iter().copied().max().unwrap_or(0) as usize;
-        let mut indices = vec![NONE; 3 * (largest + 1)];
-        for (index, &dof) in dofs.iter().enumerate() {
-            if let Some(entry) = indices.get_mut(dof as usize) {
-                *entry = index as u32;
-            }
-        }
-        let of_node = |&node: &u32| {
-            let axes = [0, 1, 2].map(|axis| indices[3 * node as usize + axis]);
-            (!axes.contains(&NONE)).then_some(axes)
-        };
+        let indices: BTreeMap<u32, u32> = (0..).zip(dofs).map(|(index, &dof)| (dof, index)).collect();
+        let index = |node: u32, axis: u32| indices.get(&node.checked_mul(3)?.checked_add(axis)?).copied();
+        let of_node = |&node: &u32| Some([index(node, 0)?, index(node, 1)?, index(node, 2)?]);
         surface.source_nodes.iter().map(of_node).collect()
     }
 

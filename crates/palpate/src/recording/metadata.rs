@@ -1,5 +1,6 @@
 //! Metadata of a recording; stored as JSON in the file.
 
+use super::LARGEST;
 use crate::error::{RecordingError, RecordingPart};
 use crate::surface::{SampleLevel, Surface};
 use alloc::format;
@@ -57,29 +58,67 @@ impl Metadata {
                 self.hold, self.units
             ));
         }
-        let certificate = self.certificate.as_ref();
-        if let Some(certificate) = certificate.filter(|certificate| !certificate.is_finite()) {
-            return fail(format!("its certificate holds numbers that are not finite: {certificate:?}"));
+        let range = |name: &str, value: f64, low: f64, high: f64| {
+            if (low..high).contains(&value) {
+                return Ok(());
+            }
+            fail(format!("{name} is {value:e}, expected a number from {low:e} to below {high:e}"))
+        };
+        for material in &self.materials {
+            let Material { region, young_pa, poisson, density_kg_m3 } = material;
+            let name = |key: &str| format!("materials.{key} of the region {region:?}");
+            range(&name("young_pa"), *young_pa, f64::MIN_POSITIVE, LARGEST)?;
+            range(&name("poisson"), *poisson, -1.0, 0.5)?;
+            range(&name("density_kg_m3"), *density_kg_m3, f64::MIN_POSITIVE, LARGEST)?;
         }
-        Ok(())
+        match self.damping {
+            Damping::Rayleigh { alpha, beta } => {
+                range("damping.alpha", alpha, 0.0, LARGEST)?;
+                range("damping.beta", beta, 0.0, LARGEST)?;
+            }
+            Damping::Ratio(zeta) => range("damping.ratio", zeta, 0.0, LARGEST)?,
+        }
+        if !(1..=2).contains(&self.mesh.order) {
+            return fail(format!("mesh.order is {}, expected 1 or 2", self.mesh.order));
+        }
+        if (self.mesh.fixed_nodes > 0) != (self.support == Support::Fixed) {
+            let (fixed, support) = (self.mesh.fixed_nodes, self.support);
+            return fail(format!(
+                "mesh.fixed_nodes is {fixed} with the support {support:?}, which contradict"
+            ));
+        }
+        match self.certificate.as_ref().and_then(Certificate::outlier) {
+            Some((name, value)) => {
+                fail(format!("certificate.{name} is {value:e}, expected a number below {LARGEST:e}"))
+            }
+            None => Ok(()),
+        }
     }
 }
 
 impl Certificate {
-    /// Whether every number is finite.
-    fn is_finite(&self) -> bool {
+    /// First number that is no number, or beyond all sizes, with its name.
+    fn outlier(&self) -> Option<(&'static str, f64)> {
+        let peaks = self.peak_force_error_max.iter().flat_map(|peak| [peak.held, peak.touched]).flatten();
+        let levels = self.sample_levels.iter().flat_map(|level| [level.spacing_m, level.distance_or_zero()]);
+        let CertificateEvent { step_s, rise_s, duration_s } = self.event;
         [
-            self.force_error_max,
-            self.force_error_median,
-            self.static_compliance_error_max,
-            self.instantaneous_compliance_error_max,
-            self.bandwidth_hz,
-            self.reference_error,
+            ("force_error_max", self.force_error_max),
+            ("force_error_median", self.force_error_median),
+            ("static_compliance_error_max", self.static_compliance_error_max),
+            ("instantaneous_compliance_error_max", self.instantaneous_compliance_error_max),
+            ("bandwidth_hz", self.bandwidth_hz),
+            ("reference_error", self.reference_error),
+            ("worst_patch_radius_m", self.worst_patch_radius_m),
+            ("event.step_s", step_s),
+            ("event.rise_s", rise_s),
+            ("event.duration_s", duration_s),
         ]
         .into_iter()
-        .chain(self.peak_force_error_max.iter().flat_map(|peak| [peak.held, peak.touched]).flatten())
-        .chain(self.sample_levels.iter().flat_map(|level| [level.spacing_m, level.distance_or_zero()]))
-        .all(f64::is_finite)
+        .chain(self.worst_at_m.map(|coordinate| ("worst_at_m", coordinate)))
+        .chain(peaks.map(|error| ("peak_force_error_max", error)))
+        .chain(levels.map(|length| ("sample_levels", length)))
+        .find(|(_, number)| number.is_nan() || number.abs() >= LARGEST)
     }
 }
 

@@ -5,6 +5,7 @@ mod impulse_response;
 mod metadata;
 mod residual;
 mod sample_levels;
+mod validation;
 
 pub use file::FORMAT_VERSION;
 pub use impulse_response::{Column, ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
@@ -15,9 +16,7 @@ pub use metadata::{
 pub(crate) use residual::block_at;
 pub use residual::{NearField, ResidualCompliance};
 
-use crate::error::{Error, RecordingError, RecordingPart};
 use crate::surface::{SampleLevel, Surface};
-use alloc::format;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
@@ -89,20 +88,6 @@ impl GravityResponse {
 /// Upper limit of sizes [SI units], and inverse of the lower limit, so that a step cannot overflow.
 const LARGEST: f64 = 1e18;
 
-/// Whether a tensor is the inertia of a body: its second moment of mass ½·tr(I)·1 − I is positive definite.
-fn is_inertia(tensor: &DMat3) -> bool {
-    let trace = tensor.x_axis.x + tensor.y_axis.y + tensor.z_axis.z;
-    let asymmetry =
-        (*tensor - tensor.transpose()).to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-    let moment = DMat3::from_diagonal(DVec3::splat(0.5 * trace)) - *tensor;
-    let minor = moment.x_axis.x * moment.y_axis.y - moment.x_axis.y * moment.x_axis.y;
-    trace.is_finite()
-        && asymmetry <= 1e-12 * trace
-        && moment.x_axis.x > 0.0
-        && minor > 0.0
-        && moment.determinant() > 0.0
-}
-
 /// Sum of barycentric weights of movable nodes [1] below which a point counts as fixed. Compliance falls with its square: 10⁻⁶ of a
 /// free point's, at a thousandth of an edge.
 const MIN_MOVABLE_WEIGHT: f64 = 1e-3;
@@ -145,80 +130,5 @@ impl Recording {
     /// Inertia [kg·m²] about the centre of mass, in body axes.
     pub fn inertia(&self) -> DMat3 {
         DMat3::from_cols_array_2d(&self.metadata.mass.inertia_kg_m2)
-    }
-
-    /// Check lengths, indices, finite numbers and physical ranges, so that a step cannot fail. A recording from a file has
-    /// been checked.
-    ///
-    /// # Errors
-    /// [`RecordingError::Inconsistent`] with the part and the finding.
-    pub fn validate(&self) -> Result<(), Error> {
-        use RecordingPart::{Gravity, Mass, Modes, Surface};
-        let fail = |part, what| Err(RecordingError::Inconsistent { part, what }.into());
-        let (nodes, modes) = (self.surface.positions.len(), self.modes.len());
-        if nodes == 0 || self.surface.triangles.is_empty() {
-            return fail(Surface, "the surface is empty".into());
-        }
-        if self.surface.source_nodes.len() != nodes {
-            return fail(
-                Surface,
-                format!("{} source nodes for {nodes} nodes", self.surface.source_nodes.len()),
-            );
-        }
-        if let Some(t) = self.surface.triangles.iter().position(|t| t.iter().any(|&n| n as usize >= nodes)) {
-            return fail(Surface, format!("triangle {t} names a node beyond the surface's {nodes} nodes"));
-        }
-        if self.modes.damping_ratios.len() != modes {
-            return fail(
-                Modes,
-                format!("{} damping ratios for {modes} modes", self.modes.damping_ratios.len()),
-            );
-        }
-        if self.modes.mode_shapes.len() != 3 * nodes * modes {
-            return fail(
-                Modes,
-                format!(
-                    "mode shapes hold {} numbers, {nodes} nodes with {modes} modes need {}",
-                    self.modes.mode_shapes.len(),
-                    3 * nodes * modes
-                ),
-            );
-        }
-        let finite = |values: &[f64]| values.iter().all(|v| v.abs() < LARGEST);
-        if !self.surface.positions.iter().all(|p| p.abs().max_element() < LARGEST) {
-            return fail(Surface, "a surface position is not finite".into());
-        }
-        if !finite(&self.modes.mode_shapes) {
-            return fail(Modes, "a mode shape is not finite".into());
-        }
-        let frequencies = &self.modes.angular_frequencies;
-        if !frequencies.iter().all(|w| (1.0 / LARGEST..LARGEST).contains(w)) || !frequencies.is_sorted() {
-            return fail(Modes, "angular frequencies must be positive, finite and ascending".into());
-        }
-        if !self.modes.damping_ratios.iter().all(|z| (0.0..LARGEST).contains(z)) {
-            return fail(Modes, "damping ratios must be finite and not negative".into());
-        }
-        self.residual.validate(nodes)?;
-        let mass = self.mass();
-        if !(1.0 / LARGEST..LARGEST).contains(&mass) {
-            return fail(Mass, format!("mass is {mass:e} kg, expected a positive number"));
-        }
-        if !is_inertia(&self.inertia()) {
-            return fail(Mass, "the inertia tensor is not one of a body: symmetric, positive definite, and no principal value above the sum of the others".into());
-        }
-        self.metadata.validate()?;
-        self.validate_sample_levels()?;
-        match (&self.gravity, self.metadata.support) {
-            (None, Support::Free) => Ok(()),
-            (Some(gravity), Support::Fixed)
-                if gravity.modal_forces.len() == 3 * modes
-                    && gravity.residual_displacements.len() == 9 * nodes
-                    && finite(&gravity.modal_forces)
-                    && finite(&gravity.residual_displacements) =>
-            {
-                Ok(())
-            }
-            _ => fail(Gravity, "the gravity response does not fit the support".into()),
-        }
     }
 }

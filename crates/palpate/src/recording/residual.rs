@@ -5,8 +5,10 @@
 //! is positive definite in space, so by Schur's product theorem the near field is positive
 //! semi-definite too, and its diagonal is exact (Wendland 1995, Adv. Comput. Math. 4, 389).
 
+use super::LARGEST;
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
@@ -87,10 +89,11 @@ impl ResidualCompliance {
         Ok(Self::Whole(blocks))
     }
 
+    /// Check lengths, indices, finite numbers and symmetry.
     pub(super) fn validate(&self, nodes: usize) -> Result<(), RecordingError> {
         let fail = |what| Err(RecordingError::Inconsistent { part: RecordingPart::Residual, what });
-        let values: &[f32] = match self {
-            Self::None => &[],
+        let (name, values): (_, &[f32]) = match self {
+            Self::None => return Ok(()),
             Self::Whole(blocks) => {
                 let needed = 9 * nodes * (nodes + 1) / 2;
                 if blocks.len() != needed {
@@ -99,40 +102,29 @@ impl ResidualCompliance {
                         blocks.len()
                     ));
                 }
-                let is_symmetric = |node: &usize| {
-                    let block = self.block(*node, *node);
-                    block == block.transpose() || block.is_nan()
-                };
-                if let Some(node) = (0..nodes).find(|node| !is_symmetric(node)) {
-                    return fail(format!("residual compliance of surface node {node} is not symmetric"));
-                }
-                blocks
+                ("residual.packed", blocks)
             }
             Self::NearField(near) => {
-                let blocks = near.nodes.len();
-                if near.offsets.len() != nodes + 1
-                    || near.offsets[0] != 0
-                    || near.offsets[nodes] as usize != blocks
-                    || !near.offsets.is_sorted()
-                    || near.blocks.len() != 9 * blocks
-                    || near.nodes.iter().any(|&n| n as usize >= nodes)
-                    || !near.rows().all(|row| row.is_sorted_by(|a, b| a < b))
-                    || !(near.radius.is_finite() && near.radius > 0.0)
-                {
-                    return fail("the residual near field does not fit together".into());
-                }
-                &near.blocks
+                near.validate(nodes).or_else(fail)?;
+                ("residual.blocks", &near.blocks)
             }
         };
-        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-            return fail(format!("residual compliance number {at} is not finite"));
+        if let Some(at) = values.iter().position(|v| !(f64::from(v.abs()) < LARGEST)) {
+            return fail(format!(
+                "{name} holds {:e} m/N at {at}, expected numbers below {LARGEST:e}",
+                values[at]
+            ));
         }
-        let diagonal = (0..nodes).map(|node| self.block(node, node));
-        let negative = |block: &DMat3| (0..3).any(|axis| block.col(axis)[axis] < 0.0);
-        match diagonal.into_iter().position(|block| negative(&block)) {
-            Some(node) => fail(format!("residual compliance of surface node {node} is negative")),
-            None => Ok(()),
+        for node in 0..nodes {
+            let block = self.block(node, node);
+            if block != block.transpose() {
+                return fail(format!("residual compliance of surface node {node} is not symmetric"));
+            }
+            if (0..3).any(|axis| block.col(axis)[axis] < 0.0) {
+                return fail(format!("residual compliance of surface node {node} is negative"));
+            }
         }
+        Ok(())
     }
 }
 
@@ -150,6 +142,54 @@ impl NearField {
 
     fn block(&self, at: usize) -> DMat3 {
         block_at(&self.blocks, at)
+    }
+
+    /// Check lengths and indices, and that every block has its transpose on the other side of the diagonal.
+    fn validate(&self, nodes: usize) -> Result<(), String> {
+        let blocks = self.nodes.len();
+        if !(self.radius > 0.0 && self.radius < LARGEST) {
+            return Err(format!(
+                "residual.radius is {:e} m, expected above 0 and below {LARGEST:e}",
+                self.radius
+            ));
+        }
+        if self.offsets.len() != nodes + 1
+            || self.offsets[0] != 0
+            || self.offsets[nodes] as usize != blocks
+            || !self.offsets.is_sorted()
+        {
+            return Err(format!("residual.offsets do not divide {blocks} blocks between {nodes} nodes"));
+        }
+        if self.blocks.len() != 9 * blocks {
+            return Err(format!(
+                "residual.blocks hold {} numbers, expected {}",
+                self.blocks.len(),
+                9 * blocks
+            ));
+        }
+        if let Some(node) = self.nodes.iter().find(|node| **node as usize >= nodes) {
+            return Err(format!("residual.nodes name node {node}, beyond the surface's {nodes} nodes"));
+        }
+        if let Some(node) = self.rows().position(|row| !row.is_sorted_by(|a, b| a < b)) {
+            return Err(format!("residual.nodes of surface node {node} do not ascend"));
+        }
+        for (i, row) in self.rows().enumerate() {
+            for (at, j) in (self.offsets[i] as usize..).zip(row.iter().map(|&j| j as usize)) {
+                let mirrored = self.rows_of(j).binary_search(&(i as u32));
+                let mirrored = mirrored.ok().map(|position| self.block(self.offsets[j] as usize + position));
+                let own = self.block(at);
+                if !own.is_nan() && mirrored != Some(own.transpose()) {
+                    return Err(format!(
+                        "residual compliance of the surface nodes {i} and {j} is not symmetric"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn rows_of(&self, node: usize) -> &[u32] {
+        &self.nodes[self.offsets[node] as usize..self.offsets[node + 1] as usize]
     }
 
     /// Wendland's function ψ at the ratio s ≥ 0 of distance and radius [1].

@@ -123,6 +123,9 @@ fn check_nodes(level: &SampleLevel, surface_nodes: usize) -> Result<(), String> 
             Some(is_sample) => *is_sample = true,
         }
     }
+    if let Some(at) = level.triangles.iter().position(|[a, b, c]| a == b || b == c || c == a) {
+        return Err(format!("triangle {at} names a node twice"));
+    }
     let mut is_joined = vec![false; surface_nodes];
     for (at, corners) in level.triangles.iter().enumerate() {
         for &node in corners {

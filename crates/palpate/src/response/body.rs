@@ -386,11 +386,17 @@ impl Body {
         self.patch(footprint).map_or(&self.bounds, |patch| &patch.bounds)
     }
 
-    /// Sag of a location beyond the modes under a gravity [m/s², body]; zero for a free body [m, body].
+    /// Sag of a location beyond the modes under a gravity [m/s², body]; zero for a free body [m, body]. That of a contact sample is averaged
+    /// over its patch.
     pub(crate) fn sag(&self, location: &ContactLocation, gravity: DVec3) -> DVec3 {
         let Some(response) = &self.recording.gravity else { return DVec3::ZERO };
-        let corners = self.corners(location).into_iter();
-        corners.map(|(node, weight)| response.residual_displacement(node, gravity) * weight).sum()
+        let of = |(node, weight): (usize, f64)| response.residual_displacement(node, gravity) * weight;
+        if self.samples(location.footprint).is_none() {
+            return self.corners(location).into_iter().map(of).sum();
+        }
+        let mut sum = DVec3::ZERO;
+        self.distribute(location, |node, weight| sum += of((node, weight)));
+        sum
     }
 
     /// Residual compliance between two locations [m/N]; zero between patches of tips and other footprints, which couple by the

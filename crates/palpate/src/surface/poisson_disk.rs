@@ -71,9 +71,10 @@ impl Grid {
     fn near(&self, position: DVec3) -> impl Iterator<Item = u32> {
         let [x, y, z] = self.cell_of(position);
         let offsets = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
-        offsets
-            .flat_map(move |[dx, dy, dz]| self.points.get(&[x + dx, y + dy, z + dz]).into_iter().flatten())
-            .copied()
+        // Cells of positions beyond 2⁶³ cells saturate.
+        let cell =
+            move |[dx, dy, dz]: [i64; 3]| [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)];
+        offsets.flat_map(move |offset| self.points.get(&cell(offset)).into_iter().flatten()).copied()
     }
 }
 
