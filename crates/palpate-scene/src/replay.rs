@@ -105,7 +105,7 @@ pub struct LogReplay {
     pub steps: u64,
     names: SceneNames,
     modes: Vec<DeviceMode>,
-    // The unpacked files must outlive the scene: tables are mapped into memory.
+    // The unpacked files must outlive the scene: tables are read on first use.
     _folder: TempDir,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::attributes::{Compression, Number, TableAttributes, TableContent};
 use crate::object_storage::ObjectStorage;
+use crate::shards::CHECKSUM;
 use glam::DVec3;
 use palpate::Surface;
 use serde_json::{Map, json};
@@ -12,8 +13,10 @@ use zarrs::array::codec::{
     api::{BytesToBytesCodecTraits, CodecSpecificOptions},
 };
 use zarrs::array::{
-    Array, ArrayBuilder, CodecOptions, DataType, Element, ElementOwned, IntoArrayBytes, data_type,
+    Array, ArrayBuilder, ArrayShardedExt, CodecOptions, DataType, Element, ElementOwned, IntoArrayBytes,
+    data_type,
 };
+use zarrs::storage::ReadableStorageTraits;
 
 /// Path of the table in the store.
 const TABLE: &str = "/impulse_response";
@@ -144,14 +147,61 @@ where
     Ok(())
 }
 
-/// Reads an array; the error names it.
-fn read_array<T: ElementOwned>(storage: &Arc<ObjectStorage>, name: &str) -> Result<Vec<T>, String>
+/// Reads an array; the error names it. It was written as one chunk without compression, whose size tells what there is to allocate.
+fn read_array<T: ElementOwned>(
+    storage: &Arc<ObjectStorage>,
+    name: &str,
+    (number, columns): (DataType, &[u64]),
+) -> Result<Vec<T>, String>
 where
     Vec<T>: zarrs::array::FromArrayBytes,
 {
     let said = |e: &dyn std::fmt::Display| format!("{name}: {e}");
     let array = Array::open(storage.clone(), &format!("/{name}")).map_err(|e| said(&e))?;
+    let (shape, place) = (array.shape(), vec![0; array.shape().len()]);
+    if *array.data_type() != number || shape.len() != 1 + columns.len() || shape[1..] != *columns {
+        let found = (array.data_type(), shape);
+        return Err(said(&format!(
+            "it has the type and shape {found:?}, expected {number:?} in rows of {columns:?}"
+        )));
+    }
+    let chunk = array.chunk_shape_usize(&place).map_err(|e| said(&e))?;
+    if !chunk.iter().zip(shape).all(|(part, whole)| *part as u64 == *whole) {
+        return Err(said(&format!("its chunks have the shape {chunk:?}, expected {shape:?}")));
+    }
+    let size = size_of::<T>() as u64;
+    let bytes = shape.iter().try_fold(size, |bytes, extent| bytes.checked_mul(*extent));
+    let stored = storage.size_key(&array.chunk_key(&place)).map_err(|e| said(&e))?;
+    match (bytes.and_then(|bytes| bytes.checked_add(CHECKSUM)), stored) {
+        (Some(expected), Some(stored)) if expected == stored => {}
+        (_, Some(stored)) => return Err(said(&format!("{stored} bytes don't hold the shape {shape:?}"))),
+        (_, None) => return Err(said(&"its numbers are missing")),
+    }
     array.retrieve_array_subset::<Vec<T>>(&array.subset_all()).map_err(|e| said(&e))
+}
+
+/// Check that the table is divided into shards and columns as its attributes say.
+fn check_division(array: &Array<ObjectStorage>, columns_per_shard: u64) -> Result<(), String> {
+    let &[_, samples, observed] = array.shape() else {
+        return Err(format!("its table has {} dimensions, expected 3", array.shape().len()));
+    };
+    let expected = [columns_per_shard, samples, observed];
+    let numbers =
+        expected.iter().try_fold(size_of::<f64>() as u64, |bytes, extent| bytes.checked_mul(*extent));
+    if expected.contains(&0) || numbers.is_none_or(|bytes| bytes > isize::MAX as u64) {
+        return Err(format!(
+            "its shards have the shape {expected:?}, expected numbers above 0 that fit into memory"
+        ));
+    }
+    let chunk = array.chunk_shape_usize(&[0, 0, 0]).map_err(|e| e.to_string())?;
+    let column = array.subchunk_shape().map(|shape| shape.iter().map(|extent| extent.get()).collect());
+    let is_divided = chunk.iter().map(|extent| *extent as u64).eq(expected);
+    if !is_divided || column != Some(vec![1, samples, observed]) {
+        return Err(format!(
+            "its shards have the shape {chunk:?} and columns {column:?}, expected {expected:?}"
+        ));
+    }
+    Ok(())
 }
 
 /// Reads the content of a store without the numbers of the table.
@@ -165,31 +215,29 @@ pub(crate) fn read_content(
         t if *t == data_type::float64() => Number::F64,
         other => return Err(format!("its numbers are {other:?}, expected float32 or float64")),
     };
-    let shape = array.shape().to_vec();
-    let &[touchable, samples, observed] = shape.as_slice() else {
-        return Err(format!("its table has {} dimensions, expected 3", shape.len()));
-    };
+    check_division(array, attributes.columns_per_shard)?;
+    let &[touchable, samples, observed] = array.shape() else { return Err("its table has no shape".into()) };
+    let whole = (data_type::uint32(), &[][..]);
+    let [corner, vector] = [data_type::uint32(), data_type::float64()].map(|number| (number, &[3][..]));
     let [touchables, observeds, rest, places, corners, sources, gravity] = SIDE_ARRAYS;
-    let touchable_dofs: Vec<u32> = read_array(storage, touchables)?;
-    let observed_dofs: Vec<u32> = read_array(storage, observeds)?;
+    let touchable_dofs: Vec<u32> = read_array(storage, touchables, whole.clone())?;
+    let observed_dofs: Vec<u32> = read_array(storage, observeds, whole.clone())?;
     if touchable_dofs.len() as u64 != touchable || observed_dofs.len() as u64 != observed {
         return Err("its table and its lists of degrees of freedom don't fit together".into());
     }
-    let rest: Vec<f64> = read_array(storage, rest)?;
-    let positions: Vec<f64> = read_array(storage, places)?;
-    let triangles: Vec<u32> = read_array(storage, corners)?;
+    let rest: Vec<f64> = read_array(storage, rest, vector.clone())?;
+    let positions: Vec<f64> = read_array(storage, places, vector)?;
+    let triangles: Vec<u32> = read_array(storage, corners, corner)?;
     let surface = Surface {
         positions: positions.chunks_exact(3).map(DVec3::from_slice).collect(),
         triangles: triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
-        source_nodes: read_array(storage, sources)?,
+        source_nodes: read_array(storage, sources, whole)?,
     };
     let fixed = attributes.recording.support == palpate::Support::Fixed;
-    let gravity: Option<Vec<f64>> = if fixed { Some(read_array(storage, gravity)?) } else { None };
+    let response = (data_type::float64(), &[samples, observed][..]);
+    let gravity: Option<Vec<f64>> = if fixed { Some(read_array(storage, gravity, response)?) } else { None };
     if gravity.as_ref().is_some_and(|g| g.len() as u64 != 3 * samples * observed) {
         return Err("its gravity response does not fit its table".into());
-    }
-    if attributes.columns_per_shard == 0 {
-        return Err("its shards hold no columns".into());
     }
     Ok(TableContent {
         attributes,

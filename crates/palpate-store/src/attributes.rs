@@ -21,7 +21,7 @@ pub enum Number {
 pub enum Compression {
     /// Zstandard after byte shuffling (Blosc): the smaller store.
     Zstd,
-    /// None: a run maps the columns from the file without decompression.
+    /// None: a run reads the columns as they lie.
     None,
 }
 

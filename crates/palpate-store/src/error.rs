@@ -71,7 +71,7 @@ pub enum StoreError {
         /// Number of all shards.
         shards: usize,
     },
-    /// The store is in object storage, and only a folder can be mapped into memory.
+    /// The store is in object storage, and only a folder is read while a scene runs.
     #[error("the store {location} lies in object storage; copy it into a folder of this machine to run it")]
     Remote {
         /// Location of the store.

@@ -17,11 +17,12 @@
 
 mod arrays;
 mod attributes;
+mod columns;
 mod error;
 mod load;
 mod location;
-mod mapped;
 mod object_storage;
+mod shards;
 mod table_store;
 
 pub use attributes::{Compression, Number, STORE_VERSION, TableAttributes, TableContent};

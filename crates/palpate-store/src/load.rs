@@ -1,13 +1,13 @@
 //! Loading of a finished store for a scene.
 
 use crate::attributes::TableContent;
+use crate::columns::StoredColumns;
 use crate::error::StoreError;
-use crate::mapped::MappedColumns;
 use crate::table_store::{Part, TableStore};
 use palpate::{GravityResponse, ImpulseResponse, ModalBasis, Recording, ResidualCompliance};
 
 impl TableStore {
-    /// Loads the body and its table for a scene: shards are mapped into memory, columns are read on first use.
+    /// Loads the body and its table for a scene: columns are read into memory on first use.
     ///
     /// # Errors
     /// [`StoreError`] when shards are missing, the store is in object storage, or its content is invalid.
@@ -27,7 +27,14 @@ impl TableStore {
         let recording = body(self.content());
         recording.validate().map_err(|e| invalid(e.to_string()))?;
         let content = self.content().clone();
-        let columns = MappedColumns::new(self)?;
+        let (step_s, gravity) = (content.attributes.step_s, content.gravity.as_deref().unwrap_or_default());
+        if !(step_s > 0.0 && step_s <= 1.0) {
+            return Err(invalid(format!("its step is {step_s} s, expected above 0 and at most 1")));
+        }
+        if let Some(number) = gravity.iter().find(|number| !number.is_finite()) {
+            return Err(invalid(format!("its gravity response holds {number}, expected finite numbers")));
+        }
+        let columns = StoredColumns::new(self)?;
         let table = ImpulseResponse {
             step_s: content.attributes.step_s,
             samples: content.samples,

@@ -6,7 +6,7 @@ use object_store::path::Path;
 use object_store::{ObjectStore, ObjectStoreExt};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
-use zarrs::storage::byte_range::ByteRangeIterator;
+use zarrs::storage::byte_range::{ByteRange, ByteRangeIterator};
 use zarrs::storage::{
     Bytes, MaybeBytes, MaybeBytesIterator, OffsetBytesIterator, ReadableStorageTraits, StorageError,
     StoreKey, StorePrefix, WritableStorageTraits, store_set_partial_many,
@@ -89,7 +89,19 @@ impl ReadableStorageTraits for ObjectStorage {
     ) -> Result<MaybeBytesIterator<'a>, StorageError> {
         let Some(size) = self.size_key(key)? else { return Ok(None) };
         let path = self.path(key.as_str());
-        let ranges: Vec<_> = byte_ranges.map(|range| range.start(size)..range.end(size)).collect();
+        let within = |range: ByteRange| {
+            let (start, end) = match range {
+                ByteRange::FromStart(start, None) => (start, Some(size)),
+                ByteRange::FromStart(start, Some(length)) => (start, start.checked_add(length)),
+                ByteRange::Suffix(length) => (size.checked_sub(length)?, Some(size)),
+            };
+            end.filter(|end| start <= *end && *end <= size).map(|end| start..end)
+        };
+        let ranges: Option<Vec<_>> = byte_ranges.map(within).collect();
+        let Some(ranges) = ranges else {
+            let what = format!("{}/{key} is cut short: it has {size} bytes", self.name);
+            return Err(StorageError::Other(what));
+        };
         let read = self.runtime.block_on(self.store.get_ranges(&path, &ranges));
         let parts = read.map_err(|error| self.failed("read", key, &error))?;
         Ok(Some(Box::new(parts.into_iter().map(Ok))))

@@ -138,7 +138,8 @@ impl TableStore {
     /// Columns of a shard.
     pub fn columns_of(&self, shard: usize) -> Range<usize> {
         let width = self.columns_per_shard();
-        shard * width..((shard + 1) * width).min(self.content.touchable_dofs.len())
+        let end = self.content.touchable_dofs.len();
+        shard.saturating_mul(width).min(end)..(shard + 1).saturating_mul(width).min(end)
     }
 
     /// Size of each shard [bytes]; none for a missing shard.
@@ -221,34 +222,14 @@ impl TableStore {
         Ok(())
     }
 
-    /// Reads a whole shard and checks its checksums and that all numbers are finite.
-    ///
-    /// # Errors
-    /// [`StoreError::Damaged`].
-    pub fn check_shard(&self, shard: usize) -> Result<(), StoreError> {
-        let place = [shard as u64, 0, 0];
-        let used = self.columns_of(shard).len() * self.content.column_length();
-        let whole = match self.content.number {
-            Number::F32 => self
-                .array
-                .retrieve_chunk::<Vec<f32>>(&place)
-                .map(|values| values[..used.min(values.len())].iter().all(|v| v.is_finite())),
-            Number::F64 => self
-                .array
-                .retrieve_chunk::<Vec<f64>>(&place)
-                .map(|values| values[..used.min(values.len())].iter().all(|v| v.is_finite())),
-        };
-        match whole {
-            Ok(true) => Ok(()),
-            Ok(false) => Err(self.damaged(shard, "columns are missing in it or hold no numbers")),
-            Err(error) => Err(self.damaged(shard, &error.to_string())),
-        }
-    }
-
     /// Error of a damaged shard.
     pub(crate) fn damaged(&self, shard: usize, reason: &str) -> StoreError {
         let key = format!("{}/impulse_response/c/{shard}/0/0", self.location);
         StoreError::Damaged { shard, key, reason: reason.into() }
+    }
+
+    pub(crate) fn storage(&self) -> &ObjectStorage {
+        &self.storage
     }
 
     /// Zarr array of the table.

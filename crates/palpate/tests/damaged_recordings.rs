@@ -198,7 +198,8 @@ fn refusals_name_the_field_the_finding_and_what_is_expected() {
         change(&mut recording);
         recording.validate().expect_err("damaged").to_string()
     };
-    let cases: [(&dyn Fn(&mut Recording), &Arc<Recording>, &str); 22] = [
+    type Case<'a> = (&'a dyn Fn(&mut Recording), &'a Arc<Recording>, &'a str);
+    let cases: [Case; 22] = [
         (
             &|r| r.surface.positions[2].y = f64::NAN,
             &free_block(),

@@ -32,7 +32,7 @@ pub enum Column<'a> {
     F64(&'a [u8]),
 }
 
-/// Storage of a table's columns: in memory, or in a mapped file.
+/// Storage of a table's columns: in memory, or in a store that is read on first use.
 pub trait ImpulseColumns: Debug + Send + Sync {
     /// Length of every column.
     fn column_length(&self) -> usize;

@@ -109,7 +109,7 @@ impl ResidualCompliance {
                 ("residual.blocks", &near.blocks)
             }
         };
-        if let Some(at) = values.iter().position(|v| !(f64::from(v.abs()) < LARGEST)) {
+        if let Some(at) = values.iter().position(|v| v.is_nan() || f64::from(v.abs()) >= LARGEST) {
             return fail(format!(
                 "{name} holds {:e} m/N at {at}, expected numbers below {LARGEST:e}",
                 values[at]
