@@ -177,3 +177,56 @@ fn a_missing_file_is_an_io_error_with_its_path() {
     assert_eq!((error.kind, error.file.as_deref(), error.line), (SceneErrorKind::Io, Some(path), None));
     assert!(error.to_string().starts_with("cannot read the scene no/such/scene.toml: "), "{error}");
 }
+
+/// Places of the numbers in a scene's text.
+fn numbers(text: &str) -> Vec<std::ops::Range<usize>> {
+    let bytes = text.as_bytes();
+    let (mut found, mut at, mut is_text) = (Vec::new(), 0, false);
+    while at < bytes.len() {
+        is_text ^= bytes[at] == b'"';
+        let begins = bytes[at].is_ascii_digit() || bytes[at] == b'-' && bytes[at + 1].is_ascii_digit();
+        let before = at.checked_sub(1).map_or(b' ', |before| bytes[before]);
+        if is_text || !begins || !b" [".contains(&before) {
+            at += 1;
+            continue;
+        }
+        let length = bytes[at..].iter().take_while(|byte| b"-+.0123456789e".contains(*byte)).count();
+        found.push(at..at + length);
+        at += length;
+    }
+    found
+}
+
+#[test]
+fn a_number_that_is_none_or_beyond_all_sizes_is_refused_in_every_key() {
+    let all = numbers(OLD_SCENE);
+    assert!(all.len() > 50, "{}", all.len());
+    for place in all {
+        for other in ["nan", "inf", "-inf", "1e300", "-1e300"] {
+            let text = format!("{}{other}{}", &OLD_SCENE[..place.start], &OLD_SCENE[place.end..]);
+            let line = 1 + OLD_SCENE[..place.start].matches('\n').count();
+            let error = read(&text).err().unwrap_or_else(|| panic!("refused: line {line}: {other}"));
+            assert!(error.line.is_some(), "{error}");
+        }
+    }
+}
+
+#[test]
+fn a_path_that_is_no_regular_file_or_in_no_order_is_refused_with_its_line() {
+    let device = "[[device]]\nname = \"a\"\nmode = \"touch\"\n";
+    let of_folder = read(&format!("{OBJECT}{device}path = {{ file = \".\" }}")).err().expect("a refusal");
+    let text = of_folder.to_string();
+    assert!(text.contains("line 7: cannot read the path ") && text.ends_with(": it is not a file"), "{text}");
+    for (rows, expected) in [
+        ("0,0,0,nan\n", "line 1"),
+        ("0,0,inf,0\n", "line 1"),
+        ("nan,0,0,0\n", "line 1"),
+        ("0,0,0,0\n2,0,0,0\n1,0,0,0\n", "line 3"),
+        ("0,0,0,0\n0,0,0,0\n", "line 2"),
+        ("0,0,0,2e6\n", "line 1"),
+    ] {
+        let refused = palpate_haptics::MotionPath::parse(rows, palpate_haptics::Columns::Position);
+        let text = refused.expect_err(rows).to_string();
+        assert!(text.contains(expected), "{rows:?}: {text}");
+    }
+}

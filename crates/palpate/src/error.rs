@@ -167,8 +167,14 @@ pub enum ModelError {
         node: u32,
     },
     /// Surface point whose corners are all fixed.
-    #[error("the point lies on fixed nodes: no hand can move it")]
+    #[error("the point lies on fixed nodes: no hand can move it; hold one that is farther from them")]
     FixedPoint,
+    /// Point that an object does not have, or where no force may enter.
+    #[error("there is no point in triangle {triangle} with such weights where a force may enter")]
+    NoSuchPoint {
+        /// Index of the triangle.
+        triangle: u32,
+    },
     /// Object that cannot be put into the scene.
     #[error("object {object}: {error}")]
     Object {

@@ -260,6 +260,30 @@ impl Model {
             object.body.recording.surface.contains(&grasp.point) && object.response.accepts(&grasp.point)
         })
     }
+
+    /// Check that a hand can hold a point: it exists, forces may enter there, and not all of its nodes are fixed. A step rejects other
+    /// grasps.
+    ///
+    /// # Errors
+    /// [`ModelError::Object`] of [`ModelError::FixedPoint`] or [`ModelError::NoSuchPoint`], with the number of the object.
+    pub fn check_grasp(&self, grasp: &Grasp) -> Result<(), Error> {
+        let fail = |error| {
+            let error = Box::new(error);
+            Err(ModelError::Object { object: grasp.object, error }.into())
+        };
+        if !self.accepts(grasp) {
+            return fail(ModelError::NoSuchPoint { triangle: grasp.point.triangle });
+        }
+        if self.can_hold(grasp) { Ok(()) } else { fail(ModelError::FixedPoint) }
+    }
+
+    /// Whether a hand can hold the point of a grasp: it exists, forces may enter there, and it can move.
+    ///
+    /// # Real time
+    pub(crate) fn can_hold(&self, grasp: &Grasp) -> bool {
+        let can_move = |object: &Object| object.response.is_movable(&object.body, &grasp.point);
+        self.accepts(grasp) && self.objects.get(grasp.object).is_some_and(can_move)
+    }
 }
 
 impl ModelParameters {

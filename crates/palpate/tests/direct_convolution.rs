@@ -359,3 +359,33 @@ fn a_table_of_a_fixed_body_knows_constant_gravity_alone_and_starts_undeformed() 
         Model::new(ModelParameters::for_reference(), vec![object]).expect_err("it starts undeformed");
     assert_eq!(refused.to_string(), "object 0: uses a table, which starts undeformed: use the modal form");
 }
+
+#[test]
+fn a_point_whose_free_corner_has_no_weight_to_speak_of_is_refused_as_fixed() {
+    let block = fixed_block();
+    let corner = |triangle: u32, at: usize| SurfacePoint {
+        triangle,
+        weights: std::array::from_fn(|k| f64::from(u8::from(k == at))),
+    };
+    let moves = |triangle: u32, at: usize| block.is_movable(&corner(triangle, at));
+    let triangles = 0..block.surface.triangles.len() as u32;
+    // One corner of three moves; it has the weight that round-off leaves.
+    let (triangle, free) = triangles
+        .flat_map(|triangle| (0..3).map(move |at| (triangle, at)))
+        .find(|&(triangle, at)| moves(triangle, at) && (1..3).all(|k| !moves(triangle, (at + k) % 3)))
+        .expect("a triangle at the fixed end");
+    let mut weights = [0.5; 3];
+    weights[free] = 1e-16;
+    let point = SurfacePoint { triangle, weights };
+    let table = Arc::new(table(&block, 4, H));
+    let refusal = table.prepare(&block.surface, &point).map_err(|error| error.to_string());
+    let expected = "the point lies on fixed nodes: no hand can move it; hold one that is farther from them";
+    assert_eq!(refusal, Err(expected.into()));
+    let parameters =
+        ModelParameters { devices: vec![DeviceParameters::default()], ..ModelParameters::for_reference() };
+    let (model, mut state) = scene(&block, ResponseForm::Fir(table), parameters);
+    let position = block.surface.rest_position(&point) + DVec3::Y * 0.01;
+    let output = step(&model, &mut state, &holding(position, Grasp { object: 0, point }));
+    assert_eq!((output.status.rejected_inputs, output.devices[0].force_on_hand), (1, DVec3::ZERO));
+    assert_eq!(output.energy.stored(), 0.0);
+}

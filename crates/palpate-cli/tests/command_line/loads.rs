@@ -136,7 +136,7 @@ fn keys_that_do_not_fit_a_force_are_refused() {
     );
     assert_eq!(
         fail("0.05, 0.0, 0.0", "-0.05, 0.0, 0.0"),
-        "scene.toml: line 8: the point of \"load\" lies on fixed nodes of \"beam\": no hand can move it"
+        "scene.toml: line 8: the point of \"load\" lies on fixed nodes of \"beam\": no hand can move it; hold one that is farther from them"
     );
     assert_eq!(
         fail("\"force\"", "\"pull\""),

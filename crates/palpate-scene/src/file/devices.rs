@@ -251,7 +251,7 @@ fn read_grasp(
                 attach.point.span(),
                 SceneErrorKind::Grasp,
                 "point",
-                format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it"),
+                format!("the point of {name:?} lies on fixed nodes of {wanted:?}: no hand can move it; hold one that is farther from them"),
             );
         }
         ResponseForm::Modal => {}

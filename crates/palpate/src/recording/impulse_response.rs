@@ -4,6 +4,7 @@
 //! force was **held for one step** on a touchable one, elastic part only. A column holds all samples of one
 //! touchable degree of freedom, sample after sample, each with all observed ones, little-endian.
 
+use super::carry_movable_weight;
 use crate::error::{Error, ModelError};
 use crate::surface::{Surface, SurfacePoint};
 use alloc::boxed::Box;
@@ -165,18 +166,34 @@ impl ImpulseResponse {
     pub fn prepare(&self, surface: &Surface, point: &SurfacePoint) -> Result<(), Error> {
         let touchable = Self::dof_indices(surface, &self.touchable_dofs);
         let observed = Self::dof_indices(surface, &self.observed_dofs);
-        let mut moves = false;
         for (node, _) in surface.corners(point).into_iter().filter(|(_, weight)| *weight != 0.0) {
-            let (Some(columns), Some(rows)) = (touchable[node], observed[node]) else {
+            let Some(columns) = touchable[node].filter(|_| observed[node].is_some()) else {
                 return Err(ModelError::NotTouchable { node: surface.source_nodes[node] }.into());
             };
-            for (column, row) in columns.into_iter().zip(rows) {
+            for column in columns {
                 let prepared = self.columns.prepare(column as usize);
                 prepared.map_err(|what| ModelError::ImpulseResponse { what })?;
-                moves |= self.columns.column(column as usize).at(row as usize) > 0.0;
             }
         }
-        if moves { Ok(()) } else { Err(ModelError::FixedPoint.into()) }
+        let is_movable = self.moves(surface.corners(point), &touchable, &observed);
+        if is_movable { Ok(()) } else { Err(ModelError::FixedPoint.into()) }
+    }
+
+    /// Whether corners with barycentric weights can move, by R[0] of their nodes, with the indices of all nodes.
+    ///
+    /// # Real time
+    pub(crate) fn moves(
+        &self,
+        corners: [(usize, f64); 3],
+        touchable: &[Option<[u32; 3]>],
+        observed: &[Option<[u32; 3]>],
+    ) -> bool {
+        let used = corners.map(|(node, weight)| (node, if touchable[node].is_some() { weight } else { 0.0 }));
+        carry_movable_weight(used, |node| {
+            let (Some(columns), Some(rows)) = (touchable[node], observed[node]) else { return false };
+            let mut pairs = columns.into_iter().zip(rows);
+            pairs.any(|(column, row)| self.columns.column(column as usize).at(row as usize) > 0.0)
+        })
     }
 
     /// Check lengths and degrees of freedom, so that a step cannot fail.

@@ -92,6 +92,12 @@ const LARGEST: f64 = 1e18;
 /// free point's, at a thousandth of an edge.
 const MIN_MOVABLE_WEIGHT: f64 = 1e-3;
 
+/// Whether corners with barycentric weights can move: those of nodes that move carry more than a thousandth.
+fn carry_movable_weight(corners: [(usize, f64); 3], moves: impl Fn(usize) -> bool) -> bool {
+    let movable: f64 = corners.into_iter().filter(|&(node, _)| moves(node)).map(|(_, weight)| weight).sum();
+    movable > MIN_MOVABLE_WEIGHT
+}
+
 impl Recording {
     /// Add the modal forces of a gravity [m/s², body] on a body with fixed nodes [N/√kg]; a free body has none.
     pub(crate) fn add_gravity_load(&self, gravity: DVec3, forces: &mut [f64]) {
@@ -104,6 +110,8 @@ impl Recording {
     }
 
     /// Whether a surface point can move: its corners are not all fixed nodes, but for a thousandth of their weight.
+    ///
+    /// # Real time
     pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
         let moves = |node: usize| {
             (0..3).any(|axis| {
@@ -111,9 +119,7 @@ impl Recording {
                     || self.residual.block(node, node).col(axis)[axis] != 0.0
             })
         };
-        let corners = self.surface.corners(point).into_iter();
-        let movable: f64 = corners.filter(|&(node, _)| moves(node)).map(|(_, weight)| weight).sum();
-        movable > MIN_MOVABLE_WEIGHT
+        carry_movable_weight(self.surface.corners(point), moves)
     }
 
     /// Relaxation time of the residual compliance [s], see [`Damping::residual_relaxation_s`].

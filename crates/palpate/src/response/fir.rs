@@ -97,6 +97,13 @@ impl Fir {
         corners.iter().all(|&(node, weight)| weight == 0.0 || self.touchable[node].is_some())
     }
 
+    /// Whether a surface point that forces may enter at can move.
+    ///
+    /// # Real time
+    pub(crate) fn is_movable(&self, point: &SurfacePoint) -> bool {
+        self.table.moves(self.recording.surface.corners(point), &self.touchable, &self.observed)
+    }
+
     /// J_a·R[sample]·J_bᵀ between two surface points, row by row [m/N]; R_cc[0] of equation (9) for sample 0.
     ///
     /// # Real time

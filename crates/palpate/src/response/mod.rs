@@ -107,6 +107,16 @@ impl Response {
         }
     }
 
+    /// Whether a surface point that a force may act on can move.
+    ///
+    /// # Real time
+    pub(crate) fn is_movable(&self, body: &Body, point: &SurfacePoint) -> bool {
+        match self {
+            Self::Modal(_) => body.recording.is_movable(point),
+            Self::Fir(fir) => fir.is_movable(point),
+        }
+    }
+
     /// Precompute R[0] between all surface nodes and between contact samples, up to a number of nodes.
     /// `others` are earlier objects: those of the same recording share theirs.
     pub(crate) fn precompute_nodal_compliance<'r>(

@@ -178,7 +178,7 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
     let device_input = input.devices.get(device)?;
     let is_allowed = match &device_input.mode {
         DeviceMode::Inactive | DeviceMode::Suspended => false,
-        DeviceMode::Held(grasp) => model.accepts(grasp),
+        DeviceMode::Held(grasp) => model.can_hold(grasp),
         DeviceMode::Touch => true,
         DeviceMode::Force(AppliedForce { grasp, force }) => model.accepts(grasp) && force.is_finite(),
     };
