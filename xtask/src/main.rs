@@ -4,6 +4,7 @@
 
 mod bare;
 mod dependencies;
+mod fuzz;
 mod machine;
 mod process;
 mod tests;
@@ -83,6 +84,15 @@ const CHORES: &[Chore] = &[
         summary: "build the runtime for a target without an operating system (no_std)",
         flags: &[],
         run: |_| bare::build(),
+    },
+    Chore {
+        name: "fuzz",
+        summary: "run the readers of files on random and damaged input, with a nightly toolchain and cargo-fuzz",
+        flags: &[
+            ("--target", fuzz::TARGETS, "one reader; all without"),
+            ("--seconds", fuzz::SECONDS, "time for each; 60 without"),
+        ],
+        run: |flags| fuzz::run_targets(flags.value("--target"), flags.value("--seconds")),
     },
 ];
 

@@ -5,6 +5,7 @@
 //! L·B·Lᵀ (pivots of size one and two) counts the eigenvalues of the pencil below −s (Sylvester).
 
 use crate::assembly::Assembly;
+use crate::kernels::SEQUENTIAL;
 use crate::solve_error::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::matmul::matmul;
@@ -37,10 +38,6 @@ pub struct Factor {
 
 /// Number of nodes from which nested dissection reduces fill-in.
 const NESTED_DISSECTION_FROM: usize = 64;
-
-fn parallel() -> Par {
-    Par::rayon(0)
-}
 
 impl Pattern {
     /// Symbolic factorisation of a body.
@@ -85,7 +82,7 @@ impl Pattern {
     ) -> Result<Factor, SolveError> {
         let matrix = lower_triangle(assembly, constrained, shift);
         let mut values = vec![0.0; self.symbolic.len_val()];
-        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
+        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(SEQUENTIAL, Default::default());
         let mut memory = MemBuffer::new(scratch);
         self.symbolic
             .factorize_numeric_llt::<f64>(
@@ -93,7 +90,7 @@ impl Pattern {
                 matrix.as_ref(),
                 Side::Lower,
                 Default::default(),
-                parallel(),
+                SEQUENTIAL,
                 MemStack::new(&mut memory),
                 Default::default(),
             )
@@ -109,7 +106,7 @@ impl Pattern {
         let mut values = vec![0.0; self.symbolic.len_val()];
         let (mut subdiagonal, mut forward, mut inverse) = (vec![0.0; n], vec![0_usize; n], vec![0_usize; n]);
         let scratch =
-            self.symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(parallel(), Default::default());
+            self.symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(SEQUENTIAL, Default::default());
         let mut memory = MemBuffer::new(scratch);
         self.symbolic.factorize_numeric_intranode_lblt::<f64>(
             &mut values,
@@ -118,7 +115,7 @@ impl Pattern {
             &mut inverse,
             matrix.as_ref(),
             Side::Lower,
-            parallel(),
+            SEQUENTIAL,
             MemStack::new(&mut memory),
             Default::default(),
         );

@@ -18,6 +18,7 @@ mod certificate;
 mod discretisation;
 mod element;
 mod factor;
+mod kernels;
 mod krylov;
 mod material;
 mod memory;

@@ -8,6 +8,7 @@
 //! all modes below s; if one is missing, the basis is extended by a new random block.
 //! References: Golub & Underwood 1977 (block Lanczos); Grimes, Lewis & Simon 1994, SIAM J. Matrix Anal. 15, 228.
 
+use crate::kernels::{SEQUENTIAL, product};
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
 use crate::system::System;
@@ -143,7 +144,7 @@ fn krylov(
         if counted == gap {
             return Ok(ElasticModes {
                 squares: ritz.squares[..requested].to_vec(),
-                shapes: &basis.columns * ritz.vectors.subcols(0, requested),
+                shapes: product(basis.columns.as_ref(), ritz.vectors.subcols(0, requested)),
             });
         }
         extensions += 1;
@@ -185,8 +186,8 @@ impl Basis {
     fn orthogonalise(&self, system: &System, mut block: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
         let mut coefficients = Mat::zeros(self.len(), block.ncols());
         for _ in 0..2 {
-            let share = self.columns.transpose() * system.mass_times(block.as_ref());
-            block -= &self.columns * &share;
+            let share = product(self.columns.transpose(), system.mass_times(block.as_ref()).as_ref());
+            block -= product(self.columns.as_ref(), share.as_ref());
             coefficients += share;
         }
         (block, coefficients)
@@ -253,7 +254,7 @@ fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
         faer::linalg::triangular_solve::solve_lower_triangular_in_place(
             llt.L(),
             transposed.as_mut(),
-            faer::Par::rayon(0),
+            SEQUENTIAL,
         );
         *block = transposed.transpose().to_owned();
     }
@@ -311,11 +312,7 @@ pub fn all_modes(
     let failed = |e: &dyn std::fmt::Debug| SolveError::DenseEigenproblem(format!("{e:?}"));
     let llt = m.llt(Side::Lower).map_err(|e| failed(&e))?;
     let lower_solve = |x: &mut Mat<f64>| {
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-            llt.L(),
-            x.as_mut(),
-            faer::Par::rayon(0),
-        );
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(llt.L(), x.as_mut(), SEQUENTIAL);
     };
     lower_solve(&mut k);
     let mut k = k.transpose().to_owned();
@@ -328,7 +325,7 @@ pub fn all_modes(
     faer::linalg::triangular_solve::solve_upper_triangular_in_place(
         llt.L().transpose(),
         vectors.as_mut(),
-        faer::Par::rayon(0),
+        SEQUENTIAL,
     );
     let mut shapes = Mat::zeros(dofs, requested);
     for (j, (at, &dof)) in (0..requested).flat_map(|j| free.iter().enumerate().map(move |f| (j, f))) {

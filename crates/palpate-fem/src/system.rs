@@ -17,6 +17,7 @@
 use crate::assembly::{Assembly, SystemMatrix};
 use crate::discretisation::Discretisation;
 use crate::factor::{Factor, Pattern};
+use crate::kernels::use_sequential_kernels;
 use crate::memory::check_memory;
 use crate::solve_error::SolveError;
 use faer::{Mat, MatRef};
@@ -55,6 +56,7 @@ impl System {
         assembly: Assembly,
         fixed_nodes: Vec<u32>,
     ) -> Result<Self, SolveError> {
+        use_sequential_kernels();
         let mass = mass_properties(&discretisation, &assembly);
         let shapes = rigid_shapes(&discretisation, &mass);
         let mut fixed = vec![false; discretisation.dofs()];

@@ -21,6 +21,30 @@ fn the_same_input_gives_the_same_bytes() {
 }
 
 #[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let cube = block([0.1; 3], [6, 6, 6]);
+    let ball = ball_mesh(0.05, 4).expect("a good ball");
+    // Degenerate modes by symmetry: up to three of the cube, seven of the ball; and the dense route.
+    let bodies = [
+        ("cube", &cube, parameters(ElementOrder::Linear, 60)),
+        ("cube of order 2", &cube, parameters(ElementOrder::Quadratic, 40)),
+        ("ball of order 2", &ball, parameters(ElementOrder::Quadratic, 40)),
+        ("coarse ball", &ball_mesh(0.05, 2).expect("a good ball"), parameters(ElementOrder::Linear, 60)),
+    ];
+    for (name, mesh, parameters) in &bodies {
+        let bytes = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let body = pool.install(|| recorded((*mesh).clone(), parameters));
+            body.recording.to_bytes().expect("a good recording")
+        };
+        let one = bytes(1);
+        for threads in [2, 4] {
+            assert!(one == bytes(threads), "{name} on {threads} threads");
+        }
+    }
+}
+
+#[test]
 fn mass_centre_and_inertia_of_a_box_are_the_closed_forms() {
     const SCALE: f64 = 0.5;
     for order in [ElementOrder::Linear, ElementOrder::Quadratic] {
