@@ -5,7 +5,9 @@
 
 mod commands;
 mod failure;
+mod growing_log;
 mod interrupt;
+mod log_kind;
 mod progress;
 mod terminal;
 
@@ -35,6 +37,7 @@ enum Command {
     Run(commands::run::Arguments),
     Serve(commands::serve::Arguments),
     Replay(commands::replay::Arguments),
+    Recover(commands::recover::Arguments),
     Render(commands::render::Arguments),
     Export(commands::export::Arguments),
     Device(Box<commands::device::Arguments>),
@@ -59,6 +62,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Serve(arguments) => commands::serve::serve(&arguments),
         Command::Render(arguments) => commands::render::render(&arguments),
         Command::Replay(arguments) => commands::replay::replay(&arguments),
+        Command::Recover(arguments) => commands::recover::recover(&arguments),
         Command::Export(arguments) => commands::export::export(&arguments),
         Command::Device(arguments) => commands::device::device(&arguments),
         Command::Devices(arguments) => commands::devices::devices(&arguments),

@@ -1,7 +1,7 @@
 //! Output on the terminal: results on standard output, messages on standard error.
 
 use crate::failure::Failure;
-use palpate_scene::SceneLog;
+use palpate_scene::{LogReplay, SceneLog};
 use std::io::Write;
 
 /// Prints a message on standard error; a reader that has gone away is no failure.
@@ -40,5 +40,12 @@ pub fn warn_of_stores(scene: &SceneLog) {
             "warning: {} is not taken into the log: a replay needs it where it is",
             store.display()
         ));
+    }
+}
+
+/// Warns of a log that was cut.
+pub fn warn_of_cut(log: &LogReplay) {
+    if let Some(warning) = log.warning() {
+        notify(&format!("warning: {warning}"));
     }
 }

@@ -1,50 +1,18 @@
 //! Output files that are complete or not there: written under a temporary name beside the target, then renamed.
 
+use crate::claim::{claim, sync_folder};
 use crate::error::ExportError;
-use std::collections::BTreeSet;
+use crate::unfinished::{Removal, register, unregister};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
-/// Temporary files, and folders that were made for them.
-static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// Registers a file or a folder and makes it under one lock: [`remove_unfinished`] sees both or none.
-fn register<T>(temporary: &Path, make: impl FnOnce(&Path) -> T) -> T {
-    let unfinished = UNFINISHED.lock().map(|mut unfinished| {
-        unfinished.insert(temporary.to_path_buf());
-        unfinished
-    });
-    let made = make(temporary);
-    drop(unfinished);
-    made
-}
-
-fn unregister(temporary: &Path) {
-    if let Ok(mut unfinished) = UNFINISHED.lock() {
-        unfinished.remove(temporary);
-    }
-}
-
-/// Removes all unfinished files, and holds off new ones until `then` has returned: for the handler of an interrupt, which ends
-/// the process there.
-pub fn remove_unfinished<T>(then: impl FnOnce() -> T) -> T {
-    let unfinished = UNFINISHED.lock();
-    if let Ok(unfinished) = &unfinished {
-        // Contents of a folder sort after it; a folder with anything else in it stays.
-        let remove = |path: &PathBuf| std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
-        unfinished.iter().rev().for_each(|path| drop(remove(path)));
-    }
-    let done = then();
-    drop(unfinished);
-    done
-}
-
-/// Output file with a temporary name until [`finish`](Self::finish) renames it; dropped before that, it is removed.
+/// Output file with a temporary name until [`finish`](Self::finish) renames it; dropped before that, it is removed. What a killed
+/// process left is overwritten by the next that writes the same file.
 pub struct AtomicFile {
     writer: Option<BufWriter<File>>,
-    temporary: PathBuf,
+    /// Temporary path; `None` once the file has its own.
+    temporary: Option<PathBuf>,
     path: PathBuf,
     /// Path that was asked for: `path` itself, or a link to it.
     given: PathBuf,
@@ -54,18 +22,30 @@ impl AtomicFile {
     /// Creates the temporary file. A link is followed.
     ///
     /// # Errors
-    /// When the target is no regular file or one of `inputs`, when its folder is missing, or when the system refuses.
+    /// When the target is no regular file or one of `inputs`, when its folder is missing, when another process writes it, or when the
+    /// system refuses.
     pub fn create(path: &Path, inputs: &[&Path]) -> Result<Self, ExportError> {
+        Self::claim(path, inputs)?.map_err(|_| ExportError::target(path, "another process is writing it"))
+    }
+
+    /// Claims the temporary file, or gives the one that another writer has.
+    fn claim(path: &Path, inputs: &[&Path]) -> Result<Result<Self, File>, ExportError> {
         let given = path.to_path_buf();
         let path = target(path, inputs)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let temporary = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
-        let file = register(&temporary, |path| File::create(path));
-        let file = file.map_err(|e| {
-            unregister(&temporary);
-            ExportError::io("write", &path, e)
-        })?;
-        Ok(Self { writer: Some(BufWriter::new(file)), temporary, path, given })
+        let temporary = path.with_file_name(format!(".{name}.tmp"));
+        let file = register(
+            Removal::File,
+            || claim(&temporary)?.emptied(),
+            |file| file.is_ok().then(|| temporary.clone()),
+        );
+        let file = file.map_err(|e| ExportError::io("write", &path, e))?;
+        Ok(file.map(|file| Self {
+            writer: Some(BufWriter::new(file)),
+            temporary: Some(temporary),
+            path,
+            given,
+        }))
     }
 
     /// Writes bytes.
@@ -97,10 +77,19 @@ impl AtomicFile {
     /// When the system refuses.
     pub fn finish(mut self) -> Result<PathBuf, ExportError> {
         let failed = |e: std::io::Error| ExportError::io("write", &self.path, e);
-        if let Some(writer) = self.writer.take() {
-            writer.into_inner().map_err(|e| failed(e.into_error()))?.sync_all().map_err(failed)?;
+        // Open until it is renamed: its claim lasts as long as its temporary name.
+        let file = self.writer.take().map(BufWriter::into_inner).transpose();
+        let file = file.map_err(|e| failed(e.into_error()))?;
+        file.as_ref().map_or(Ok(()), File::sync_all).map_err(failed)?;
+        if let Some(temporary) = self.temporary.take() {
+            let renamed = std::fs::rename(&temporary, &self.path).map_err(failed);
+            if renamed.is_err() {
+                let _ = std::fs::remove_file(&temporary);
+            }
+            unregister(&temporary);
+            renamed?;
+            sync_folder(&self.path);
         }
-        std::fs::rename(&self.temporary, &self.path).map_err(failed)?;
         Ok(std::mem::take(&mut self.given))
     }
 }
@@ -123,52 +112,15 @@ impl Seek for AtomicFile {
 
 impl Drop for AtomicFile {
     fn drop(&mut self) {
-        // After `finish` there is nothing left to remove.
-        let _ = std::fs::remove_file(&self.temporary);
-        unregister(&self.temporary);
-    }
-}
-
-/// Folder for a series of files. One that was made here and is still empty is removed on drop.
-pub struct OutputFolder {
-    path: PathBuf,
-    made: bool,
-}
-
-impl OutputFolder {
-    /// Creates the folder and its parents where they are missing.
-    ///
-    /// # Errors
-    /// When the system refuses.
-    pub fn create(path: &Path) -> Result<Self, ExportError> {
-        if path.is_dir() {
-            return Ok(Self { path: path.to_path_buf(), made: false });
-        }
-        let made = register(path, |path| std::fs::create_dir_all(path));
-        made.map_err(|e| {
-            unregister(path);
-            ExportError::io("make the folder", path, e)
-        })?;
-        Ok(Self { path: path.to_path_buf(), made: true })
-    }
-
-    /// Path.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-}
-
-impl Drop for OutputFolder {
-    fn drop(&mut self) {
-        if self.made {
-            let _ = std::fs::remove_dir(&self.path);
-            unregister(&self.path);
+        if let Some(temporary) = &self.temporary {
+            let _ = std::fs::remove_file(temporary);
+            unregister(temporary);
         }
     }
 }
 
 /// Path of an output with links followed.
-fn target(path: &Path, inputs: &[&Path]) -> Result<PathBuf, ExportError> {
+pub(crate) fn target(path: &Path, inputs: &[&Path]) -> Result<PathBuf, ExportError> {
     let refuse = |reason: String| Err(ExportError::target(path, reason));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
@@ -228,12 +180,18 @@ pub fn check_writable(path: &Path, inputs: &[&Path]) -> Result<(), ExportError> 
     AtomicFile::create(path, inputs).map(drop)
 }
 
-/// Writes a file atomically.
+/// Writes a file atomically, after others that are doing so: the last one stands, whole.
 ///
 /// # Errors
-/// As [`AtomicFile::create`] and [`AtomicFile::write`].
+/// When the target is no regular file, when its folder is missing, or when the system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
-    let mut file = AtomicFile::create(path, &[])?;
-    file.write(bytes)?;
-    file.finish().map(drop)
+    loop {
+        match AtomicFile::claim(path, &[])? {
+            Ok(mut file) => {
+                file.write(bytes)?;
+                return file.finish().map(drop);
+            }
+            Err(of_another) => of_another.lock().map_err(|e| ExportError::io("write", path, e))?,
+        }
+    }
 }

@@ -25,6 +25,18 @@ pub enum ExportError {
         /// Reason, in words.
         reason: String,
     },
+    /// An unfinished file of the same name is there.
+    #[error(
+        "cannot write {}: {} is there, left by a run that was killed or had no room; keep what is in it (`palpate recover` makes a whole \
+         log), or remove it",
+        path.display(), part.display()
+    )]
+    Unfinished {
+        /// Path of the output.
+        path: PathBuf,
+        /// Path of the unfinished file.
+        part: PathBuf,
+    },
     /// Two outputs name the same file.
     #[error("cannot write {}: {first} and {second} name the same file", path.display())]
     SameFile {

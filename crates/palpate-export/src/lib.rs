@@ -6,6 +6,7 @@
 #![deny(missing_docs)]
 
 mod atomic_file;
+mod claim;
 mod csv;
 mod error;
 mod frame;
@@ -13,23 +14,28 @@ mod glb;
 mod glb_parts;
 mod glb_scene;
 mod labels;
+mod output_folder;
+mod part_file;
 mod rigid_surface;
 mod scene_export;
+mod temporary_folder;
+mod unfinished;
 mod vertex_normals;
 mod vtu;
 mod vtu_scene;
 
-pub use atomic_file::{
-    AtomicFile, OutputFolder, check_distinct, check_target, check_writable, remove_unfinished,
-    write_atomically,
-};
+pub use atomic_file::{AtomicFile, check_distinct, check_target, check_writable, write_atomically};
 pub use error::{ExportError, TimeWindowError};
 pub use frame::TimeWindow;
 pub use glb::{Content, Glb, check_glb_size};
 pub use glb_parts::{DeformingSurface, GlbAnimation, NodeTrack, root_node};
 pub use glb_scene::GlbWarning;
 pub use labels::{DeviceLabel, ProbeLabel, ProbeReading, SceneLabels};
+pub use output_folder::OutputFolder;
+pub use part_file::{PART, PartFile, part_of};
 pub use scene_export::{ExportOptions, SceneExporter, WrittenFile};
+pub use temporary_folder::TemporaryFolder;
+pub use unfinished::remove_unfinished;
 pub use vtu::{Cells, Field, Grid, VtuSeries};
 pub use vtu_scene::deformed_surface;
 

@@ -2,8 +2,9 @@
 //!
 //! Inline base64, float32, so that VTK and meshio both read it. Reference: VTK file formats, XML formats.
 
-use crate::atomic_file::{AtomicFile, OutputFolder};
+use crate::atomic_file::AtomicFile;
 use crate::error::ExportError;
+use crate::output_folder::OutputFolder;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::DVec3;

@@ -1,6 +1,10 @@
-//! Atomic files: complete or not there, and never an input.
+//! Output files: complete or not there, never an input, and of one writer at a time; what of a part file was flushed stays.
 
-use palpate_export::{AtomicFile, ExportError, OutputFolder, check_distinct, write_atomically};
+use palpate_export::{
+    AtomicFile, ExportError, OutputFolder, PartFile, TemporaryFolder, check_distinct, part_of,
+    remove_unfinished, write_atomically,
+};
+use std::io::Write;
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -70,4 +74,111 @@ fn a_new_folder_that_stays_empty_is_removed() {
     std::fs::write(path.join("one.vtu"), "").expect("a file");
     drop(folder);
     assert!(path.exists());
+}
+
+#[test]
+fn an_output_that_another_process_writes_is_refused_and_what_it_left_when_killed_is_overwritten() {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("steps.csv");
+    let mut first = AtomicFile::create(&path, &[]).expect("a file");
+    let error = AtomicFile::create(&path, &[]).err().expect("a refusal").to_string();
+    assert_eq!(error, format!("cannot write {}: another process is writing it", path.display()));
+    first.write(b"of the first\n").expect("written");
+    first.finish().expect("finished");
+    assert_eq!(std::fs::read(&path).expect("a file"), b"of the first\n");
+    // A killed process leaves the file, and no lock.
+    std::fs::write(folder.path().join(".steps.csv.tmp"), "longer than what comes now").expect("a file");
+    let mut second = AtomicFile::create(&path, &[]).expect("a file");
+    second.write(b"of the second\n").expect("written");
+    second.finish().expect("finished");
+    assert_eq!(std::fs::read(&path).expect("a file"), b"of the second\n");
+    assert_eq!(names(folder.path()), ["steps.csv"]);
+}
+
+#[test]
+fn a_folder_that_another_process_writes_into_is_refused() {
+    let parent = TempDir::new().expect("a folder");
+    let path = parent.path().join("frames");
+    let first = OutputFolder::create(&path).expect("a folder");
+    let error = OutputFolder::create(&path).err().expect("a refusal").to_string();
+    assert_eq!(error, format!("cannot write {}: another process is writing into it", path.display()));
+    drop(first);
+    drop(OutputFolder::create(&path).expect("a folder"));
+    assert!(!path.exists());
+}
+
+#[test]
+fn writers_of_one_file_at_once_leave_a_whole_one() {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("cube.palp");
+    std::thread::scope(|scope| {
+        for writer in 0..4_u8 {
+            let path = &path;
+            scope.spawn(move || {
+                for _ in 0..25 {
+                    write_atomically(path, &[writer; 10_000]).expect("written");
+                }
+            });
+        }
+    });
+    let bytes = std::fs::read(&path).expect("a file");
+    assert!(bytes.len() == 10_000 && bytes.iter().all(|byte| *byte == bytes[0]));
+    assert_eq!(names(folder.path()), ["cube.palp"]);
+}
+
+#[test]
+fn a_part_file_stays_from_its_first_flush_on_and_an_older_file_stays_until_it_is_finished() {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    std::fs::write(&path, "an older run").expect("a file");
+    let mut file = PartFile::create(&path, &[]).expect("a file");
+    file.write_all(b"header").expect("written");
+    drop(file);
+    assert_eq!(names(folder.path()), ["run.mcap"], "it was worth nothing");
+
+    let mut file = PartFile::create(&path, &[]).expect("a file");
+    file.write_all(b"header, step 1").expect("written");
+    file.flush().expect("written");
+    let error = PartFile::create(&path, &[]).err().expect("a refusal").to_string();
+    assert_eq!(error, format!("cannot write {}: another process is writing it", path.display()));
+    file.write_all(b", step 2").expect("written");
+    drop(file);
+    assert_eq!(names(folder.path()), ["run.mcap", "run.mcap.part"]);
+    assert_eq!(std::fs::read(&path).expect("a file"), b"an older run");
+    assert!(std::fs::read(part_of(&path)).expect("a file").starts_with(b"header, step 1"));
+
+    // The next run destroys neither.
+    let error = PartFile::create(&path, &[]).err().expect("a refusal").to_string();
+    let expected = format!(
+        "cannot write {}: {} is there, left by a run that was killed or had no room; keep what is in it (`palpate recover` makes a \
+         whole log), or remove it",
+        path.display(),
+        part_of(&path).display()
+    );
+    assert_eq!(error, expected);
+    std::fs::remove_file(part_of(&path)).expect("removed");
+    let mut file = PartFile::create(&path, &[]).expect("a file");
+    file.write_all(b"a newer run").expect("written");
+    assert_eq!(file.finish().expect("finished"), path);
+    assert_eq!(names(folder.path()), ["run.mcap"]);
+    assert_eq!(std::fs::read(&path).expect("a file"), b"a newer run");
+}
+
+#[test]
+fn what_is_unfinished_is_removed_when_a_signal_ends_the_process_and_a_flushed_part_file_stays() {
+    let folder = TempDir::new().expect("a folder");
+    let steps = AtomicFile::create(&folder.path().join("steps.csv"), &[]).expect("a file");
+    let begun = PartFile::create(&folder.path().join("begun.mcap"), &[]).expect("a file");
+    let mut grown = PartFile::create(&folder.path().join("grown.mcap"), &[]).expect("a file");
+    grown.write_all(b"header, step 1").expect("written");
+    grown.flush().expect("written");
+    let frames = OutputFolder::create(&folder.path().join("frames")).expect("a folder");
+    let temporary = TemporaryFolder::new().expect("a folder");
+    std::fs::write(temporary.path().join("cube.palp"), "of a log").expect("a file");
+    remove_unfinished(|| {
+        assert_eq!(names(folder.path()), ["grown.mcap.part"]);
+        assert!(!temporary.path().exists());
+    });
+    drop((steps, begun, grown, frames, temporary));
+    assert_eq!(names(folder.path()), ["grown.mcap.part"]);
 }

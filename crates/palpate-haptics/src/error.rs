@@ -237,9 +237,12 @@ pub enum LogError {
         /// Reason.
         reason: String,
     },
-    /// The file has no index: its writer was killed.
-    #[error("the log was not finished: it has no index")]
-    Unfinished,
+    /// The file ends before its first whole chunk: its writer was killed at once.
+    #[error("the log ends before its first whole step: nothing of it can be read")]
+    NoWholeStep,
+    /// The log to be recovered is whole.
+    #[error("the log is whole: there is nothing to recover")]
+    Whole,
     /// The MCAP file was not written by palpate.
     #[error("it is an MCAP file, but no log of palpate's")]
     NotPalpate,

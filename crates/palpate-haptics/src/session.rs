@@ -5,7 +5,7 @@ use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::{Error, SessionError};
 use crate::force_process::{ForceProcess, ObstacleTrajectory};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
-use crate::log::{LogSender, LogSummary, LogWriter};
+use crate::log::{LogSender, LogSummary, LogWriter, WrittenLog};
 use crate::motion_path::MotionPath;
 use crate::passivity::PassivityController;
 use crate::playback::Playback;
@@ -107,7 +107,7 @@ pub struct Report {
     pub largest_penetration_m: Vec<f64>,
     /// Number of steps in which each device's tip touched something.
     pub touching_steps: Vec<u64>,
-    /// Summary of the log; `None` if there is none or its writing failed.
+    /// Summary of the log; `None` if there is none.
     pub log: Option<LogSummary>,
     /// Wall-clock time of the steps [s].
     pub wall_s: f64,
@@ -157,7 +157,7 @@ struct ForceResult {
 
 impl Session {
     /// Runs until the steps are done or `stop` is set. `steps` follows the number of steps. `show` is called with new snapshots at
-    /// the frame rate, on the deformation process's thread. Returns the report, and the sink of the log or its error: a log that
+    /// the frame rate, on the deformation process's thread. Returns the report, and the log as far as it was written: one that
     /// fails does not end the session.
     ///
     /// # Errors
@@ -168,7 +168,7 @@ impl Session {
         stop: &AtomicBool,
         steps: &AtomicU64,
         mut show: impl FnMut(&Snapshot) + Send,
-    ) -> Result<(Report, Option<Result<W, Error>>), Error> {
+    ) -> Result<(Report, Option<WrittenLog<W>>), Error> {
         self.check()?;
         let Self { model, start, devices, obstacle_trajectories, frame_rate_hz, scheduling, .. } = self;
         let (step_limit, device_timeout_s) = (self.steps, self.device_timeout_s);
@@ -251,28 +251,29 @@ impl Session {
                 .map(|local| if local { updated.next().transpose() } else { Ok(None) })
                 .collect();
             let deformation = join(deformation_thread, "deformation process")?;
-            let written = writing.map(|thread| join(thread, "log").and_then(|written| written));
-            let (steps, out) = match written {
-                Some(Ok((steps, out))) => (Some(steps), Some(Ok(out))),
-                Some(Err(error)) => (None, Some(Err(error))),
-                None => (None, None),
-            };
+            let written = writing.map(|thread| join(thread, "log")).transpose()?;
+            let steps = forces.process.steps();
+            let log = written.as_ref().map(|log| LogSummary {
+                steps: log.steps,
+                missed: log.failure.as_ref().map_or(forces.missed_records, |_| steps - log.steps),
+                is_cut: log.failure.is_some(),
+            });
             let report = Report {
                 granted: forces.granted,
                 force: forces.timing,
                 deformation,
                 devices: devices?,
-                steps: forces.process.steps(),
+                steps,
                 state: forces.process.into_state(),
                 unsolved_steps: forces.unsolved_steps,
                 steps_out_of_budget: forces.steps_out_of_budget,
                 largest_penetration_m: forces.largest_penetration_m,
                 touching_steps: forces.touching_steps,
-                log: steps.map(|steps| LogSummary { steps, missed: forces.missed_records }),
+                log,
                 wall_s: forces.wall_s,
                 steal_time_s: forces.steal_time_s,
             };
-            Ok((report, out))
+            Ok((report, written))
         })
     }
 

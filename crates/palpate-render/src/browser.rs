@@ -2,6 +2,7 @@
 
 use crate::error::RenderError;
 use crate::log_frames::LogFramePlayer;
+use palpate_export::TemporaryFolder;
 use palpate_scene::Progress;
 use palpate_viewer::{RenderJob, RenderRequest, ServedContent, Server, Settings};
 use std::net::Ipv4Addr;
@@ -10,7 +11,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// Time without an image after which the browser is given up.
 const TIMEOUT: Duration = Duration::from_secs(120);
@@ -79,12 +79,12 @@ pub fn find_browser(given: Option<&Path>) -> Result<PathBuf, RenderError> {
 /// Headless browser, ended on drop.
 struct Browser {
     child: Child,
-    _profile: TempDir,
+    _profile: TemporaryFolder,
 }
 
 impl Browser {
     fn open(program: &Path, address: &str, (width, height): (u32, u32)) -> Result<Self, RenderError> {
-        let profile = TempDir::new().map_err(RenderError::TemporaryFolder)?;
+        let profile = TemporaryFolder::new().map_err(RenderError::TemporaryFolder)?;
         let mut command = Command::new(program);
         // Software rendering gives the same bytes on every machine with the same browser.
         command

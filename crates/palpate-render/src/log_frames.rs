@@ -87,12 +87,18 @@ impl LogFramePlayer {
         let steps = choose(&log);
         let spacing = steps.spacing(log.steps, step_s);
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let about = format!("{:.1} s at {:.0} Hz", log.steps as f64 * step_s, 1.0 / step_s);
+        let end = if log.is_cut() { "; the log was cut here" } else { "" };
+        let about = format!("{:.1} s at {:.0} Hz{end}", log.steps as f64 * step_s, 1.0 / step_s);
         let description = describe_scene(&log.scene, (None, name.clone(), about), &[]);
         let model = log.scene.model.clone();
         let (frames, builder) =
             LogFrames::new(number, name, model, description, spacing.count, spacing.interval_s);
         Ok(Self { log, steps, builder, frames })
+    }
+
+    /// The log.
+    pub fn log(&self) -> &LogReplay {
+        &self.log
     }
 
     /// Number and interval of its frames.

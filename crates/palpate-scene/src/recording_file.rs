@@ -2,6 +2,7 @@
 
 use crate::error::{SceneError, SceneErrorKind};
 use palpate::{Certificate, PeakForceError, Recording};
+use palpate_fem::read_regular_file;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -12,10 +13,7 @@ use std::path::Path;
 pub fn read_recording(path: &Path) -> Result<Recording, SceneError> {
     let refused = |message: String| SceneError::of_file(SceneErrorKind::Recording, path, message);
     let failed = |error: std::io::Error| SceneError::io("read the recording", path, &error);
-    if !std::fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(refused(format!("cannot read the recording {}: it is not a file", path.display())));
-    }
-    let bytes = std::fs::read(path).map_err(failed)?;
+    let bytes = read_regular_file(path).map_err(failed)?;
     if bytes.is_empty() {
         return Err(refused(format!("{}: the file is empty", path.display())));
     }

@@ -7,12 +7,13 @@ use crate::error::SceneError;
 use crate::file::{Relocated, RunMode, read_relocated_scene};
 use crate::scene::Scene;
 use palpate::{DeviceMode, Input, State, step};
+use palpate_export::{TemporaryFolder, part_of};
+use palpate_fem::read_regular_file;
 use palpate_haptics::log::{LogReader, SceneNames};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// Reason that a log cannot be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +28,18 @@ pub enum ReplayError {
         path: PathBuf,
         /// Error of the operating system.
         source: io::Error,
+    },
+    /// The log is not there, but an unfinished one.
+    #[error(
+        "cannot read the log {}: there is only {}, of a run that is going on, was killed or had no room; what is in it can be read by that \
+         name",
+        path.display(), part.display()
+    )]
+    OnlyPart {
+        /// Log.
+        path: PathBuf,
+        /// Unfinished log.
+        part: PathBuf,
     },
     /// The file is no log, or damaged.
     #[error("{}: {error}", path.display())]
@@ -97,7 +110,7 @@ pub struct Replayed {
 /// Log with the scene that it carries.
 pub struct LogReplay {
     path: PathBuf,
-    bytes: Vec<u8>,
+    reader: LogReader<'static>,
     facts: BTreeMap<String, String>,
     /// Scene; the log is one of its inputs.
     pub scene: Scene,
@@ -106,7 +119,7 @@ pub struct LogReplay {
     names: SceneNames,
     modes: Vec<DeviceMode>,
     // The unpacked files must outlive the scene: tables are read on first use.
-    _folder: TempDir,
+    _folder: TemporaryFolder,
 }
 
 impl LogReplay {
@@ -115,13 +128,17 @@ impl LogReplay {
     /// # Errors
     /// When it cannot be read, or its scene is refused.
     pub fn read(path: &Path) -> Result<Self, ReplayError> {
-        let bytes = std::fs::read(path).map_err(|source| ReplayError::Io {
-            action: "read the log",
-            path: path.to_path_buf(),
-            source,
+        let bytes = read_regular_file(path).map_err(|source| {
+            let part = part_of(path);
+            match source.kind() {
+                io::ErrorKind::NotFound if part.is_file() => {
+                    ReplayError::OnlyPart { path: path.into(), part }
+                }
+                _ => ReplayError::Io { action: "read the log", path: path.into(), source },
+            }
         })?;
         let named = |error| ReplayError::Log { path: path.to_path_buf(), error };
-        let reader = LogReader::new(&bytes).map_err(named)?;
+        let reader = LogReader::new(bytes).map_err(named)?;
         let facts = reader.metadata().map_err(named)?;
         let files = reader.files().map_err(named)?;
         let steps = reader.step_count();
@@ -129,7 +146,7 @@ impl LogReplay {
         scene.inputs.push(path.to_path_buf());
         let names = scene.names();
         let modes = scene.devices.iter().map(|device| device.mode).collect();
-        Ok(Self { path: path.to_path_buf(), bytes, facts, scene, steps, names, modes, _folder: folder })
+        Ok(Self { path: path.to_path_buf(), reader, facts, scene, steps, names, modes, _folder: folder })
     }
 
     /// State before the first step: that of the scene, or the one that the log resumes from.
@@ -138,7 +155,7 @@ impl LogReplay {
     /// [`ReplayError::Log`].
     pub fn initial_state(&self) -> Result<State, ReplayError> {
         let model = &self.scene.model;
-        let motions = self.reader()?.start(&self.names).map_err(|error| self.named(error))?;
+        let motions = self.reader.start(&self.names).map_err(|error| self.named(error))?;
         Ok(motions.map_or_else(|| State::new(model), |motions| State::resume(model, &motions)))
     }
 
@@ -148,7 +165,7 @@ impl LogReplay {
     /// [`ReplayError::Log`].
     pub fn initial_input(&self) -> Result<Input, ReplayError> {
         let mut input = self.scene.input_at(0.0);
-        if let Some(logged) = self.reader()?.logged_steps().next() {
+        if let Some(logged) = self.reader.logged_steps().next() {
             let first = logged.and_then(|logged| logged.input(&self.names, &self.modes));
             let first = first.map_err(|error| self.named(error))?;
             for ((device, at_start), first) in
@@ -160,6 +177,23 @@ impl LogReplay {
             }
         }
         Ok(input)
+    }
+
+    /// Whether the log was cut: its last steps and its summary are missing.
+    pub fn is_cut(&self) -> bool {
+        self.reader.is_cut()
+    }
+
+    /// Warning about a log that was cut, with what was read of it.
+    pub fn warning(&self) -> Option<String> {
+        let (path, steps) = (self.path.display(), self.steps);
+        let seconds = steps as f64 * self.scene.model.parameters().step_s;
+        self.is_cut().then(|| {
+            format!(
+                "{path}: the log ends without its summary after {steps} steps ({seconds:.3} s): was the run killed? `palpate recover \
+                 {path} -o WHOLE.mcap` makes a whole file"
+            )
+        })
     }
 
     /// Version of palpate that wrote the log.
@@ -180,7 +214,7 @@ impl LogReplay {
         let path = || self.path.clone();
         let is_current = self.version() == env!("CARGO_PKG_VERSION");
         let (mut done, mut first_difference) = (0, None);
-        for logged in self.reader()?.logged_steps().take(max_steps.try_into().unwrap_or(usize::MAX)) {
+        for logged in self.reader.logged_steps().take(max_steps.try_into().unwrap_or(usize::MAX)) {
             let logged = logged.map_err(|error| self.named(error))?;
             if logged.step != done + 1 {
                 let gap = ReplayError::MissedSteps { path: path(), step: logged.step, previous: done };
@@ -214,16 +248,15 @@ impl LogReplay {
     fn named(&self, error: palpate_haptics::Error) -> ReplayError {
         ReplayError::Log { path: self.path.clone(), error }
     }
-
-    fn reader(&self) -> Result<LogReader<'_>, ReplayError> {
-        LogReader::new(&self.bytes).map_err(|error| self.named(error))
-    }
 }
 
 /// Scene of a log, and the temporary folder with its files.
-fn unpack(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Result<(Scene, TempDir), ReplayError> {
+fn unpack(
+    files: Vec<(String, Vec<u8>)>,
+    scene: Option<&Path>,
+) -> Result<(Scene, TemporaryFolder), ReplayError> {
     let scene = scene.ok_or(ReplayError::NoScene)?;
-    let folder = TempDir::new().map_err(ReplayError::TemporaryFolder)?;
+    let folder = TemporaryFolder::new().map_err(ReplayError::TemporaryFolder)?;
     let mut relocated = Relocated::new();
     for (at, (name, data)) in files.into_iter().enumerate() {
         let name = PathBuf::from(name);

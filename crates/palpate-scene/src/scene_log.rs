@@ -3,6 +3,7 @@
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::Scene;
 use palpate::{Input, Model, State};
+use palpate_fem::read_regular_file;
 use palpate_haptics::log::{LogSender, LogWriter, SceneNames};
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -77,7 +78,7 @@ impl SceneLog {
             }
             let bytes = match &self.text {
                 Some(text) if at == 0 => text.clone().into_bytes(),
-                _ => std::fs::read(input).map_err(|error| SceneError::io("read", input, &error))?,
+                _ => read_regular_file(input).map_err(|error| SceneError::io("read", input, &error))?,
             };
             files.push((name, bytes));
         }

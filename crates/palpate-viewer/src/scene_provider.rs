@@ -14,9 +14,9 @@ pub type SharedTrajectory = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
 /// Opens a device; called at each start of the scene.
 pub type DeviceOpener = Arc<dyn Fn() -> Result<AttachedDevice, SceneError> + Send + Sync>;
 
-/// Target of a log. Dropped before `finish`, it leaves no log.
+/// Target of a log. What was flushed stays, however the process ends.
 pub trait LogFile: Write + Seek + Send {
-    /// Keeps the log, which is complete.
+    /// Keeps the log: under its name if it is whole, or as far as it could be written.
     fn finish(self: Box<Self>, summary: LogSummary);
 }
 

@@ -7,6 +7,7 @@ pub mod devices;
 pub mod export;
 pub mod inspect;
 pub mod record;
+pub mod recover;
 pub mod render;
 pub mod replay;
 pub mod reproduce;

@@ -3,9 +3,9 @@
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
 use crate::progress::CountBar;
-use crate::terminal::{print, print_json};
+use crate::terminal::{print, print_json, warn_of_cut};
 use clap::{Args, ValueEnum};
-use palpate_export::write_atomically;
+use palpate_export::{OutputFolder, write_atomically};
 use palpate_render::{FrameSpacing, LogFramePlayer, find_browser, program_runs, render_log, write_gif};
 use palpate_viewer::{CameraView, RenderRequest};
 use serde_json::json;
@@ -88,8 +88,9 @@ pub fn render(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure("--mp4 needs ffmpeg, which is not found: install it, or take --gif".into()));
     }
     let output = &arguments.output;
-    std::fs::create_dir_all(output).map_err(|e| Failure::file("make the folder", output, &e))?;
+    let _folder = OutputFolder::create(output)?;
     let log = LogFramePlayer::read(&arguments.log, 0, arguments.fps)?;
+    warn_of_cut(log.log());
     let numbers = chosen(log.spacing(), arguments.from, arguments.to)?;
     let frames = log.spacing();
     let request = RenderRequest {

@@ -3,7 +3,7 @@
 use crate::commands::run::{OutputArguments, Outputs};
 use crate::failure::Failure;
 use crate::progress::CountBar;
-use crate::terminal::{print, print_json};
+use crate::terminal::{print, print_json, warn_of_cut};
 use clap::Args;
 use palpate_scene::{LogReplay, Progress};
 use serde_json::json;
@@ -37,6 +37,7 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure("--runs is 0, expected 1 or more".into()));
     }
     let log = LogReplay::read(&arguments.log)?;
+    warn_of_cut(&log);
     let scene = &log.scene;
     let mut least: Vec<Duration> = Vec::new();
     for _ in 1..arguments.runs {
@@ -69,8 +70,7 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
         let difference = done.first_difference.as_ref().map(|first| {
             json!({ "step": first.step, "quantity": first.quantity, "logged": first.logged, "computed": first.computed })
         });
-        json["replayed"] =
-            json!({ "steps": done.steps, "identical": difference.is_none(), "first_difference": difference });
+        json["replayed"] = json!({ "steps": done.steps, "identical": difference.is_none(), "first_difference": difference, "cut": log.is_cut() });
         return print_json(&json);
     }
     let compared = match &done.first_difference {

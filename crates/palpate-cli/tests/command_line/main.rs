@@ -4,6 +4,7 @@ mod bad_contact_scenes;
 mod bad_input;
 mod contacts;
 mod couplings;
+mod cut_logs;
 mod devices;
 mod experiments;
 mod exports;

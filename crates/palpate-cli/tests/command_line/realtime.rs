@@ -1,9 +1,10 @@
 //! Runs in real time, their logs, and replays. No test here looks at how fast anything was.
 
+use crate::cut_logs::logged_steps;
 use crate::workplace::{Table, Workplace};
+use palpate_testkit::wait_until;
 use std::io::Read;
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 /// Two fingers on the cube of `Workplace::with_scene`, which lies on a floor; the right one in a simulated hand.
 pub fn workplace() -> Workplace {
@@ -151,16 +152,8 @@ fn signals_end_a_run_in_good_order() {
             .stdout(Stdio::piped())
             .spawn()
             .expect("the command starts");
-        // The unfinished log has a hidden name.
-        let has_begun = || {
-            let entries = std::fs::read_dir(workplace.path(".")).expect("a folder").flatten();
-            entries.map(|entry| entry.file_name()).any(|name| {
-                let name = name.to_string_lossy().into_owned();
-                name.starts_with('.') && name.contains(&log)
-            })
-        };
-        palpate_testkit::wait_until("the log has begun", has_begun);
-        std::thread::sleep(Duration::from_millis(300));
+        let part = format!("{log}.part");
+        wait_until("the log has begun", || logged_steps(&workplace, &part) > 50);
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
         let mut report = String::new();
@@ -169,6 +162,7 @@ fn signals_end_a_run_in_good_order() {
         let report: serde_json::Value = serde_json::from_str(&report).expect("a report");
         assert!(report["steps"].as_u64() > Some(50), "{signal}: {report:#}");
         workplace.succeed(&["replay", &log]);
+        assert!(!workplace.path(&part).exists(), "{:?}", workplace.files());
     }
 }
 
@@ -179,7 +173,7 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
         (&["run", "scene.toml", "--log", "a.mcap"][..], "--log is of a run in real time: add --realtime"),
         (&["run", "scene.toml", "--realtime", "--csv", "a.csv"], "--csv, --contacts and --vtu take time"),
         (
-            &["run", "scene.toml", "--realtime", "--device-rate", "0"],
+            &["run", "scene.toml", "--realtime", "--device-rate", "0", "--log", "a.mcap"],
             "a device is to be updated at 0 Hz, expected 50 to 5000",
         ),
         (&["run", "scene.toml", "--realtime", "--pictures", "-1"], "--pictures is -1, expected 0 to 1000"),
@@ -236,5 +230,6 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
         let error = workplace.fail(&["run", "wrong.toml", "--realtime", "--duration", "0.1"]);
         assert!(error.contains(expected), "{error}");
     }
-    assert!(!workplace.path("a.mcap").exists());
+    let logs = ["a.mcap", "a.mcap.part"];
+    assert!(!logs.iter().any(|log| workplace.path(log).exists()), "{:?}", workplace.files());
 }

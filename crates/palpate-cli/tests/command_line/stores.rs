@@ -237,19 +237,17 @@ fn a_damaged_shard_is_told_of_and_can_be_recorded_again() {
 #[test]
 fn a_disk_without_room_loses_nothing() {
     let workplace = Workplace::new();
-    // A limit on the size of files acts as a full disk does.
-    let limited = Command::new("sh")
-        .args(["-c", "trap '' XFSZ; ulimit -f 200; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_palpate")])
-        .args(TABLE)
-        .current_dir(workplace.path(""))
-        .output()
-        .expect("a shell");
-    let text = String::from_utf8_lossy(&limited.stderr).into_owned();
-    assert_eq!(limited.status.code(), Some(1), "{text}");
-    assert!(
-        text.contains("error: cannot write t.zarr/") && text.contains("What is finished is kept"),
-        "{text}"
-    );
+    // Room for ever larger files: first not even for the metadata, at last for all but the shards.
+    for blocks in [0, 1, 4, 16, 64, 200] {
+        let limited = workplace.palpate_with_room(blocks, &TABLE);
+        let text = String::from_utf8_lossy(&limited.stderr).into_owned();
+        assert_eq!(limited.status.code(), Some(1), "{text}");
+        assert!(
+            text.contains("error: cannot write t.zarr") && text.contains("File too large (os error 27)"),
+            "{blocks}: {text}"
+        );
+        assert!(blocks < 200 || text.contains("What is finished is kept"), "{text}");
+    }
     workplace.succeed(&TABLE);
     same(&whole_store().0, &workplace.path("t.zarr"));
 }

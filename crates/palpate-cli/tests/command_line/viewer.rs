@@ -11,8 +11,8 @@ use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
 /// `palpate serve` in a workplace, until it is interrupted.
-struct Serving {
-    child: Child,
+pub struct Serving {
+    pub child: Child,
     /// `127.0.0.1:PORT`.
     address: String,
     /// Lines printed after that.
@@ -20,7 +20,7 @@ struct Serving {
 }
 
 impl Serving {
-    fn new(workplace: &Workplace, arguments: &[&str]) -> Self {
+    pub fn new(workplace: &Workplace, arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
             .args(["serve", "--no-browser", "--listen", "127.0.0.1:0"])
             .args(arguments)
@@ -39,7 +39,7 @@ impl Serving {
         Self { child, address, said }
     }
 
-    fn get(&self, path: &str) -> (String, Vec<u8>) {
+    pub fn get(&self, path: &str) -> (String, Vec<u8>) {
         let mut stream = TcpStream::connect(&self.address).expect("it listens");
         write!(stream, "GET {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.address)
             .expect("it reads");
@@ -57,7 +57,7 @@ impl Serving {
     }
 
     /// Its status after Ctrl-C.
-    fn interrupt(self) -> Option<i32> {
+    pub fn interrupt(self) -> Option<i32> {
         self.interrupted().0
     }
 

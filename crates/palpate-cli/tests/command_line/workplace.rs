@@ -114,6 +114,18 @@ impl Workplace {
             .expect("the command starts")
     }
 
+    /// Run `palpate` here with room for so many blocks of 512 bytes in every file: a limit on the size of files acts as a full disk does.
+    pub fn palpate_with_room(&self, blocks: u64, arguments: &[&str]) -> Output {
+        Command::new("sh")
+            .args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\""), "sh"])
+            .arg(env!("CARGO_BIN_EXE_palpate"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env("XDG_CACHE_HOME", self.path("cache"))
+            .output()
+            .expect("a shell")
+    }
+
     /// Run a command line that must succeed; gives standard output.
     pub fn succeed(&self, arguments: &[&str]) -> String {
         let Output { status, stdout, stderr } = self.palpate(arguments);

@@ -52,7 +52,7 @@ impl Number {
 
 /// Content of a mesh file.
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshError> {
-    std::fs::read(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })
+    crate::read_regular_file(path).map_err(|source| MeshError::Read { path: path.to_path_buf(), source })
 }
 
 /// Cursor over the bytes of a mesh file.

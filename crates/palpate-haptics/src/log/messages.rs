@@ -10,6 +10,9 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::{BTreeMap, HashMap};
 
+/// Topic of the steps.
+pub(super) const STEP_TOPIC: &str = "/step";
+
 /// Names of a scene's parts, in the model's order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SceneNames {

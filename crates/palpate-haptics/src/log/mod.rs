@@ -9,14 +9,20 @@
 //!
 //! Messages are JSON, in which every number keeps its last bit. The files that the scene was read from are attached, and the metadata
 //! record `start` holds the initial state of every object, so that a log replays bit for bit anywhere.
+//!
+//! A log is a series of chunks, each of at most half a second and whole by itself: one that was cut is read up to its last whole
+//! chunk, and [`recover`] makes a whole one of it.
 
 mod buffer_pool;
 mod messages;
 mod reader;
 mod records;
+mod recovery;
+mod scan;
 mod writer;
 
 pub use messages::SceneNames;
 pub use reader::{LogReader, LoggedStep};
 pub use records::{FrameRecord, StepRecord};
-pub use writer::{LogSender, LogSummary, LogWriter};
+pub use recovery::{Recovered, recover};
+pub use writer::{LogSender, LogSummary, LogWriter, WrittenLog};

@@ -1,20 +1,24 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
 use super::messages::{EnergyMessage, SceneNames, StartMessage, StepMessage};
+use super::scan::{RecordReader, Scan, step_channel, step_count};
 use super::writer::START;
 use crate::error::{Error, LogError};
 use glam::DVec3;
 use mcap::Summary;
 use mcap::read::parse_record;
 use mcap::records::{Record, op::MESSAGE};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// Log in memory.
+/// Log in memory, whole or up to the last whole chunk of one that was cut.
 pub struct LogReader<'a> {
-    bytes: &'a [u8],
+    bytes: Cow<'a, [u8]>,
+    /// Length of what is read [bytes].
+    end: usize,
     summary: Summary,
+    is_cut: bool,
 }
 
 /// Logged step.
@@ -25,7 +29,7 @@ pub struct LoggedStep {
     message: StepMessage,
 }
 
-fn unreadable(error: impl std::fmt::Display) -> Error {
+pub(super) fn unreadable(error: impl std::fmt::Display) -> Error {
     LogError::Unreadable { reason: error.to_string() }.into()
 }
 
@@ -33,10 +37,26 @@ impl<'a> LogReader<'a> {
     /// Log from the bytes of its file.
     ///
     /// # Errors
-    /// If they are no MCAP file, or one that was not finished.
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
-        let summary = Summary::read(bytes).map_err(unreadable)?;
-        Ok(Self { bytes, summary: summary.ok_or(LogError::Unfinished)? })
+    /// If they are no MCAP file, or have neither a summary nor a whole step.
+    pub fn new(bytes: impl Into<Cow<'a, [u8]>>) -> Result<Self, Error> {
+        let bytes = bytes.into();
+        if let Ok(Some(summary)) = Summary::read(&bytes) {
+            return Ok(Self { end: bytes.len(), bytes, summary, is_cut: false });
+        }
+        let Scan { summary, whole, .. } = Scan::new(&bytes)?;
+        if step_count(&summary) == 0 {
+            return Err(LogError::NoWholeStep.into());
+        }
+        Ok(Self { bytes, end: whole, summary, is_cut: true })
+    }
+
+    /// Whether the log lacks its summary: its writer was killed, or the disk full.
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.end]
     }
 
     /// Metadata about the scene.
@@ -63,7 +83,7 @@ impl<'a> LogReader<'a> {
 
     fn metadata_record(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, Error> {
         let index = self.summary.metadata_indexes.iter().find(|index| index.name == name);
-        let read = |index| mcap::read::metadata(self.bytes, index).map_err(unreadable);
+        let read = |index| mcap::read::metadata(self.bytes(), index).map_err(unreadable);
         index.map(|index| read(index).map(|metadata| metadata.metadata)).transpose()
     }
 
@@ -72,40 +92,25 @@ impl<'a> LogReader<'a> {
     /// # Errors
     /// If one can't be read.
     pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let read = |index| mcap::read::attachment(self.bytes, index).map_err(unreadable);
+        let read = |index| mcap::read::attachment(self.bytes(), index).map_err(unreadable);
         let indexes = self.summary.attachment_indexes.iter();
         indexes.map(|index| read(index).map(|a| (a.name, a.data.into_owned()))).collect()
     }
 
     /// Number of steps.
     pub fn step_count(&self) -> u64 {
-        let counts = self.summary.stats.as_ref().map(|stats| &stats.channel_message_counts);
-        self.step_channel().and_then(|id| counts?.get(&id).copied()).unwrap_or(0)
-    }
-
-    fn step_channel(&self) -> Option<u16> {
-        let mut channels = self.summary.channels.iter();
-        channels.find(|(_, channel)| channel.topic == "/step").map(|(id, _)| *id)
+        step_count(&self.summary)
     }
 
     /// Steps in order. After an error there are no more.
-    pub fn logged_steps(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> + use<'a> {
-        // Bounds the lengths that a damaged file may claim: the file's own, or one chunk.
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(self.bytes.len().max(1 << 20))
-            .with_validate_chunk_crcs(true);
-        Steps {
-            bytes: self.bytes,
-            reader: LinearReader::new_with_options(options),
-            channel: self.step_channel(),
-        }
+    pub fn logged_steps(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> {
+        Steps { records: RecordReader::new(self.bytes()), channel: step_channel(&self.summary) }
     }
 }
 
 /// Iterator over the steps of a log.
 struct Steps<'a> {
-    bytes: &'a [u8],
-    reader: LinearReader,
+    records: RecordReader<'a>,
     channel: Option<u16>,
 }
 
@@ -114,29 +119,28 @@ impl Iterator for Steps<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let channel = self.channel?;
-        let found = loop {
-            match self.reader.next_event()? {
-                Ok(LinearReadEvent::ReadRequest(requested)) => {
-                    let (now, later) = self.bytes.split_at(requested.min(self.bytes.len()));
-                    self.reader.insert(now.len()).copy_from_slice(now);
-                    self.reader.notify_read(now.len());
-                    self.bytes = later;
+        let step = |opcode, data: &[u8]| -> Result<Option<StepMessage>, Error> {
+            if opcode != MESSAGE {
+                return Ok(None);
+            }
+            match parse_record(MESSAGE, data).map_err(unreadable)? {
+                Record::Message { header, data } if header.channel_id == channel => {
+                    serde_json::from_slice(&data).map(Some).map_err(unreadable)
                 }
-                Ok(LinearReadEvent::Record { opcode: MESSAGE, data }) => match parse_record(MESSAGE, data) {
-                    Ok(Record::Message { header, data }) if header.channel_id == channel => {
-                        break serde_json::from_slice(&data).map_err(unreadable);
-                    }
-                    Ok(_) => {}
-                    Err(error) => break Err(unreadable(error)),
-                },
-                Ok(LinearReadEvent::Record { .. }) => {}
-                Err(error) => break Err(unreadable(error)),
+                _ => Ok(None),
+            }
+        };
+        let found = loop {
+            match self.records.next(step)?.map_err(unreadable).and_then(|step| step) {
+                Ok(None) => {}
+                Ok(Some(message)) => break Ok(LoggedStep { step: message.step, message }),
+                Err(error) => break Err(error),
             }
         };
         if found.is_err() {
             self.channel = None;
         }
-        Some(found.map(|message: StepMessage| LoggedStep { step: message.step, message }))
+        Some(found)
     }
 }
 

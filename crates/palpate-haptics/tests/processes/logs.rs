@@ -3,14 +3,14 @@
 use super::scenes::{STEP_S, half_width, model, process_from};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, State, step};
-use palpate_haptics::Motion;
-use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
+use palpate_haptics::log::{LogReader, LogWriter, SceneNames, WrittenLog};
+use palpate_haptics::{Error, Motion};
 use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::io::{Cursor, Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-fn names() -> SceneNames {
+pub fn names() -> SceneNames {
     SceneNames {
         objects: vec!["body".into()],
         devices: vec!["finger".into()],
@@ -30,13 +30,24 @@ fn log(steps: u64) -> Vec<u8> {
 
 /// Log that begins at a state of the model.
 fn log_from(state: State, model: &Arc<Model>, steps: u64) -> Vec<u8> {
+    let written = write_log(Cursor::new(Vec::new()), state, model, steps).expect("a log in memory");
+    assert_eq!((written.steps, written.failure), (steps, None));
+    written.sink.into_inner()
+}
+
+/// Writes a log of a finger that presses and falls silent in between.
+pub fn write_log<W: Write + Seek>(
+    sink: W,
+    state: State,
+    model: &Arc<Model>,
+    steps: u64,
+) -> Result<WrittenLog<W>, Error> {
     let edge = half_width(model) + 0.004;
     let (mut force, mut ports) = process_from(state, model);
     let facts = BTreeMap::from([("scene".to_string(), "a.toml".to_string())]);
     let files = [("a.toml".to_string(), b"step = 1".to_vec())];
     let start = (&**model, force.state(), force.input());
-    let (mut sender, writer) =
-        LogWriter::new(Cursor::new(Vec::new()), names(), facts, &files, start).expect("a log in memory");
+    let (mut sender, writer) = LogWriter::new(sink, names(), facts, &files, start)?;
     for tick in 1..=steps {
         let now_s = tick as f64 * STEP_S;
         if !(200..300).contains(&tick) {
@@ -52,9 +63,8 @@ fn log_from(state: State, model: &Arc<Model>, steps: u64) -> Vec<u8> {
             sender.record_frame(|frame| frame.capture(force.input(), force.state()));
         }
     }
-    let (written, out) = writer.run(&AtomicBool::new(true)).expect("memory is not full");
-    assert_eq!((written, sender.missed()), (steps, 0));
-    out.into_inner()
+    assert_eq!(sender.missed(), 0);
+    Ok(writer.run(&AtomicBool::new(true)))
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod allocations;
 mod closed_loop;
+mod cut_logs;
 mod links;
 mod logs;
 mod scenes;

@@ -67,7 +67,8 @@ pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -
 
 /// Reads the text of a scene file that is stored at `stored`.
 pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError> {
-    let bytes = std::fs::read(stored).map_err(|error| SceneError::io("read the scene", path, &error))?;
+    let bytes = palpate_fem::read_regular_file(stored)
+        .map_err(|error| SceneError::io("read the scene", path, &error))?;
     String::from_utf8(bytes).map_err(|_| {
         let message = "it is not a text file; a scene is TOML (docs/scene.md)";
         SceneError::of_file(SceneErrorKind::Syntax, path, message)

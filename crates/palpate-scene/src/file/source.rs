@@ -133,13 +133,8 @@ const FRICTION: f64 = 0.5;
 /// # Errors
 /// When the file cannot be read, or is no path.
 pub fn read_path(path: &Path, columns: Columns) -> Result<MotionPath, SceneError> {
-    let failed = |error: std::io::Error| SceneError::io("read the path", path, &error);
-    // A pipe would be waited for.
-    if !std::fs::metadata(path).map_err(failed)?.is_file() {
-        let what = format!("cannot read the path {}: it is not a file", path.display());
-        return Err(SceneError::of_file(SceneErrorKind::Path, path, what));
-    }
-    let text = std::fs::read_to_string(path).map_err(failed)?;
+    let text = palpate_fem::read_regular_text(path)
+        .map_err(|error| SceneError::io("read the path", path, &error))?;
     MotionPath::parse(&text, columns).map_err(|what| {
         SceneError::of_file(SceneErrorKind::Path, path, format!("path {}: {what}", path.display()))
     })

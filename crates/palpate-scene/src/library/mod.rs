@@ -12,12 +12,12 @@ use crate::recording_file::read_recording;
 use crate::scene::Scene;
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
 use palpate::{Coupling, Damping, Material};
+use palpate_export::TemporaryFolder;
 use palpate_fem::ElementOrder;
 use palpate_fem::Progress;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use tempfile::TempDir;
 use toml::{Table, Value};
 
 /// Library of scenes; changes apply to the scene that was opened last.
@@ -25,7 +25,7 @@ pub struct SceneLibrary {
     /// Cache folder of built-in recordings.
     cache: PathBuf,
     /// Temporary folder for paths and meshes, and the cache where there is no other.
-    folder: TempDir,
+    folder: TemporaryFolder,
     current: Mutex<Current>,
 }
 
@@ -111,7 +111,7 @@ impl SceneLibrary {
     /// # Errors
     /// When there is no temporary folder.
     pub fn new(cache: Option<&Path>) -> Result<Self, SceneError> {
-        let folder = TempDir::new().map_err(|error| {
+        let folder = TemporaryFolder::new().map_err(|error| {
             SceneError::new(SceneErrorKind::Io, format!("cannot make a folder for the viewer: {error}"))
         })?;
         let cache = cache_folder(cache).unwrap_or_else(|| folder.path().to_path_buf());

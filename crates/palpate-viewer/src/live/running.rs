@@ -131,10 +131,10 @@ impl RunningScene {
         let run = move || {
             let publish = |snapshot: &Snapshot| frames.publish(&mut encoder, snapshot);
             match session.run(log, &stop_session, &step_count, publish) {
-                Ok((Report { state, log, .. }, file)) => {
+                Ok((Report { state, log, .. }, written)) => {
                     // The log file itself reports failed writes.
-                    if let (Some(Ok(file)), Some(summary)) = (file, log) {
-                        file.finish(summary);
+                    if let (Some(written), Some(summary)) = (written, log) {
+                        written.sink.finish(summary);
                     }
                     Some(state.snapshots())
                 }

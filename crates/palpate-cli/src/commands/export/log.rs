@@ -3,7 +3,7 @@
 use super::{Arguments, print_written};
 use crate::failure::Failure;
 use crate::progress::CountBar;
-use crate::terminal::notify;
+use crate::terminal::{notify, warn_of_cut};
 use palpate_export::{ExportOptions, SceneExporter, TimeWindow};
 use palpate_scene::{LogReplay, Progress};
 use serde_json::json;
@@ -26,6 +26,7 @@ pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
     };
     options.check()?;
     let log = LogReplay::read(&arguments.source)?;
+    warn_of_cut(&log);
     let scene = &log.scene;
     let step_s = scene.model.parameters().step_s;
     let end_s = log.steps as f64 * step_s;
@@ -59,6 +60,7 @@ pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
     let facts = json!({
         "steps": log.steps,
         "repeated": { "steps": done.steps, "identical": done.first_difference.is_none() },
+        "cut": log.is_cut(),
         "step_s": step_s,
         "frames": frames,
     });

@@ -4,12 +4,11 @@ mod log;
 mod recording;
 
 use crate::failure::Failure;
+use crate::log_kind::{has_ending, is_log};
 use crate::terminal::{print, print_json, size_text};
 use clap::{ArgGroup, Args};
 use palpate_export::WrittenFile;
 use serde_json::{Value, json};
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Turn a log or a recording into files for ParaView, Blender, a browser or a notebook
@@ -61,9 +60,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Magic bytes of MCAP files.
-const MCAP: &[u8] = b"\x89MCAP0\r\n";
-
 /// Runs the command.
 pub fn export(arguments: &Arguments) -> Result<(), Failure> {
     if is_log(&arguments.source) {
@@ -94,17 +90,6 @@ pub fn export(arguments: &Arguments) -> Result<(), Failure> {
 fn misplaced(option: &str, of: &str, source: &Path) -> Failure {
     let is = if of == "a log" { "a recording" } else { "a log" };
     Failure(format!("{option} is of {of}, {} is {is}: leave it out", source.display()))
-}
-
-/// Whether a file is a log, by its magic bytes or its ending.
-fn is_log(path: &Path) -> bool {
-    let mut start = [0; MCAP.len()];
-    let begins = File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    has_ending(path, "mcap") || (begins.is_ok() && start == MCAP)
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
 }
 
 /// Prints the written files: as JSON with facts, or after a line of text.

@@ -1,8 +1,10 @@
-//! `palpate inspect`: contents of a recording or a store, and the stable couplings of a device.
+//! `palpate inspect`: contents of a recording, a store or a log, and the stable couplings of a device.
 
+mod log;
 mod stability;
 
 use crate::failure::Failure;
+use crate::log_kind::is_log;
 use crate::progress::Bars;
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
@@ -16,19 +18,21 @@ use stability::StabilityArguments;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Show a recording with its force-error certificate, or a store of impulse responses
+/// Show a recording with its force-error certificate, a store of impulse responses, or a log
 ///
-/// Of a store it lists the shards that exist and those that are missing, and checks the former. With --device it shows which
+/// Of a store it lists the shards that exist and those that are missing, and checks the former; of a log how many steps it has, and
+/// whether it was cut. With --device it shows which
 /// virtual couplings (scene key `coupling`) are stable for that device on this object at a rate, with a delay, in a hand; the
 /// margins; where oscillation begins; and the default, the stiffest with margins of twice the gains and twice the delay.
 #[derive(Args)]
 #[command(after_help = "Examples:
   palpate inspect cube.palp
+  palpate inspect run.mcap.part
   palpate inspect cube.palp --device touch
   palpate inspect cube.palp --device omega.3 --rate 4000 --grip firm --point 0,0.05,0
   palpate inspect cube.palp --device touch --delay 0.02      # over a link, 20 ms there and back")]
 pub struct Arguments {
-    /// The recording, or the store: a folder or s3://BUCKET/PREFIX
+    /// The recording, the log (.mcap), or the store: a folder or s3://BUCKET/PREFIX
     file: PathBuf,
     /// Don't read a store's shards to check them
     #[arg(long)]
@@ -46,6 +50,9 @@ pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
     let text = arguments.file.to_string_lossy();
     if arguments.file.is_dir() || text.contains("://") {
         return inspect_store(arguments, &Location::parse(&text));
+    }
+    if is_log(&arguments.file) {
+        return log::inspect(&arguments.file, arguments.json);
     }
     let recording = read_recording(&arguments.file)?;
     if arguments.stability.print_if_given(&recording, arguments.json)? {

@@ -12,7 +12,8 @@ use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
 use palpate_fem::mesh::Mesh;
 use palpate_fem::{
-    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice, materials_from_toml,
+    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice,
+    materials_from_toml, read_regular_text,
 };
 use palpate_scene::{read_mesh, source_name};
 use std::path::{Path, PathBuf};
@@ -148,8 +149,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
 fn parameters(arguments: &Arguments, extent: RecordExtent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
     let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
         (Some(path), ..) => {
-            let text =
-                std::fs::read_to_string(path).map_err(|e| Failure::file("read the materials", path, &e))?;
+            let text = read_regular_text(path).map_err(|e| Failure::file("read the materials", path, &e))?;
             materials_from_toml(&text, mesh).map_err(|e| Failure(format!("{}: {e}", path.display())))?
         }
         (None, Some(young_pa), Some(poisson), Some(density_kg_m3)) => {

@@ -5,14 +5,15 @@ use super::realtime_report::{json, text, warnings};
 use super::warnings::refuse;
 use super::{Arguments, count_steps};
 use crate::failure::Failure;
+use crate::growing_log::GrowingLog;
 use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{DeviceMode, Pose, State};
-use palpate_export::AtomicFile;
+use palpate_fem::read_regular_text;
 use palpate_haptics::link::{LinkServer, Secret};
-use palpate_haptics::log::{LogSender, LogWriter};
+use palpate_haptics::log::{LogSender, LogWriter, WrittenLog};
 use palpate_haptics::{
     DeformationProcess, DevicePort, ObstacleTrajectory, Report, Scheduling, Session, SessionDevice, port,
 };
@@ -142,33 +143,40 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         playback: Arc::default(),
         cycles: None,
     };
-    let (report, file) = watch(session, log, steps)?;
+    let (report, written) = watch(session, log, steps)?;
     let links = server.map(|server| server.counts());
-    if let Some(file) = file {
-        file.finish()?;
-    }
+    // The report is printed whatever became of the log.
+    let kept = match written.zip(report.log) {
+        Some((written, summary)) => written.sink.keep(summary),
+        None => Ok(()),
+    };
     if arguments.outputs.json {
         print_json(&json(scene, &report, links))?;
     } else {
         print(&text(scene, &report, links, options.log.as_deref()))?;
     }
+    kept?;
     refuse(arguments.strict, &warnings(scene, &report))
 }
 
-/// Begins a log in an atomic file.
-fn begin_log(scene: &Scene, path: &Path) -> Result<(LogSender, LogWriter<AtomicFile>), Failure> {
+/// Begins a log that tells of its first failure at once.
+fn begin_log(scene: &Scene, path: &Path) -> Result<(LogSender, LogWriter<GrowingLog>), Failure> {
     let content = SceneLog::new(scene, None);
-    let file = AtomicFile::create(path, &content.inputs())?;
+    let tell = |text: &str| notify(&format!("warning: {text}. The run goes on without it."));
+    let file = GrowingLog::create(path, &content.inputs(), Box::new(tell))?;
+    let failures = file.failures();
     warn_of_stores(&content);
-    Ok(content.begin(file, &State::new(&scene.model))?)
+    let log = content.begin(file, &State::new(&scene.model))?;
+    failures.tell();
+    Ok(log)
 }
 
 /// Runs a session with a bar on a terminal, until it is done or interrupted.
 fn watch(
     session: Session,
-    log: Option<(LogSender, LogWriter<AtomicFile>)>,
+    log: Option<(LogSender, LogWriter<GrowingLog>)>,
     steps: Option<u64>,
-) -> Result<(Report, Option<AtomicFile>), Failure> {
+) -> Result<(Report, Option<WrittenLog<GrowingLog>>), Failure> {
     let (stop, done) = (stop_on_interrupt(), AtomicU64::new(0));
     let over = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -195,8 +203,7 @@ fn watch(
             deformation.cycle(snapshot);
         });
         over.store(true, Ordering::Relaxed);
-        let (report, out) = ran?;
-        Ok((report, out.transpose()?))
+        Ok(ran?)
     })
 }
 
@@ -221,7 +228,7 @@ fn listen(
 /// Secret of a file; none without one.
 pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     let Some(file) = file else { return Ok(Secret::none()) };
-    let text = std::fs::read_to_string(file).map_err(|e| Failure::file("read the secret", file, &e))?;
+    let text = read_regular_text(file).map_err(|e| Failure::file("read the secret", file, &e))?;
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
 }
 

@@ -1,7 +1,9 @@
 //! Report of a run in real time, as text and as JSON.
 
 use super::warnings::{no_contact, penetration, should_touch};
+use palpate_export::part_of;
 use palpate_haptics::link::LinkCounts;
+use palpate_haptics::log::LogSummary;
 use palpate_haptics::{DeviceReport, Percentiles, Report, Timing};
 use palpate_scene::{Scene, Warning, WarningKind};
 use serde_json::{Value, json};
@@ -80,7 +82,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "garbage": links.garbage,
         })),
         "warnings": super::warnings::json(scene, &warnings(scene, report)),
-        "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed })),
+        "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed, "whole": !log.is_cut })),
     })
 }
 
@@ -145,16 +147,22 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
     }
     out += &super::warnings::text(&warnings(scene, report));
     if let (Some(summary), Some(path)) = (report.log, log) {
-        out += &format!("  log          {} steps in {}", summary.steps, path.display());
-        if summary.missed > 0 {
-            out += &format!(
-                ", {} MISSED: the disk was too slow, a replay ends where they begin",
-                summary.missed
-            );
-        }
-        out += "\n";
+        out += &log_line(summary, path);
     }
     out
+}
+
+/// Log of the run, in a line.
+fn log_line(LogSummary { steps, missed, is_cut }: LogSummary, path: &Path) -> String {
+    let of = if is_cut { part_of(path) } else { path.to_path_buf() };
+    let lost = match (is_cut, missed) {
+        (true, missed) => format!(", {missed} MISSING: it could not be written further"),
+        (false, 0) => String::new(),
+        (false, missed) => {
+            format!(", {missed} MISSED: the disk was too slow, a replay ends where they begin")
+        }
+    };
+    format!("  log          {steps} steps in {}{lost}\n", of.display())
 }
 
 /// Warnings of the run.

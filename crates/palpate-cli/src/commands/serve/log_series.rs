@@ -1,14 +1,14 @@
 //! Logs of served scenes: one for each time that a scene begins anew.
 
 use crate::failure::Failure;
+use crate::growing_log::GrowingLog;
 use crate::terminal::{notify, warn_of_stores};
-use palpate_export::{AtomicFile, check_target, check_writable};
+use palpate_export::{PartFile, check_target, part_of};
 use palpate_haptics::log::LogSummary;
 use palpate_scene::SceneLog;
-use palpate_viewer::{LogFile, LogOpener, PageNotifier};
+use palpate_viewer::{LogFile, LogOpener};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Series of logs `OUT.mcap`, `OUT-2.mcap`, ….
@@ -19,7 +19,8 @@ pub struct LogSeries {
 
 #[derive(Default)]
 struct SoFar {
-    written: usize,
+    /// Logs that are kept, whole or in part.
+    kept: usize,
     /// First failure.
     failure: Option<String>,
 }
@@ -27,7 +28,8 @@ struct SoFar {
 impl LogSeries {
     /// Series whose first log has the given path.
     pub fn new(path: &Path) -> Result<Arc<Self>, Failure> {
-        check_writable(path, &[])?;
+        // An unfinished log of a run before is refused here, not when the scene runs.
+        PartFile::create(path, &[])?;
         Ok(Arc::new(Self { path: path.to_path_buf(), so_far: Mutex::default() }))
     }
 
@@ -37,12 +39,12 @@ impl LogSeries {
 
     /// Path of the next log. Only the first may replace a file: nobody has named the others.
     fn next(&self) -> PathBuf {
-        let written = self.lock().written;
-        if written == 0 {
+        let kept = self.lock().kept;
+        if kept == 0 {
             return self.path.clone();
         }
-        let mut names = (written + 1..).map(|number| numbered(&self.path, number));
-        names.find(|path| !path.exists()).unwrap_or_else(|| self.path.clone())
+        let mut names = (kept + 1..).map(|number| numbered(&self.path, number));
+        names.find(|path| !path.exists() && !part_of(path).exists()).unwrap_or_else(|| self.path.clone())
     }
 
     /// Function that begins logs of a scene.
@@ -51,23 +53,19 @@ impl LogSeries {
         let series = self.clone();
         Ok(Arc::new(move |state, pages| {
             let path = series.next();
-            let begun = Arc::new(AtomicBool::new(false));
-            let created = AtomicFile::create(&path, &scene.inputs()).map_err(Failure::from);
-            let file = created.map(|file| SeriesFile {
-                file,
-                path: path.clone(),
-                step_s: scene.step_s(),
-                series: series.clone(),
-                pages,
-                begun: begun.clone(),
-                failed: false,
-            });
-            let log = file.and_then(|file| {
+            let teller = series.clone();
+            let tell = move |text: &str| {
+                teller.note_failure(text);
+                pages(&format!("{text}. The scene goes on without it."));
+            };
+            let log = GrowingLog::create(&path, &scene.inputs(), Box::new(tell)).and_then(|file| {
+                let failures = file.failures();
                 warn_of_stores(&scene);
+                let file = SeriesFile { file, step_s: scene.step_s(), series: series.clone() };
                 let log = scene.begin(Box::new(file) as Box<dyn LogFile>, state);
+                failures.tell();
                 log.map_err(|error| Failure(format!("{}: {error}", path.display())))
             });
-            begun.store(true, Ordering::Relaxed);
             log.map_err(|failure| {
                 series.note_failure(&failure.0);
                 failure.0.into()
@@ -99,62 +97,43 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 
 /// Log of a series.
 struct SeriesFile {
-    file: AtomicFile,
-    path: PathBuf,
+    file: GrowingLog,
     step_s: f64,
     series: Arc<LogSeries>,
-    pages: PageNotifier,
-    /// Whether the log has begun; before that the opener reports failures.
-    begun: Arc<AtomicBool>,
-    failed: bool,
-}
-
-impl SeriesFile {
-    /// Reports the first failure at once: the scene goes on without a log.
-    fn watch<T>(&mut self, done: std::io::Result<T>) -> std::io::Result<T> {
-        let silent = self.failed || !self.begun.load(Ordering::Relaxed);
-        if let (Err(error), false) = (&done, silent) {
-            self.failed = true;
-            let text = format!("cannot write the log {}: {error}", self.path.display());
-            self.series.note_failure(&text);
-            (self.pages)(&format!("{text}. The scene goes on without it."));
-        }
-        done
-    }
 }
 
 impl Write for SeriesFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let done = Write::write(&mut self.file, bytes);
-        self.watch(done)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        let done = self.file.flush();
-        self.watch(done)
+        self.file.flush()
     }
 }
 
 impl Seek for SeriesFile {
     fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-        let done = self.file.seek(to);
-        self.watch(done)
+        self.file.seek(to)
     }
 }
 
 impl LogFile for SeriesFile {
-    fn finish(self: Box<Self>, LogSummary { steps, missed }: LogSummary) {
-        let Self { file, path, step_s, series, .. } = *self;
-        let path = path.display();
+    fn finish(self: Box<Self>, summary: LogSummary) {
+        let Self { file, step_s, series } = *self;
+        let path = file.path().display().to_string();
+        let LogSummary { steps, missed, is_cut } = summary;
+        series.lock().kept += usize::from(steps > 0);
+        if let Err(failure) = file.keep(summary) {
+            series.note_failure(&failure.0);
+        }
+        if is_cut {
+            return;
+        }
         if steps == 0 {
             notify(&format!("log {path}: no step was made, so it is not kept"));
             return;
         }
-        if let Err(error) = file.finish() {
-            series.note_failure(&error.to_string());
-            return;
-        }
-        series.lock().written += 1;
         let late = if missed == 0 {
             String::new()
         } else {

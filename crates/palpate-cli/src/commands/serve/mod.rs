@@ -5,8 +5,9 @@ mod scene_provider;
 
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
+use crate::log_kind::is_log;
 use crate::progress::CountBar;
-use crate::terminal::notify;
+use crate::terminal::{notify, warn_of_cut};
 use clap::Args;
 use indicatif::ProgressBar;
 use log_series::LogSeries;
@@ -17,7 +18,7 @@ use palpate_viewer::{Live, SceneProvider, ServedContent, Server, Settings, Viewe
 use scene_provider::LibraryProvider;
 use std::io::IsTerminal;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -96,15 +97,12 @@ pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn is_log(path: &Path) -> bool {
-    path.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("mcap"))
-}
-
 fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
     let server = serving.bind()?;
     let read = |(number, path): (usize, &PathBuf)| LogFramePlayer::read(path, number, LOG_FRAMES_HZ);
     let logs: Result<Vec<LogFramePlayer>, _> = paths.iter().enumerate().map(read).collect();
     let logs = logs?;
+    logs.iter().for_each(|log| warn_of_cut(log.log()));
     let frames = logs.iter().map(|log| log.frames.clone()).collect();
     let stop = stop_on_interrupt();
     std::thread::scope(|scope| {

@@ -1,0 +1,96 @@
+//! Log of a scene that runs: it grows as `NAME.part`, tells of a failure when it happens, and keeps what was written.
+
+use crate::failure::Failure;
+use palpate_export::PartFile;
+use palpate_haptics::log::LogSummary;
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Teller of a failure.
+pub type Teller = Box<dyn Fn(&str) + Send>;
+
+/// Log file. The part that was flushed stays, however the process ends.
+pub struct GrowingLog {
+    file: PartFile,
+    path: PathBuf,
+    tell: Teller,
+    failures: Failures,
+}
+
+/// Whether failures are told: those before the log has begun are errors of whoever begins it.
+#[derive(Clone, Default)]
+pub struct Failures(Arc<AtomicBool>);
+
+impl Failures {
+    /// Tells of the next failure.
+    pub fn tell(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl GrowingLog {
+    /// Creates the file. `tell` gets the text of the first failure, when it happens.
+    pub fn create(path: &Path, inputs: &[&Path], tell: Teller) -> Result<Self, Failure> {
+        let file = PartFile::create(path, inputs)?;
+        Ok(Self { file, path: path.to_path_buf(), tell, failures: Failures::default() })
+    }
+
+    /// Switch that is on once the log has begun.
+    pub fn failures(&self) -> Failures {
+        self.failures.clone()
+    }
+
+    /// Path that was asked for.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives a whole log its name, and says what can be had of one that is cut. A log without steps is removed.
+    pub fn keep(self, LogSummary { steps, missed, is_cut }: LogSummary) -> Result<(), Failure> {
+        let Self { file, path, .. } = self;
+        let (path, part) = (path.display(), file.part().display().to_string());
+        match (is_cut, steps) {
+            (false, 0) => Ok(file.discard()?),
+            (false, _) => Ok(file.finish().map(drop)?),
+            (true, 0) => {
+                Err(Failure(format!("the log {path} could not be written: none of {missed} steps are kept")))
+            }
+            (true, _) => Err(Failure(format!(
+                "the log {path} is incomplete: at least the first {steps} of {} steps are kept in {part}; `palpate recover {part} -o WHOLE.mcap` \
+                 makes a whole file of them",
+                steps + missed
+            ))),
+        }
+    }
+
+    /// Tells of the first failure at once: the scene goes on without a log.
+    fn watch<T>(&self, done: std::io::Result<T>) -> std::io::Result<T> {
+        if let Err(error) = &done
+            && self.failures.0.swap(false, Ordering::Relaxed)
+        {
+            (self.tell)(&format!("cannot write the log {}: {error}", self.path.display()));
+        }
+        done
+    }
+}
+
+impl Write for GrowingLog {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let done = self.file.write(bytes);
+        self.watch(done)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let done = self.file.flush();
+        self.watch(done)
+    }
+}
+
+impl Seek for GrowingLog {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        let done = self.file.seek(to);
+        self.watch(done)
+    }
+}
