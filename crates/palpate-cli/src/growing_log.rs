@@ -1,8 +1,10 @@
 //! Log of a scene that runs: it grows as `NAME.part`, tells of a failure when it happens, and keeps what was written.
 
 use crate::failure::Failure;
-use palpate_export::PartFile;
-use palpate_haptics::log::LogSummary;
+use palpate_export::{ExportError, PartFile};
+use palpate_fem::read_regular_file;
+use palpate_haptics::LogError;
+use palpate_haptics::log::{LogReader, LogSummary};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,7 +35,7 @@ impl Failures {
 impl GrowingLog {
     /// Creates the file. `tell` gets the text of the first failure, when it happens.
     pub fn create(path: &Path, inputs: &[&Path], tell: Teller) -> Result<Self, Failure> {
-        let file = PartFile::create(path, inputs)?;
+        let file = create_part(path, inputs)?;
         Ok(Self { file, path: path.to_path_buf(), tell, failures: Failures::default() })
     }
 
@@ -74,6 +76,27 @@ impl GrowingLog {
         }
         done
     }
+}
+
+/// Creates the file of a log that grows. One that was left without a whole step is replaced.
+pub fn create_part(path: &Path, inputs: &[&Path]) -> Result<PartFile, ExportError> {
+    match PartFile::create(path, inputs) {
+        Err(ExportError::Unfinished { part, .. }) if !has_steps(&part) => {
+            std::fs::remove_file(&part).map_err(|source| ExportError::Io {
+                action: "remove",
+                path: part,
+                source,
+            })?;
+            PartFile::create(path, inputs)
+        }
+        created => created,
+    }
+}
+
+/// Whether something can be read of an unfinished log; what is no log counts, too.
+fn has_steps(part: &Path) -> bool {
+    let Ok(bytes) = read_regular_file(part) else { return true };
+    !matches!(LogReader::new(bytes), Err(palpate_haptics::Error::Log(LogError::NoWholeStep)))
 }
 
 impl Write for GrowingLog {

@@ -45,7 +45,7 @@ pub mod timing;
 pub use clock::Clock;
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 #[doc(no_inline)]
-pub use error::Error;
+pub use error::{Error, LogError};
 pub use force_process::{ForceProcess, ObstacleTrajectory};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
 pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};

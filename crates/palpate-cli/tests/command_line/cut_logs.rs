@@ -88,15 +88,27 @@ fn a_killed_run_leaves_a_log_that_is_read_and_recovered() {
     assert_eq!(error, expected);
     assert_eq!(logged_steps(&workplace, "run.mcap.part"), steps);
 
+    // One that is killed at once leaves nothing that is worth refusing for.
+    let bytes = workplace.read("run.mcap.part");
+    workplace.write("other.mcap.part", &bytes[..2000]);
+    workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "other.mcap"]);
+    assert_eq!(
+        (logged_steps(&workplace, "other.mcap"), workplace.path("other.mcap.part").exists()),
+        (50, false)
+    );
+    workplace.write("notes.part", "no log");
+    let error = workplace.fail(&["run", "scene.toml", "--realtime", "--duration", "0.1", "--log", "notes"]);
+    assert!(error.starts_with("cannot write notes: notes.part is there"), "{error}");
+
     let error = workplace.fail(&["recover", "run.mcap.part", "-o", "run.mcap.part"]);
     assert_eq!(error, "cannot write run.mcap.part: it is one of the inputs");
     let recovered = workplace.json(&["recover", "run.mcap.part", "-o", "run.mcap", "--json"]);
     assert_eq!((&recovered["steps"], &recovered["log"]), (&steps.into(), &"run.mcap".into()));
     assert_eq!(said(&workplace, &["replay", "run.mcap"]), "");
     assert_eq!(workplace.json(&["inspect", "run.mcap", "--json"])["whole"], true);
-    let error = workplace.fail(&["recover", "run.mcap", "-o", "other.mcap"]);
+    let error = workplace.fail(&["recover", "run.mcap", "-o", "twice.mcap"]);
     assert_eq!(error, "run.mcap: the log is whole: there is nothing to recover");
-    assert!(!workplace.path("other.mcap").exists());
+    assert!(!workplace.path("twice.mcap").exists());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
 use super::messages::{EnergyMessage, SceneNames, StartMessage, StepMessage};
-use super::scan::{RecordReader, Scan, step_channel, step_count};
+use super::scan::{RecordReader, Scan, step_channel, step_count, unreadable};
 use super::writer::START;
 use crate::error::{Error, LogError};
 use glam::DVec3;
@@ -27,10 +27,6 @@ pub struct LoggedStep {
     /// Number of the step, from 1.
     pub step: u64,
     message: StepMessage,
-}
-
-pub(super) fn unreadable(error: impl std::fmt::Display) -> Error {
-    LogError::Unreadable { reason: error.to_string() }.into()
 }
 
 impl<'a> LogReader<'a> {

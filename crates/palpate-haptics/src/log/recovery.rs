@@ -1,7 +1,6 @@
 //! Recovery of a log that was cut: a whole file with all that can be read.
 
-use super::reader::unreadable;
-use super::scan::{RecordReader, Scan, step_count};
+use super::scan::{RecordReader, Scan, step_count, unreadable};
 use super::writer::{CHUNK_BYTES, failed, write_options};
 use crate::error::{Error, LogError};
 use mcap::read::parse_record;

@@ -8,8 +8,7 @@
 //! A chunk counts when its checksum is right. Reference: MCAP specification, records and chunks.
 
 use super::messages::STEP_TOPIC;
-use super::reader::unreadable;
-use crate::error::Error;
+use crate::error::{Error, LogError};
 use mcap::read::parse_record;
 use mcap::records::{AttachmentIndex, MetadataIndex, Record, Statistics, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -24,6 +23,11 @@ const MIN_LENGTH_LIMIT: usize = 16 << 20;
 
 /// Opcode of no record: a power cut leaves zeros where the disk had room but no data yet.
 const NO_RECORD: u8 = 0;
+
+/// Error of what is no log, or a damaged one.
+pub(super) fn unreadable(error: impl std::fmt::Display) -> Error {
+    LogError::Unreadable { reason: error.to_string() }.into()
+}
 
 /// Records of a piece of an MCAP file.
 pub(super) struct RecordReader<'a> {

@@ -1,9 +1,9 @@
 //! Logs of served scenes: one for each time that a scene begins anew.
 
 use crate::failure::Failure;
-use crate::growing_log::GrowingLog;
+use crate::growing_log::{GrowingLog, create_part};
 use crate::terminal::{notify, warn_of_stores};
-use palpate_export::{PartFile, check_target, part_of};
+use palpate_export::{check_target, part_of};
 use palpate_haptics::log::LogSummary;
 use palpate_scene::SceneLog;
 use palpate_viewer::{LogFile, LogOpener};
@@ -29,7 +29,7 @@ impl LogSeries {
     /// Series whose first log has the given path.
     pub fn new(path: &Path) -> Result<Arc<Self>, Failure> {
         // An unfinished log of a run before is refused here, not when the scene runs.
-        PartFile::create(path, &[])?;
+        create_part(path, &[])?;
         Ok(Arc::new(Self { path: path.to_path_buf(), so_far: Mutex::default() }))
     }
 
