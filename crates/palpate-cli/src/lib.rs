@@ -42,6 +42,8 @@ enum Command {
     Export(commands::export::Arguments),
     Device(Box<commands::device::Arguments>),
     Devices(commands::devices::Arguments),
+    #[command(hide = true)]
+    Guard(commands::guard::Arguments),
     Reproduce(commands::reproduce::Arguments),
     Verify(commands::verify::Arguments),
     Bench(commands::bench::Arguments),
@@ -53,7 +55,10 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
-    interrupt::install_handler();
+    // A guardian outlives what ends the others.
+    if !matches!(arguments.command, Command::Guard(_)) {
+        interrupt::install_handler();
+    }
     let done = match arguments.command {
         Command::Demo(arguments) => commands::demo::demo(&arguments),
         Command::Record(arguments) => commands::record::record(&arguments),
@@ -66,6 +71,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Export(arguments) => commands::export::export(&arguments),
         Command::Device(arguments) => commands::device::device(&arguments),
         Command::Devices(arguments) => commands::devices::devices(&arguments),
+        Command::Guard(arguments) => commands::guard::guard(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::reproduce(&arguments),
         Command::Verify(arguments) => commands::verify::verify(&arguments),
         Command::Bench(arguments) => commands::bench::bench(&arguments),

@@ -1,6 +1,7 @@
 //! Errors of sessions, devices, links, logs and paths, as kinds that a program can match.
 
 use crate::motion_path::PathError;
+use crate::safety_limits::{ImplausibleMotion, LimitError};
 use std::net::{IpAddr, SocketAddr};
 use thiserror::Error as ThisError;
 
@@ -23,6 +24,12 @@ pub enum Error {
     /// Invalid path file.
     #[error(transparent)]
     Path(#[from] PathError),
+    /// Motion that can't be one of a hand.
+    #[error(transparent)]
+    Motion(#[from] ImplausibleMotion),
+    /// Limit that can't be set.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The operating system started no thread.
     #[error("cannot start a thread for the {purpose}: {reason}")]
     ThreadSpawn {
@@ -168,6 +175,21 @@ pub enum DeviceError {
         driver: &'static str,
         /// Device.
         device: String,
+    },
+    /// No guardian could be started.
+    #[error(
+        "no guardian could be started ({reason}): a real device is not opened without one, since nothing would take its force \
+         away after a crash"
+    )]
+    NoGuardian {
+        /// Reason.
+        reason: String,
+    },
+    /// The guardian has ended before the device.
+    #[error("the guardian of the device has ended ({reason}): without one it gives no force, start again")]
+    GuardianGone {
+        /// Reason of the operating system.
+        reason: String,
     },
 }
 

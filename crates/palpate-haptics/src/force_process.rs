@@ -1,7 +1,9 @@
 //! Force process (paper, section 3.2): newest positions in, one step, forces out.
 
+use crate::motion_check::Ball;
 use crate::motion_path::MotionPath;
 use crate::port::{Effort, ForcePort, Motion};
+use crate::safety_limits::RefusedMotions;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
@@ -46,6 +48,8 @@ pub struct ForceProcess {
     steps: u64,
     /// Silence of a device [s] after which it is inactive.
     device_timeout_s: f64,
+    /// Ball around the objects at the start.
+    objects_at_start: Ball,
 }
 
 impl ForceProcess {
@@ -92,7 +96,9 @@ impl ForceProcess {
             bases: vec![None; objects],
             ..Input::default()
         };
+        let objects_at_start = objects_at_start(&model, &state);
         Self {
+            objects_at_start,
             model,
             state,
             input,
@@ -158,6 +164,11 @@ impl ForceProcess {
         &self.input
     }
 
+    /// Refused motions of every device, in the model's order.
+    pub fn refused_motions(&self) -> impl Iterator<Item = RefusedMotions> {
+        self.slots.iter().map(|slot| slot.port.check.refused())
+    }
+
     /// Number of steps since the start.
     pub fn steps(&self) -> u64 {
         self.steps
@@ -180,8 +191,8 @@ impl ForceProcess {
         let step_s = self.model.parameters().step_s;
         let time_s = self.steps as f64 * step_s;
 
-        // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent or
-        // where their position is not finite.
+        // Motions become the input of the step. Devices are inactive until they begin, and suspended while they are silent, or
+        // where their position is not finite or not plausible.
         for (slot, input) in self.slots.iter_mut().zip(&mut self.input.devices) {
             if let (Some(path), DeviceMode::Force(applied)) = (&slot.path, slot.mode) {
                 let force = path.mid_step(time_s, step_s);
@@ -193,12 +204,15 @@ impl ForceProcess {
                 let position = path.at(time_s).position;
                 motion = Motion { sequence: self.steps, time_s: now_s, position, ..Motion::default() };
             }
-            if motion.position.is_finite() {
+            let usable =
+                motion.position.is_finite() && slot.port.check.accepts(&motion, self.objects_at_start);
+            if usable {
                 slot.motion = motion;
             }
-            let silent = now_s - motion.time_s > self.device_timeout_s || !motion.position.is_finite();
+            // A motion of the future is as bad as an old one: a clock has jumped.
+            let silent = !usable || (now_s - motion.time_s).abs() > self.device_timeout_s;
             let mode = match motion.mode.unwrap_or(slot.mode) {
-                _ if motion.sequence == 0 => DeviceMode::Inactive,
+                _ if slot.motion.sequence == 0 => DeviceMode::Inactive,
                 DeviceMode::Inactive => DeviceMode::Inactive,
                 _ if silent => DeviceMode::Suspended,
                 mode => mode,
@@ -240,4 +254,16 @@ impl ForceProcess {
         }
         output
     }
+}
+
+/// Ball around all objects of a state.
+fn objects_at_start(model: &Model, state: &State) -> Ball {
+    let poses = state.output().objects.iter().map(|object| object.pose);
+    let corners = model.recordings().zip(poses).flat_map(|(recording, pose)| {
+        recording.surface.positions.iter().map(move |position| pose.world_from_body(*position))
+    });
+    let corners: Vec<DVec3> = corners.collect();
+    let centre = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+    let radius = corners.iter().map(|corner| (*corner - centre).length()).fold(0.0, f64::max);
+    Ball { centre, radius }
 }

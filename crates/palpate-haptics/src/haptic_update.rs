@@ -3,8 +3,9 @@
 use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::Error;
 use crate::passivity::PassivityController;
-use crate::port::{DevicePort, Motion};
-use crate::safety::{Safety, SafetyCounts};
+use crate::port::{DevicePort, Effort, Motion};
+use crate::safety::{Conditions, Reply, Safety, SafetyCounts};
+use crate::safety_limits::ImplausibleMotion;
 use crate::timing::DurationHistogram;
 use glam::{DQuat, DVec3};
 use std::time::Duration;
@@ -37,6 +38,8 @@ pub struct HapticUpdate {
     /// Newest motion that was replied to.
     replied: u64,
     motion_to_force: DurationHistogram,
+    /// First position [m, device frame].
+    start: Option<DVec3>,
     /// Time [s] and position [m, world] of the last reading.
     last: Option<(f64, DVec3)>,
     /// Filtered position that was sent last [m, world].
@@ -93,6 +96,7 @@ impl HapticUpdate {
             sent_at: vec![0.0; HISTORY].into_boxed_slice(),
             replied: 0,
             motion_to_force: DurationHistogram::default(),
+            start: None,
             last: None,
             filtered_position: None,
             updated_s: None,
@@ -139,13 +143,9 @@ impl HapticUpdate {
     pub fn cycle(&mut self, now_s: f64) {
         self.counts.updates += 1;
         let effort = self.port.newest();
-        if effort.in_reply_to > self.replied && effort.in_reply_to + HISTORY as u64 > self.sequence {
-            self.replied = effort.in_reply_to;
-            let sent = self.sent_at[(effort.in_reply_to % HISTORY as u64) as usize];
-            self.motion_to_force.record(Duration::from_secs_f64((now_s - sent).max(0.0)));
-        }
-        let age_s = if effort.sequence == 0 { f64::INFINITY } else { now_s - effort.time_s };
-        let since_update = self.updated_s.replace(now_s).map_or(0.0, |time| now_s - time);
+        let reply = self.reply(&effort, now_s);
+        let since_update_s = self.updated_s.replace(now_s).map(|time| now_s - time);
+        let mut conditions = Conditions { since_update_s, reply, speed_m_s: 0.0, distance_m: 0.0 };
 
         // Read. A device that fails gets no force, and is disarmed when it is lost.
         let reading = match self.device.read(now_s) {
@@ -156,7 +156,8 @@ impl HapticUpdate {
                     self.safety.arm(false);
                     self.buttons = u32::MAX;
                 }
-                let force = self.safety.limit(effort.force, f64::INFINITY, 0.0, since_update);
+                conditions.reply = None;
+                let force = self.safety.limit(effort.force, &conditions);
                 self.set_force(force, now_s);
                 return;
             }
@@ -168,7 +169,7 @@ impl HapticUpdate {
             self.sequence += 1;
             self.sent_at[(self.sequence % HISTORY as u64) as usize] = now_s;
             let orientation = reading.orientation.unwrap_or(DQuat::IDENTITY);
-            let filtered = self.filter(position, now_s, since_update);
+            let filtered = self.filter(position, now_s, since_update_s.unwrap_or(0.0));
             self.port.send(Motion {
                 sequence: self.sequence,
                 time_s: now_s,
@@ -185,19 +186,52 @@ impl HapticUpdate {
 
         // Work on the hand, and its speed.
         let before = self.last.replace((now_s, position));
-        let (dt, moved) = before.map_or((0.0, DVec3::ZERO), |(time, last)| (now_s - time, position - last));
+        // A clock that goes back gives no time.
+        let (dt, moved) =
+            before.map_or((0.0, DVec3::ZERO), |(time, last)| ((now_s - time).max(0.0), position - last));
         if moved.is_finite() {
             self.counts.work_on_hand_j += self.held.dot(moved);
         }
-        let speed = if dt > 0.0 { moved.length() / dt / self.mount.scale } else { 0.0 };
+        conditions.speed_m_s = if dt > 0.0 { moved.length() / dt / self.mount.scale } else { 0.0 };
+        conditions.distance_m = self.distance_from_start(reading.position);
 
         // Command the force, made passive and safe.
         let wanted = match &mut self.passivity {
             Some(passivity) => passivity.control(self.sequence, position, &effort, dt),
             None => effort.force,
         };
-        let force = self.safety.limit(wanted, age_s, speed, since_update);
+        let force = self.safety.limit(wanted, &conditions);
         self.set_force(force, now_s);
+    }
+
+    /// Reply of an effort at a time [s]; `None` for one that replies to no motion, and has no force. Records the latency of a new one.
+    fn reply(&mut self, effort: &Effort, now_s: f64) -> Option<Reply> {
+        if effort.sequence == 0 || effort.in_reply_to == 0 && effort.force == DVec3::ZERO {
+            return None;
+        }
+        let is_known = effort.in_reply_to > 0 && effort.in_reply_to + HISTORY as u64 > self.sequence;
+        let sent_s = self.sent_at[(effort.in_reply_to % HISTORY as u64) as usize];
+        let motion_age_s = if is_known { now_s - sent_s } else { f64::INFINITY };
+        let is_new = is_known && effort.in_reply_to > self.replied;
+        if is_new {
+            self.replied = effort.in_reply_to;
+            self.motion_to_force.record(Duration::from_secs_f64(motion_age_s.max(0.0)));
+        }
+        Some(Reply { force_age_s: now_s - effort.time_s, motion_age_s, is_new })
+    }
+
+    /// Distance of a position from the first one [m, device frame]. The first that is not plausible is noted.
+    fn distance_from_start(&mut self, position: DVec3) -> f64 {
+        let start = *self.start.get_or_insert(position);
+        if !start.is_finite() {
+            self.start = None;
+        }
+        let (distance_m, range_m) = ((position - start).length(), self.safety.limits().range_m);
+        if distance_m.is_finite() && distance_m > range_m {
+            self.failure
+                .get_or_insert_with(|| ImplausibleMotion::FarFromStart { distance_m, range_m }.into());
+        }
+        distance_m
     }
 
     /// Position [m, world], low-pass filtered if the device has an encoder.

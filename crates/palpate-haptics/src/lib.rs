@@ -19,6 +19,7 @@
 //! | run a scene with devices in real time | [`Session`] |
 //! | close a loop in simulated time | [`ForceProcess`], [`HapticUpdate`], [`port()`] |
 //! | write or use a driver | [`device`] |
+//! | leave a real device without force on every way out | [`guardian`] |
 //! | connect a device over a network | [`link`] |
 //! | write, read or replay a log | [`log`] |
 //! | choose a stable virtual coupling | [`stability`] |
@@ -28,14 +29,17 @@ mod deformation_process;
 pub mod device;
 pub mod error;
 mod force_process;
+pub mod guardian;
 mod haptic_update;
 pub mod link;
 pub mod log;
+mod motion_check;
 mod motion_path;
 mod passivity;
 mod playback;
 mod port;
 mod safety;
+mod safety_limits;
 mod scheduling;
 mod session;
 mod snapshot;
@@ -52,7 +56,8 @@ pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quat
 pub use passivity::PassivityController;
 pub use playback::Playback;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};
-pub use safety::{Safety, SafetyCounts, SafetyLimits};
+pub use safety::{Conditions, Reply, Safety, SafetyCounts};
+pub use safety_limits::{ImplausibleMotion, LimitError, MotionLimits, RefusedMotions, SafetyLimits};
 pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
 pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer};

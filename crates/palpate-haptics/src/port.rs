@@ -1,5 +1,7 @@
 //! Port between a haptic update and the force process: two values, motion and effort, of which only the newest counts.
 
+use crate::motion_check::MotionCheck;
+use crate::safety_limits::MotionLimits;
 use glam::{DQuat, DVec3};
 use palpate::DeviceMode;
 use triple_buffer::{Input, Output, triple_buffer};
@@ -73,6 +75,8 @@ pub(crate) enum MotionSink {
 
 /// Force process's side of a port.
 pub struct ForcePort {
+    /// Check of the motions; without limits by default.
+    pub(crate) check: MotionCheck,
     motion: Output<Motion>,
     effort: Input<Effort>,
 }
@@ -83,7 +87,7 @@ pub fn port() -> (DevicePort, ForcePort) {
     let (effort_in, effort_out) = triple_buffer(&Effort::default());
     (
         DevicePort { motion: MotionSink::Local(motion_in), effort: effort_out },
-        ForcePort { motion: motion_out, effort: effort_in },
+        ForcePort { check: MotionCheck::default(), motion: motion_out, effort: effort_in },
     )
 }
 
@@ -120,6 +124,13 @@ impl MotionSink {
 }
 
 impl ForcePort {
+    /// Port that refuses motions beyond limits: those of a device in another process, which may be in other units.
+    #[must_use]
+    pub fn with_limits(mut self, limits: MotionLimits) -> Self {
+        self.check.limits = Some(limits);
+        self
+    }
+
     /// Newest motion.
     ///
     /// # Real time

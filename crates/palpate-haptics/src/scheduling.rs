@@ -32,7 +32,7 @@ impl Scheduling {
         GrantedScheduling { priority: self.apply_priority(), core: self.apply_core(), memory: lock_memory() }
     }
 
-    fn apply_priority(&self) -> Result<Option<u8>, String> {
+    pub(crate) fn apply_priority(&self) -> Result<Option<u8>, String> {
         let Some(priority) = self.priority else { return Ok(None) };
         let value =
             ThreadPriorityValue::try_from(priority).map_err(|what| format!("priority {priority}: {what}"))?;

@@ -10,7 +10,8 @@ use crate::motion_path::MotionPath;
 use crate::passivity::PassivityController;
 use crate::playback::Playback;
 use crate::port::{DevicePort, ForcePort, port};
-use crate::safety::{Safety, SafetyLimits};
+use crate::safety::Safety;
+use crate::safety_limits::{RefusedMotions, SafetyLimits};
 use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer};
 use crate::timing::{Cycle, CycleSender, DurationHistogram, Overrun, Timing};
@@ -23,6 +24,9 @@ use std::time::{Duration, Instant};
 
 /// Lead of the haptic updates over the force process.
 const HEAD_START: Duration = Duration::from_millis(20);
+
+/// Periods of the haptic update within its watchdog: one update may be missed.
+const MISSED_UPDATES: f64 = 2.0;
 
 /// Attached device: a driver with the settings of its haptic update.
 pub struct AttachedDevice {
@@ -95,6 +99,8 @@ pub struct Report {
     pub deformation: Timing,
     /// Reports of the devices, in the model's order; `None` for remote devices and paths.
     pub devices: Vec<Option<DeviceReport>>,
+    /// Refused motions of the devices, in the model's order.
+    pub refused_motions: Vec<RefusedMotions>,
     /// Final state.
     pub state: State,
     /// Number of steps.
@@ -263,6 +269,7 @@ impl Session {
                 force: forces.timing,
                 deformation,
                 devices: devices?,
+                refused_motions: forces.process.refused_motions().collect(),
                 steps,
                 state: forces.process.into_state(),
                 unsolved_steps: forces.unsolved_steps,
@@ -461,13 +468,17 @@ impl SessionDevice {
 
 impl AttachedDevice {
     /// Haptic update of the device on a port, with a passivity controller if `passive` is set. The force limit is at most the
-    /// device's.
+    /// device's; the watchdog bears an update that is missed, also at a low rate.
     pub fn update(self, port: DevicePort) -> HapticUpdate {
         let Self { device, mount, rate_hz, limits, passive, arm_by_button, .. } = self;
         let spec = device.spec();
         let controller =
             PassivityController::new(spec.mass_kg, spec.resolution_m * mount.scale, 1.0 / rate_hz);
-        let safety = Safety::new(SafetyLimits { force_n: limits.force_n.min(spec.force_n), ..limits });
+        let safety = Safety::new(SafetyLimits {
+            force_n: limits.force_n.min(spec.force_n),
+            watchdog_s: limits.watchdog_s.max(MISSED_UPDATES / rate_hz),
+            ..limits
+        });
         HapticUpdate::new(device, port, mount, safety, passive.then_some(controller), arm_by_button)
     }
 }

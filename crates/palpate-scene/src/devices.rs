@@ -1,5 +1,6 @@
 //! Devices by name: drivers of real devices, traits of simulated ones, grips of a hand.
 
+use palpate_haptics::SafetyLimits;
 use palpate_haptics::device::{DeviceSpec, Driver, Hand, Mount};
 
 /// Real device with its limits.
@@ -13,6 +14,8 @@ pub struct RealDevice {
     pub mount: Mount,
     /// Force limit [N]; none for the default of [`SafetyLimits`](palpate_haptics::SafetyLimits).
     pub max_force_n: Option<f64>,
+    /// Safety limits; `max_force_n` replaces that of the force.
+    pub limits: SafetyLimits,
     /// Whether forces are on from the start; otherwise from the press of a button.
     pub armed: bool,
 }

@@ -5,9 +5,9 @@ use crate::warning::Warning;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
 use palpate_export::{DeviceLabel, ProbeLabel, SceneLabels};
-use palpate_haptics::MotionPath;
 use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::log::SceneNames;
+use palpate_haptics::{MotionLimits, MotionPath};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -52,6 +52,8 @@ pub struct SceneDevice {
     pub simulated: Option<(DeviceSpec, Hand)>,
     /// Real device.
     pub real: Option<RealDevice>,
+    /// Limits of the motions that come over a link.
+    pub motion_limits: MotionLimits,
     /// Whether it is a pointer of the viewer's page.
     pub pointer: bool,
 }

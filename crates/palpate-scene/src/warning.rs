@@ -45,6 +45,8 @@ pub enum WarningKind {
     Unsolved,
     /// Contacts were left out beyond the limit of contact points.
     DroppedContacts,
+    /// Motions of a linked device were not those of a hand.
+    RefusedMotions,
     /// Held directions repeat others.
     DependentRows,
 }

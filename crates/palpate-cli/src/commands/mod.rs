@@ -5,6 +5,7 @@ pub mod demo;
 pub mod device;
 pub mod devices;
 pub mod export;
+pub mod guard;
 pub mod inspect;
 pub mod record;
 pub mod recover;

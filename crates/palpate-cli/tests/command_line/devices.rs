@@ -1,7 +1,7 @@
 //! Real devices, against a stand-in for Force Dimension's library: nothing else is there.
 
 #[path = "../../../palpate-haptics/tests/standins/compile.rs"]
-mod compile;
+pub mod compile;
 
 use crate::workplace::Workplace;
 

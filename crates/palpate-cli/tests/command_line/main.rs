@@ -9,6 +9,7 @@ mod devices;
 mod experiments;
 mod exports;
 mod glb;
+mod guardian;
 mod loads;
 mod old_logs;
 mod realtime;

@@ -9,9 +9,10 @@ use super::driver::{DiscoveredDevice, select};
 use super::library::{Vendor, functions};
 use super::{Device, DeviceSpec, Reading, handle_orientation};
 use crate::error::{DeviceError, Error};
-use crate::safety::SafetyLimits;
+use crate::safety_limits::SafetyLimits;
 use glam::{DMat3, DVec3};
 use std::ffi::{CStr, c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
+use std::time::{Duration, Instant};
 
 pub(super) static VENDOR: Vendor = Vendor {
     driver: "dhd",
@@ -25,6 +26,13 @@ const LOST_S: f64 = 0.1;
 
 /// Interval between attempts to reopen a lost device [s].
 const RETRY_INTERVAL_S: f64 = 1.0;
+
+/// Watchdog of the device: time without a command after which its firmware disables forces. It is above the 20 ms from one update to
+/// the next at the lowest rate (50 Hz), and at most 255 units.
+const WATCHDOG: Duration = Duration::from_millis(30);
+
+/// Unit of the watchdog [µs].
+const WATCHDOG_UNIT_MICROS: u128 = 125;
 
 const OFF: c_uchar = 0;
 const ON: c_uchar = 1;
@@ -54,6 +62,8 @@ struct Dhd {
     functions: Functions,
     /// `dhdGetMaxForce`, missing in old versions.
     max_force: Option<unsafe extern "C" fn(c_char) -> c_double>,
+    /// `dhdSetWatchdog`, missing before version 3.3.2.
+    set_watchdog: Option<unsafe extern "C" fn(c_uchar, c_char) -> c_int>,
 }
 
 /// Open device.
@@ -66,6 +76,8 @@ pub(super) struct ForceDimension {
     spec: DeviceSpec,
     failing_since: Option<f64>,
     next_try_s: f64,
+    /// Time of the last command; `None` before the first.
+    commanded: Option<Instant>,
 }
 
 /// Connected devices.
@@ -89,6 +101,7 @@ pub(super) fn open(which: &str, location: Option<&str>) -> Result<(DiscoveredDev
         wrist,
         failing_since: None,
         next_try_s: f64::NEG_INFINITY,
+        commanded: None,
     };
     Ok((found, device))
 }
@@ -120,7 +133,9 @@ impl Dhd {
         let loaded = VENDOR.load(location)?;
         // SAFETY: the type is that of the vendor's published header.
         let max_force = unsafe { loaded.function("dhdGetMaxForce") }.ok();
-        Ok(Self { functions: Functions::of(&loaded)?, max_force })
+        // SAFETY: as above.
+        let set_watchdog = unsafe { loaded.function("dhdSetWatchdog") }.ok();
+        Ok(Self { functions: Functions::of(&loaded)?, max_force, set_watchdog })
     }
 
     fn find(&self) -> Result<Vec<DiscoveredDevice>, Error> {
@@ -173,7 +188,7 @@ impl Dhd {
         }
     }
 
-    /// Opens a device, with forces enabled and zero. Returns its id and whether it has a wrist.
+    /// Opens a device, with forces enabled and zero, and its watchdog set. Returns its id and whether it has a wrist.
     fn open(&self, index: usize) -> Result<(c_char, bool), Error> {
         // SAFETY: a plain call; an invalid index is refused.
         let id = unsafe { (self.functions.dhdOpenID)(index as c_char) };
@@ -191,7 +206,22 @@ impl Dhd {
             unsafe { (self.functions.dhdClose)(id) };
             return Err(error);
         }
+        if let Some(set_watchdog) = self.set_watchdog {
+            let units = (WATCHDOG.as_micros() / WATCHDOG_UNIT_MICROS) as c_uchar;
+            // SAFETY: the device is open. Devices without a watchdog refuse, and go on.
+            unsafe { set_watchdog(units, id) };
+        }
         Ok((id, wrist))
+    }
+
+    /// Commands zero force, and enables forces again.
+    fn enable_again(&self, id: c_char) -> Result<(), Error> {
+        self.command(id, DVec3::ZERO)?;
+        // SAFETY: a plain call with an open device.
+        if unsafe { (self.functions.dhdEnableForce)(ON, id) } < 0 {
+            return Err(self.call_error("switch forces on"));
+        }
+        Ok(())
     }
 
     /// Commands a force [N, vendor's frame], with zero torque and gripper force.
@@ -297,6 +327,8 @@ impl Device for ForceDimension {
             Err(_) if now_s - *self.failing_since.get_or_insert(now_s) > LOST_S => {
                 self.close();
                 self.failing_since = None;
+                // The next reading opens it again, which may take long.
+                return Err(self.disconnected());
             }
             Err(_) => {}
         }
@@ -305,7 +337,10 @@ impl Device for ForceDimension {
 
     fn set_force(&mut self, force: DVec3, _: f64) -> Result<(), Error> {
         let force = if force.is_finite() { force } else { DVec3::ZERO };
+        let before = self.commanded.replace(Instant::now());
         match self.id {
+            // The device's watchdog has disabled forces: they come back from zero.
+            Some(id) if before.is_some_and(|time| time.elapsed() > WATCHDOG) => self.dhd.enable_again(id),
             Some(id) => self.dhd.command(id, dhd_from_ours(force)),
             // A lost device gives no force.
             None if force == DVec3::ZERO => Ok(()),

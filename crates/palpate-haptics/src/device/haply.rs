@@ -9,7 +9,7 @@ use super::driver::{DiscoveredDevice, select};
 use super::exchange::{DriverSide, STALE_AFTER, UpdateSide, exchange};
 use super::{Device, DeviceSpec, Reading, orientation_from_quaternion};
 use crate::error::{DeviceError, Error};
-use crate::safety::SafetyLimits;
+use crate::safety_limits::SafetyLimits;
 use glam::DVec3;
 use serde::Deserialize;
 use std::net::{TcpStream, ToSocketAddrs};

@@ -2,7 +2,7 @@
 
 use super::identity::Secret;
 use super::lock;
-use super::messages::{Hello, Welcome, effort, motion_bytes};
+use super::messages::{Hello, Welcome, effort, motion_bytes, taken};
 use super::sequence::SequenceFilter;
 use super::server::runtime;
 use super::transport::transport;
@@ -32,6 +32,8 @@ pub enum LinkState {
     Connecting(String),
     /// Connected: both ends have authenticated.
     Connected,
+    /// Refused while another device has the name; tried again.
+    Taken(String),
     /// Refused by the server, with its reason.
     Refused(String),
 }
@@ -194,6 +196,7 @@ impl Link {
         })?;
         match serde_json::from_slice(&answer) {
             Ok(Welcome::Accepted) => Ok(connection),
+            Ok(Welcome::Refused(why)) if why == taken(&self.device) => Err(LinkState::Taken(why)),
             Ok(Welcome::Refused(why)) => Err(LinkState::Refused(why)),
             Err(_) => Err(lost("it was answered")),
         }

@@ -35,6 +35,11 @@ pub(super) enum Welcome {
     Refused(String),
 }
 
+/// Reason of a refusal while another device has the name.
+pub(super) fn taken(device: &str) -> String {
+    format!("the device {device:?} is taken")
+}
+
 /// Numbers from little-endian bytes; `None` if the length differs.
 fn numbers<const N: usize>(bytes: &[u8]) -> Option<[f64; N]> {
     let (chunks, rest) = bytes.as_chunks::<8>();

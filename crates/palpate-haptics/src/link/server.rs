@@ -2,7 +2,7 @@
 
 use super::identity::Secret;
 use super::lock;
-use super::messages::{Hello, Welcome, effort_bytes, motion};
+use super::messages::{Hello, Welcome, effort_bytes, motion, taken};
 use super::sequence::SequenceFilter;
 use super::transport::transport;
 use crate::clock::Clock;
@@ -288,7 +288,7 @@ async fn greet(connection: &Connection, slots: &DeviceSlots) -> Option<(String, 
             let port = lock(&slots.free).remove(device);
             port.map(|port| (device.clone(), port)).ok_or_else(|| {
                 if slots.names.contains(device) {
-                    format!("the device {device:?} is taken")
+                    taken(device)
                 } else {
                     format!("the scene has no device {device:?} for a link, only {}", slots.names.join(", "))
                 }

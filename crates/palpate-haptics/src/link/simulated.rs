@@ -28,6 +28,10 @@ const TICK_MS: u64 = 1;
 /// Time that a datagram is under way at least [ms].
 const LATENCY_MS: u64 = 2;
 
+/// Ports of the server and of the client.
+const SERVER: u16 = 1;
+const CLIENT: u16 = 2;
+
 /// Ticks after which a wait has failed.
 const MAX_TICKS: u64 = 30_000;
 
@@ -54,6 +58,10 @@ struct Faults {
     late_ms: f64,
     /// Whether nothing passes.
     cut: bool,
+    /// Whether nothing passes from the device to the scene.
+    cut_motions: bool,
+    /// Latency beyond the usual one [ms].
+    slow_ms: u64,
 }
 
 /// Datagrams that have arrived at a socket, with their senders.
@@ -98,10 +106,11 @@ impl Network {
     fn send(&self, from: SocketAddr, to: SocketAddr, datagram: &[u8]) {
         let (faults, mut random) = (*lock(&self.faults), lock(&self.random));
         let Some(inbox) = lock(&self.inboxes).get(&to).cloned() else { return };
-        let lost = faults.cut || random.chance(faults.lost);
+        let cut = faults.cut || faults.cut_motions && to.port() == SERVER;
+        let lost = cut || random.chance(faults.lost);
         let copies = if lost { 0 } else { 1 + u32::from(random.chance(faults.doubled)) };
         for _ in 0..copies {
-            let late_ms = LATENCY_MS + random.within(0.0, faults.late_ms) as u64;
+            let late_ms = LATENCY_MS + faults.slow_ms + random.within(0.0, faults.late_ms) as u64;
             let (inbox, datagram) = (inbox.clone(), datagram.to_vec());
             tokio::spawn(async move {
                 tokio::time::sleep(Duration::from_millis(late_ms)).await;
@@ -198,23 +207,24 @@ struct Linked {
 }
 
 impl Linked {
-    fn new() -> Self {
+    fn new(limits: SafetyLimits) -> Self {
         let network = Network::new(1);
         let secret = Secret::new("only for this test").expect("long enough");
         let start = Instant::now();
         let (device_port, force_port) = port();
         let config = server_config(&secret).expect("a configuration");
         let ports = vec![("finger".to_string(), device_port)];
-        let (server, listening) = LinkServer::on(network.endpoint(1, Some(config)), ports, start.into_std());
+        let (server, listening) =
+            LinkServer::on(network.endpoint(SERVER, Some(config)), ports, start.into_std());
         tokio::spawn(listening);
         let address = server.address().expect("an address");
-        let own = network.endpoint(2, None);
+        let own = network.endpoint(CLIENT, None);
         let (port, client, connected) =
             LinkClient::on(own, address, &secret, "finger", start.into_std()).expect("a client");
         tokio::spawn(connected);
         let pushes = Arc::new(Mutex::new(Vec::new()));
         let device = Box::new(ForceRecorder { pushes: pushes.clone() });
-        let limits = SafetyLimits { ramp_up_s: 0.05, recovery_s: 0.05, ..SafetyLimits::default() };
+        let limits = SafetyLimits { ramp_up_s: 0.05, recovery_s: 0.05, ..limits };
         let update = HapticUpdate::new(device, port, Mount::default(), Safety::new(limits), None, false);
         Self { network, server, client, update, force_port, start, tick: 0, silent: 0, pushes }
     }
@@ -253,16 +263,23 @@ impl Linked {
     }
 }
 
+/// Runs a test in simulated time.
+fn in_simulated_time(test: impl Future<Output = ()>) {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
+    runtime.expect("a runtime").block_on(test);
+}
+
 #[test]
 fn a_force_ramps_down_when_the_link_is_cut_and_comes_back_by_itself() {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
-    runtime.expect("a runtime").block_on(async {
-        let mut linked = Linked::new();
+    in_simulated_time(async {
+        // Both ways are late by up to 32 ms.
+        let weather = SafetyLimits { motion_age_s: 0.2, round_trip_s: 0.2, ..SafetyLimits::default() };
+        let mut linked = Linked::new(weather);
         linked.until_whole("the link comes").await;
         assert_eq!(linked.client.state(), LinkState::Connected);
 
         // Bad weather: a fifth is lost, some come twice, all late by up to 30 ms, so that many overtake others.
-        linked.network.set(Faults { lost: 0.2, doubled: 0.1, late_ms: 30.0, cut: false });
+        linked.network.set(Faults { lost: 0.2, doubled: 0.1, late_ms: 30.0, ..Faults::default() });
         for _ in 0..500 {
             linked.tick().await;
         }
@@ -297,4 +314,48 @@ fn a_force_ramps_down_when_the_link_is_cut_and_comes_back_by_itself() {
         assert!(counts.safety.trips >= 2 && counts.force_max_n <= 1.0 + LIMITED_N, "{counts:?}");
         assert!(linked.silent > 100, "the force process noticed the silence: {}", linked.silent);
     });
+}
+
+#[test]
+fn forces_that_answer_an_old_motion_are_taken_away_and_counted_though_they_arrive() {
+    in_simulated_time(async {
+        let mut linked = Linked::new(SafetyLimits::default());
+        for cut in 1..=5 {
+            linked.until_whole("force before the cut").await;
+            // Shorter than the 0.1 s after which the force process suspends a silent device.
+            linked.network.set(Faults { cut_motions: true, ..Faults::default() });
+            let cut_s = linked.now_s();
+            for _ in 0..90 {
+                linked.tick().await;
+            }
+            linked.network.set(Faults::default());
+            let gone =
+                lock(&linked.pushes).iter().find(|push| push.0 > cut_s && push.1 == DVec3::ZERO).copied();
+            let took_ms = (gone.expect("it goes").0 - cut_s) * 1e3;
+            // The limit of 50 ms, 20 ms of ramp, and a tick at either end.
+            assert!((50.0..=72.0 + TIME_ROUND_OFF_MS).contains(&took_ms), "gone after {took_ms} ms");
+            let safety = linked.update.counts().safety;
+            assert_eq!((safety.trips, safety.stale, safety.slow_replies), (cut, 0, 0), "{safety:?}");
+            assert!(safety.old_motions >= 35 * cut, "{safety:?}");
+        }
+    });
+}
+
+#[test]
+fn a_round_trip_of_600_ms_gives_no_force_unless_it_is_allowed() {
+    let allowed = SafetyLimits { motion_age_s: 0.7, round_trip_s: 0.7, ..SafetyLimits::default() };
+    for (limits, is_felt) in [(SafetyLimits::default(), false), (allowed, true)] {
+        in_simulated_time(async {
+            let mut linked = Linked::new(limits);
+            linked.until_whole("the link comes").await;
+            linked.network.set(Faults { slow_ms: 298, ..Faults::default() });
+            for _ in 0..2000 {
+                linked.tick().await;
+            }
+            let safety = linked.update.counts().safety;
+            let slow = safety.slow_replies > 900 && safety.old_motions > 900;
+            let force = linked.tick().await;
+            assert_eq!((slow, force.z > WHOLE_N), (!is_felt, is_felt), "{safety:?}, {force}");
+        });
+    }
 }

@@ -97,7 +97,9 @@ impl Loop {
         for _ in 0..ticks {
             self.tick += 1;
             let now_s = self.tick as f64 * 1e-3;
-            let effort = Effort { sequence: self.tick, time_s: now_s, force: DVec3::Y, ..Effort::default() };
+            let in_reply_to = self.port.newest().sequence;
+            let (force, absorbed_j) = (DVec3::Y, 0.0);
+            let effort = Effort { sequence: self.tick, in_reply_to, time_s: now_s, force, absorbed_j };
             self.port.send(effort);
             self.update.cycle(now_s);
         }
@@ -180,4 +182,26 @@ fn numbers_that_are_not_finite_never_reach_the_hand() {
     }
     let safety = it.update.counts().safety;
     assert!(safety.not_finite > 2 && safety.overspeed > 0, "{safety:?}");
+}
+
+#[test]
+fn the_device_s_own_watchdog_is_set_and_forces_come_back_from_zero_after_it() {
+    let standin = Standin::new("libdhd");
+    let mut device = open(&standin, "0");
+    assert_eq!(standin.function::<extern "C" fn(usize) -> u32>("standin_watchdog")(0), 30_000, "30 ms");
+    let is_on = standin.function::<IsOpen>("standin_is_on");
+    let mut push = || device.set_force(DVec3::Y, 0.0).expect("it pushes");
+    push();
+    // However busy the machine is: within the watchdog's time at some time.
+    palpate_testkit::wait_until("a force", || {
+        push();
+        standin.force(0) == [0.0, 0.0, 1.0]
+    });
+    std::thread::sleep(std::time::Duration::from_millis(40));
+    push();
+    assert!(is_on(0) && standin.force(0) == [0.0; 3], "zero first: {:?}", standin.force(0));
+    palpate_testkit::wait_until("the force again", || {
+        push();
+        standin.force(0) == [0.0, 0.0, 1.0]
+    });
 }

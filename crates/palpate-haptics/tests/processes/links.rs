@@ -77,7 +77,7 @@ fn clients_with_another_secret_are_refused_and_garbage_is_dropped() {
     let (mut first_port, first) = link(&secret, "finger");
     assert_eq!(settled(&first), LinkState::Connected);
     let (_port, second) = link(&secret, "finger");
-    assert_eq!(settled(&second), LinkState::Refused("the device \"finger\" is taken".to_string()));
+    assert_eq!(settled(&second), LinkState::Taken("the device \"finger\" is taken".to_string()));
     drop(second);
 
     // Whatever is thrown at the socket, what is linked goes on.

@@ -1,6 +1,7 @@
 //! The processes in simulated time and as threads.
 
 mod allocations;
+mod clocks;
 mod closed_loop;
 mod cut_logs;
 mod links;

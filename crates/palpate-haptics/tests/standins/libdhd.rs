@@ -4,8 +4,13 @@
 
 #![allow(non_snake_case)]
 
+mod amplifier;
+
+use amplifier::Amplifier;
 use std::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
+use std::fs::File;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 #[derive(Clone, Copy)]
 struct One {
@@ -16,6 +21,9 @@ struct One {
     buttons: c_uint,
     force: [f64; 3],
     serial: c_ushort,
+    /// Watchdog [125 µs]; 0 for none.
+    watchdog: c_uchar,
+    commanded: Option<Instant>,
 }
 
 struct World {
@@ -23,13 +31,16 @@ struct World {
     failing: bool,
     max_force: f64,
     devices: [One; 2],
+    /// The first device's file, while it is open.
+    amplifier: Option<File>,
     error: &'static std::ffi::CStr,
 }
 
 const UNTURNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 const fn one(serial: c_ushort) -> One {
-    One { open: false, forces_on: false, position: [0.0; 3], frame: UNTURNED, buttons: 0, force: [0.0; 3], serial }
+    let (position, force) = ([0.0; 3], [0.0; 3]);
+    One { open: false, forces_on: false, position, frame: UNTURNED, buttons: 0, force, serial, watchdog: 0, commanded: None }
 }
 
 static WORLD: Mutex<World> = Mutex::new(World {
@@ -37,6 +48,7 @@ static WORLD: Mutex<World> = Mutex::new(World {
     failing: false,
     max_force: -1.0,
     devices: [one(301), one(702)],
+    amplifier: None,
     error: c"no error",
 });
 
@@ -60,7 +72,23 @@ impl World {
             return self.fail(c"no device found");
         }
         act(&mut self.devices[at]);
+        self.save();
         0
+    }
+
+    /// Writes the first device's state into its file.
+    fn save(&mut self) {
+        let One { open, forces_on, force, .. } = self.devices[0];
+        self.amplifier.iter_mut().for_each(|file| Amplifier { open, forces_on, force }.save(file));
+    }
+}
+
+impl One {
+    /// What the firmware does when no command came for too long.
+    fn watch(&mut self) {
+        let limit = Duration::from_micros(125) * u32::from(self.watchdog);
+        let late = self.commanded.replace(Instant::now()).is_some_and(|time| time.elapsed() > limit);
+        self.forces_on &= self.watchdog == 0 || !late;
     }
 }
 
@@ -79,15 +107,30 @@ pub extern "C" fn dhdOpenID(index: c_char) -> c_int {
     if world.devices[at].open {
         return world.fail(c"device is already in use");
     }
+    if at == 0 {
+        let Ok((file, Amplifier { forces_on, force, .. })) = Amplifier::claim() else {
+            return world.fail(c"device is already in use");
+        };
+        if file.is_some() {
+            (world.devices[0].forces_on, world.devices[0].force) = (forces_on, force);
+        }
+        world.amplifier = file;
+    }
     world.devices[at].open = true;
+    world.save();
     index as c_int
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdClose(id: c_char) -> c_int {
-    let one = &mut world().devices[id as usize];
+    let mut world = world();
+    let one = &mut world.devices[id as usize];
     one.open = false;
     one.forces_on = false;
+    if id == 0 {
+        world.save();
+        world.amplifier = None;
+    }
     0
 }
 
@@ -146,7 +189,15 @@ pub extern "C" fn dhdSetForceAndTorqueAndGripperForce(
     id: c_char,
 ) -> c_int {
     assert_eq!((tx, ty, tz, grip), (0.0, 0.0, 0.0, 0.0));
-    world().on(id, |one| one.force = if one.forces_on { [x, y, z] } else { [f64::NAN; 3] })
+    world().on(id, |one| {
+        one.watch();
+        one.force = if one.forces_on || [x, y, z] == [0.0; 3] { [x, y, z] } else { [f64::NAN; 3] };
+    })
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn dhdSetWatchdog(duration: c_uchar, id: c_char) -> c_int {
+    world().on(id, |one| one.watchdog = duration)
 }
 
 #[unsafe(no_mangle)]
@@ -188,10 +239,21 @@ pub extern "C" fn standin_fail(failing: bool) {
     world().failing = failing;
 }
 
-/// The force that a device gives; not a number for one that was set before forces were on.
+/// The force that a device gives; not a number for one that was set while forces were off.
 #[unsafe(no_mangle)]
 pub extern "C" fn standin_force(id: usize, force: &mut [f64; 3]) {
     *force = world().devices[id].force;
+}
+
+/// The watchdog's time [µs].
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_watchdog(id: usize) -> u32 {
+    125 * u32::from(world().devices[id].watchdog)
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn standin_is_on(id: usize) -> bool {
+    world().devices[id].forces_on
 }
 
 #[unsafe(no_mangle)]

@@ -4,7 +4,11 @@
 
 #![allow(non_snake_case)]
 
+mod amplifier;
+
+use amplifier::Amplifier;
 use std::ffi::{CStr, c_char, c_double, c_int, c_uint, c_ulong, c_ushort, c_void};
+use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -46,6 +50,8 @@ const ONE: One = One {
 
 struct World {
     devices: [One; 2],
+    /// The first device's file, while it is open.
+    amplifier: Option<File>,
     current: usize,
     errors: Vec<c_uint>,
     /// An error of every frame.
@@ -58,6 +64,7 @@ struct World {
 
 static WORLD: Mutex<World> = Mutex::new(World {
     devices: [ONE; 2],
+    amplifier: None,
     current: 0,
     errors: Vec::new(),
     fault: 0,
@@ -76,6 +83,12 @@ fn world() -> MutexGuard<'static, World> {
 }
 
 impl World {
+    /// Writes the first device's state into its file.
+    fn save(&mut self) {
+        let One { open, forces_on, force, .. } = self.devices[0];
+        self.amplifier.iter_mut().for_each(|file| Amplifier { open, forces_on, force }.save(file));
+    }
+
     /// The device of a frame; what is called outside of one is an error.
     fn in_frame(&mut self) -> Option<&mut One> {
         if !self.devices[self.current].in_frame {
@@ -96,23 +109,39 @@ pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
         Some("Left") => 1,
         Some(_) => 2,
     };
-    let error = match world.devices.get(at) {
+    let mut error = match world.devices.get(at) {
         Some(one) if one.open => 0x0301,
         Some(_) if world.present => 0,
         _ => 0x0302,
     };
+    if error == 0 && at == 0 {
+        match Amplifier::claim() {
+            Err(()) => error = 0x0301,
+            Ok((None, _)) => {}
+            Ok((file, Amplifier { forces_on, force, .. })) => {
+                (world.devices[0].forces_on, world.devices[0].force) = (forces_on, force);
+                world.amplifier = file;
+            }
+        }
+    }
     if error != 0 {
         world.errors.push(error);
         return 0xFFFF_FFFF;
     }
     world.devices[at].open = true;
     world.current = at;
+    world.save();
     at as c_uint
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn hdDisableDevice(device: c_uint) {
-    world().devices[device as usize].open = false;
+    let mut world = world();
+    world.devices[device as usize].open = false;
+    if device == 0 {
+        world.save();
+        world.amplifier = None;
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -141,6 +170,7 @@ pub extern "C" fn hdEndFrame(device: c_uint) {
     one.pushed |= one.force != [0.0; 3];
     // What is not set in the next frame is none.
     one.wanted = [0.0; 3];
+    world.save();
 }
 
 #[unsafe(no_mangle)]
@@ -148,6 +178,7 @@ pub extern "C" fn hdEnable(what: c_uint) {
     let mut world = world();
     let current = world.current;
     world.devices[current].forces_on |= what == 0x4000;
+    world.save();
 }
 
 #[unsafe(no_mangle)]
@@ -155,6 +186,7 @@ pub extern "C" fn hdDisable(what: c_uint) {
     let mut world = world();
     let current = world.current;
     world.devices[current].forces_on &= what != 0x4000;
+    world.save();
 }
 
 #[unsafe(no_mangle)]

@@ -1,7 +1,7 @@
 //! `[[device]]`: devices that hold a point or prescribe a force on it, and tips that touch.
 
 use super::coupling;
-use super::drivers::{read_real, read_simulated};
+use super::drivers::{read_motion_limits, read_real, read_simulated};
 use super::keys::{AttachEntry, DeviceEntry};
 use super::places::surface_point;
 use super::source::{Quantity, Source};
@@ -9,7 +9,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use crate::warning::{Warning, WarningKind};
 use palpate::{AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
-use palpate_haptics::Columns;
+use palpate_haptics::{Columns, MotionLimits};
 use toml::Spanned;
 
 /// Distance of a device's start from its held point that gets a warning, as a share of the diagonal.
@@ -104,9 +104,9 @@ pub(super) fn read_device(
         (entry, _) => entry.as_ref().map(|entry| source.motion_path(entry, Columns::Position)).transpose()?,
     };
     let simulated = device.simulated.as_ref().map(|entry| read_simulated(source, entry)).transpose()?;
-    let pointer = pointer.is_some();
-    let device =
-        SceneDevice { name: device.name.get_ref().clone(), mode, parameters, path, simulated, real, pointer };
+    let (pointer, motion_limits) = (pointer.is_some(), read_motion_limits(source, device)?);
+    let name = device.name.get_ref().clone();
+    let device = SceneDevice { name, mode, parameters, path, simulated, real, motion_limits, pointer };
     warnings.extend(far_start(&device, objects));
     warnings.extend(small_patches(&device, objects, object_names));
     Ok(device)
@@ -142,6 +142,7 @@ fn read_force(
         path: Some(path),
         simulated: None,
         real: None,
+        motion_limits: MotionLimits::default(),
         pointer: false,
     };
     let touched = grasp.object..grasp.object + 1;
@@ -164,6 +165,7 @@ fn force_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParam
         ("simulated", device.simulated.as_ref().map(|simulated| simulated.device.span())),
         ("driver", device.driver.as_ref().map(Spanned::span)),
         ("mount", device.mount.as_ref().map(Spanned::span)),
+        ("limits", device.limits.as_ref().map(Spanned::span)),
     ];
     if let Some((key, span)) = refused.into_iter().find_map(|(key, span)| Some((key, span?))) {
         let message =

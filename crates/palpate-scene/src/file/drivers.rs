@@ -1,13 +1,13 @@
 //! Real and simulated devices of a scene: `driver`, `mount` and `simulated`.
 
-use super::keys::{DeviceEntry, DriverEntry, LARGEST, MountEntry, SimulatedEntry};
+use super::keys::{DeviceEntry, DriverEntry, LARGEST, LimitEntries, MountEntry, SimulatedEntry};
 use super::source::{Quantity, Source};
 use crate::devices::{MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::Pose;
 use palpate_haptics::device::{DeviceSpec, Hand, Mount};
-use palpate_haptics::unit_quaternion;
+use palpate_haptics::{LimitError, MotionLimits, SafetyLimits, unit_quaternion};
 
 /// Real device of an entry, if it has one.
 pub(super) fn read_real(source: &Source, device: &DeviceEntry) -> Result<Option<RealDevice>, SceneError> {
@@ -27,9 +27,40 @@ pub(super) fn read_real(source: &Source, device: &DeviceEntry) -> Result<Option<
                 );
             }
             let mount = mount.as_ref().map(|mount| read_mount(source, mount.get_ref())).transpose()?;
-            read_driver(source, driver.get_ref(), mount.unwrap_or_default()).map(Some)
+            let mut real = read_driver(source, driver.get_ref(), mount.unwrap_or_default())?;
+            let limits: &mut SafetyLimits = &mut real.limits;
+            read_limits(source, device.limits.as_ref(), |name, value| limits.set(name, value))?;
+            Ok(Some(real))
         }
     }
+}
+
+/// Limits of the motions that come over a link; those of the force are of the process that has the device.
+pub(super) fn read_motion_limits(source: &Source, device: &DeviceEntry) -> Result<MotionLimits, SceneError> {
+    let mut limits = MotionLimits::default();
+    match (&device.limits, &device.driver, &device.linked) {
+        (Some(_), Some(_), _) | (None, ..) => {}
+        (Some(entries), None, Some(linked)) if *linked.get_ref() => {
+            read_limits(source, Some(entries), |name, value| limits.set(name, value))?;
+        }
+        (Some(entries), None, _) => {
+            let message = "limits are of a real device or a linked one: leave them out";
+            return source.fail(entries.span(), SceneErrorKind::Conflict, "limits", message);
+        }
+    }
+    Ok(limits)
+}
+
+fn read_limits(
+    source: &Source,
+    entries: Option<&LimitEntries>,
+    mut set: impl FnMut(&str, f64) -> Result<(), LimitError>,
+) -> Result<(), SceneError> {
+    let mut entries = entries.iter().flat_map(|entries| entries.get_ref());
+    entries.try_for_each(|(name, value)| {
+        set(name, *value.get_ref())
+            .or_else(|what| source.fail(value.span(), SceneErrorKind::OutOfRange, "limits", what))
+    })
 }
 
 fn read_driver(source: &Source, entry: &DriverEntry, mount: Mount) -> Result<RealDevice, SceneError> {
@@ -47,7 +78,8 @@ fn read_driver(source: &Source, entry: &DriverEntry, mount: Mount) -> Result<Rea
     let max_force = Quantity { key: "max_force", unit: " N", below: MAX_FORCE_N };
     let max_force_n =
         entry.max_force.as_ref().map(|number| source.positive(number, max_force)).transpose()?;
-    Ok(RealDevice { driver, id, mount, max_force_n, armed: entry.armed.unwrap_or(false) })
+    let (limits, armed) = (SafetyLimits::default(), entry.armed.unwrap_or(false));
+    Ok(RealDevice { driver, id, mount, max_force_n, limits, armed })
 }
 
 fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> {

@@ -3,6 +3,7 @@
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use toml::Spanned;
 
@@ -161,7 +162,11 @@ pub(super) struct DeviceEntry {
     pub simulated: Option<SimulatedEntry>,
     pub driver: Option<Spanned<DriverEntry>>,
     pub mount: Option<Spanned<MountEntry>>,
+    pub limits: Option<LimitEntries>,
 }
+
+/// Limits by name.
+pub(super) type LimitEntries = Spanned<BTreeMap<String, Spanned<f64>>>;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -2,7 +2,8 @@
 
 mod real;
 
-use crate::commands::run::{device_line, percentiles, read_secret, timing};
+use crate::commands::guard::attach_guarded;
+use crate::commands::run::{device_line, percentiles, read_secret, safety, timing};
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
 use crate::terminal::{notify, print, print_json};
@@ -11,9 +12,9 @@ use palpate::DeviceMode;
 use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::link::{LinkClient, LinkState};
 use palpate_haptics::{
-    AttachedDevice, Clock, Columns, DeviceReport, MotionPath, Scheduling, run_haptic_update,
+    AttachedDevice, Clock, Columns, DeviceReport, MotionPath, SafetyLimits, Scheduling, run_haptic_update,
 };
-use palpate_scene::{attach_path, attach_real, find_device_traits, find_grip, read_path};
+use palpate_scene::{attach_path, find_device_traits, find_grip, read_path};
 use real::RealArguments;
 use serde_json::json;
 use std::net::SocketAddr;
@@ -52,6 +53,10 @@ pub struct Arguments {
     /// Real device
     #[command(flatten)]
     pub real: RealArguments,
+    /// Safety limit: slew (N/s), step (N), speed (m/s), range (m), watchdog, motion_age, round_trip, ramp_up, ramp_down,
+    /// recovery or hang (s), as in docs/realtime.md
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub limit: Vec<String>,
     /// Updates per second [Hz]
     #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
     pub rate: f64,
@@ -91,9 +96,10 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     }
     // The scene decides the mode.
     let (mode, rate, passivity) = (DeviceMode::Touch, arguments.rate, !arguments.not_passive);
-    let source = match (arguments.real.real()?, &arguments.path) {
+    let limits = arguments.limits(SafetyLimits::default())?;
+    let source = match (arguments.real.real(limits)?, &arguments.path) {
         (Some(real), _) => {
-            let (attached, line) = attach_real(&real, mode, rate, passivity)?;
+            let (attached, line) = attach_guarded(&real, mode, rate, passivity)?;
             notify(&line);
             Source::Real(Box::new(attached))
         }
@@ -112,7 +118,8 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
     let found = start.elapsed().as_secs_f64();
     let attached = match source {
         Source::Path(path, simulated) => {
-            attach_path(path.delayed_by(found), simulated, mode, rate, passivity)
+            let attached = attach_path(path.delayed_by(found), simulated, mode, rate, passivity);
+            AttachedDevice { limits: arguments.limits(attached.limits)?, ..attached }
         }
         Source::Real(attached) => *attached,
     };
@@ -131,6 +138,19 @@ pub fn device(arguments: &Arguments) -> Result<(), Failure> {
         print_json(&json(arguments, &report, linked))
     } else {
         print(&text_of(arguments, &report))
+    }
+}
+
+impl Arguments {
+    /// Limits, with those of the options in place of others.
+    fn limits(&self, mut limits: SafetyLimits) -> Result<SafetyLimits, Failure> {
+        for option in &self.limit {
+            let named = option.split_once('=').and_then(|(name, value)| Some((name, value.parse().ok()?)));
+            let (name, value) = named
+                .ok_or_else(|| Failure(format!("--limit is {option:?}, expected NAME=VALUE, as speed=3")))?;
+            limits.set(name, value).map_err(|what| Failure(format!("--limit: {what}")))?;
+        }
+        Ok(limits)
     }
 }
 
@@ -155,7 +175,7 @@ fn simulated(arguments: &Arguments) -> Result<Option<(DeviceSpec, Hand)>, Failur
     Ok(traits.map(|traits| (traits, hand)))
 }
 
-/// Waits for the connection.
+/// Waits for the connection, also while the name is taken: whoever has it may leave.
 fn connect(
     client: &LinkClient,
     arguments: &Arguments,
@@ -163,16 +183,27 @@ fn connect(
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
     let Arguments { connect, name, wait, .. } = arguments;
+    let mut was_taken = false;
     loop {
+        let over = start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || stop.load(Ordering::Relaxed);
         let why = match client.state() {
             LinkState::Connected => {
                 notify(&format!("linked to {connect} as {name}"));
                 return Ok(());
             }
+            LinkState::Taken(why) if over => {
+                return Err(Failure(format!("{why}, also after {wait} s (--wait)")));
+            }
+            LinkState::Taken(why) => {
+                if !std::mem::replace(&mut was_taken, true) {
+                    notify(&format!("{why}: waiting for it"));
+                }
+                why
+            }
             LinkState::Refused(why) => return Err(Failure(why)),
             LinkState::Connecting(why) => why,
         };
-        if start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || stop.load(Ordering::Relaxed) {
+        if over {
             return Err(Failure(format!(
                 "no scene was found at {connect} ({why}): start one with `palpate run SCENE.toml --realtime`, in which the \
                  device {name:?} has linked = true"
@@ -196,11 +227,13 @@ fn watch(
         match &state {
             LinkState::Connected => linked += POLL_INTERVAL.as_secs_f64(),
             LinkState::Refused(why) => return Err(Failure(why.clone())),
-            LinkState::Connecting(_) => {}
+            LinkState::Connecting(_) | LinkState::Taken(_) => {}
         }
         if last != state {
             notify(&match &state {
-                LinkState::Connecting(why) => format!("looking for {}: {why}", arguments.connect),
+                LinkState::Connecting(why) | LinkState::Taken(why) => {
+                    format!("looking for {}: {why}", arguments.connect)
+                }
                 _ => format!("linked to {} again", arguments.connect),
             });
         }
@@ -219,6 +252,7 @@ fn json(arguments: &Arguments, report: &DeviceReport, linked_s: f64) -> serde_js
         "force_max_n": report.counts.force_max_n,
         "given_j": report.counts.work_on_hand_j,
         "failed": report.counts.failed,
+        "safety": safety(&report.counts.safety),
         "failure": report.failure.as_ref().map(ToString::to_string),
         "granted": report.granted.to_string(),
         "timing": timing(&report.timing),

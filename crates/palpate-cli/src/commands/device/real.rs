@@ -5,7 +5,7 @@ use clap::Args;
 use glam::DVec3;
 use palpate::Pose;
 use palpate_haptics::device::Mount;
-use palpate_haptics::unit_quaternion;
+use palpate_haptics::{SafetyLimits, unit_quaternion};
 use palpate_scene::{MAX_FORCE_N, RealDevice, find_driver};
 
 /// Real device, instead of a path.
@@ -35,15 +35,15 @@ pub struct RealArguments {
 }
 
 impl RealArguments {
-    /// Real device, if given.
-    pub fn real(&self) -> Result<Option<RealDevice>, Failure> {
+    /// Real device with limits, if given.
+    pub fn real(&self, limits: SafetyLimits) -> Result<Option<RealDevice>, Failure> {
         let Some(driver) = &self.driver else { return self.refuse().map(|()| None) };
         let driver = find_driver(driver).map_err(|what| Failure(format!("--{what}")))?;
         if let Some(force) = self.force.filter(|force| !(*force > 0.0 && *force < MAX_FORCE_N)) {
             return Err(Failure(format!("--force is {force} N, expected above 0 and below {MAX_FORCE_N}")));
         }
         let (id, mount) = (self.which.clone().unwrap_or("0".into()), self.mount()?);
-        Ok(Some(RealDevice { driver, id, mount, max_force_n: self.force, armed: self.armed }))
+        Ok(Some(RealDevice { driver, id, mount, max_force_n: self.force, limits, armed: self.armed }))
     }
 
     /// Refuses options that need a driver: clap would not, since the driver conflicts with the path.

@@ -15,7 +15,7 @@ pub use outputs::{OutputArguments, Outputs};
 use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
 use palpate_scene::{RunMode, Scene, SceneDevice, read_scene};
 pub use realtime::{RealtimeArguments, read_secret};
-pub use realtime_report::{device_line, percentiles, timing};
+pub use realtime_report::{device_line, percentiles, safety, timing};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Instant;

@@ -4,6 +4,7 @@
 use super::realtime_report::{json, text, warnings};
 use super::warnings::refuse;
 use super::{Arguments, count_steps};
+use crate::commands::guard::attach_guarded;
 use crate::failure::Failure;
 use crate::growing_log::GrowingLog;
 use crate::interrupt::stop_on_interrupt;
@@ -17,7 +18,7 @@ use palpate_haptics::log::{LogSender, LogWriter, WrittenLog};
 use palpate_haptics::{
     DeformationProcess, DevicePort, ObstacleTrajectory, Report, Scheduling, Session, SessionDevice, port,
 };
-use palpate_scene::{Scene, SceneDevice, SceneLog, SceneObstacle, attach_path, attach_real};
+use palpate_scene::{Scene, SceneDevice, SceneLog, SceneObstacle, attach_path};
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -107,7 +108,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     let (rate, passivity) = (options.device_rate, !options.not_passive);
     let attach = |device: &SceneDevice| match (&device.real, &device.path) {
         (Some(real), _) => {
-            let (attached, line) = attach_real(real, device.mode, rate, passivity)?;
+            let (attached, line) = attach_guarded(real, device.mode, rate, passivity)?;
             notify(&line);
             Ok(SessionDevice::Local(attached))
         }
@@ -121,7 +122,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         (None, None) => {
             let (device_port, force_port) = port();
             linked.push((device.name.clone(), device_port));
-            Ok(SessionDevice::Remote(force_port, device.mode))
+            Ok(SessionDevice::Remote(force_port.with_limits(device.motion_limits), device.mode))
         }
     };
     let devices: Result<Vec<_>, Failure> = scene.devices.iter().map(attach).collect();

@@ -4,7 +4,7 @@ use super::warnings::{no_contact, penetration, should_touch};
 use palpate_export::part_of;
 use palpate_haptics::link::LinkCounts;
 use palpate_haptics::log::LogSummary;
-use palpate_haptics::{DeviceReport, Percentiles, Report, Timing};
+use palpate_haptics::{DeviceReport, Percentiles, Report, SafetyCounts, Timing};
 use palpate_scene::{Scene, Warning, WarningKind};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -26,11 +26,33 @@ pub fn timing(of: &Timing) -> Value {
     })
 }
 
+/// Counters of the safety as JSON.
+pub fn safety(of: &SafetyCounts) -> Value {
+    json!({
+        "clamped": of.clamped,
+        "slewed": of.slew_limited,
+        "stale": of.stale,
+        "gaps": of.gaps,
+        "old_motions": of.old_motions,
+        "slow_replies": of.slow_replies,
+        "too_fast": of.overspeed,
+        "out_of_range": of.out_of_range,
+        "not_finite": of.not_finite,
+        "trips": of.trips,
+    })
+}
+
 /// Report as JSON.
 pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) -> Value {
-    let devices = scene.devices.iter().zip(&report.devices).map(|(device, own)| {
-        let Some(own) = own else { return json!({ "name": device.name, "kind": "link" }) };
-        let (counts, safety) = (own.counts, own.counts.safety);
+    let devices = scene.devices.iter().zip(&report.devices).zip(&report.refused_motions);
+    let devices = devices.map(|((device, own), refused)| {
+        let Some(own) = own else {
+            let first = refused.first.map(|first| first.to_string());
+            return json!({
+                "name": device.name, "kind": "link", "refused_motions": refused.count, "first_refused": first,
+            });
+        };
+        let counts = own.counts;
         json!({
             "name": device.name,
             "kind": own.spec.kind,
@@ -42,14 +64,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "timing": timing(&own.timing),
             "answer_us": percentiles(own.motion_to_force.percentiles_us()),
             "passivity": { "acted": counts.passivity_active_updates, "missing_max_j": counts.passivity_max_deficit_j },
-            "safety": {
-                "clamped": safety.clamped,
-                "slewed": safety.slew_limited,
-                "stale": safety.stale,
-                "too_fast": safety.overspeed,
-                "not_finite": safety.not_finite,
-                "trips": safety.trips,
-            },
+            "safety": safety(&counts.safety),
         })
     });
     let objects = scene.object_names.iter().zip(&report.state.output().objects);
@@ -175,6 +190,11 @@ pub(super) fn warnings(scene: &Scene, report: &Report) -> Vec<Warning> {
     }
     let objects = scene.object_names.iter().zip(scene.model.recordings()).zip(&report.largest_penetration_m);
     warnings.extend(objects.filter_map(|((name, recording), depth)| penetration(name, recording, *depth)));
+    let refused = scene.devices.iter().zip(&report.refused_motions).filter(|(_, refused)| refused.count > 0);
+    warnings.extend(refused.map(|(device, refused)| {
+        let message = format!("the device {:?}: {refused}", device.name);
+        Warning::new(WarningKind::RefusedMotions, &device.name, message)
+    }));
     let devices = scene.devices.iter().zip(&report.touching_steps);
     let silent = devices.filter(|(device, touching)| should_touch(device) && **touching == 0);
     warnings.extend(silent.map(|(device, _)| no_contact(device, None)));
@@ -196,7 +216,11 @@ pub fn device_line(own: &DeviceReport) -> String {
         (safety.clamped, "clamped"),
         (safety.slew_limited, "slewed"),
         (safety.stale, "stale"),
+        (safety.gaps, "gaps between updates"),
+        (safety.old_motions, "old motions"),
+        (safety.slow_replies, "slow replies"),
         (safety.overspeed, "too fast"),
+        (safety.out_of_range, "out of range"),
         (safety.not_finite, "no number"),
         (safety.trips, "trips"),
         (counts.failed, "failed"),

@@ -1,13 +1,14 @@
 //! Scenes for the viewer's server, from a library of scenes, with their logs.
 
 use super::log_series::LogSeries;
+use crate::commands::guard::attach_guarded;
 use crate::failure::Failure;
 use crate::terminal::notify;
 use palpate::{DeviceMode, Material};
 use palpate_render::describe_scene;
 use palpate_scene::{
     BUILT_IN_SCENES, MeshUpload, OpenedScene, ProgressFn, RealDevice, SceneDevice, SceneLibrary, SceneLog,
-    SettingsChange, attach_path, attach_real,
+    SettingsChange, attach_path,
 };
 use palpate_viewer::{
     MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
@@ -127,7 +128,7 @@ fn viewer_device(device: &SceneDevice) -> ViewerDevice {
             let (real, mode): (RealDevice, DeviceMode) = (real.clone(), device.mode);
             ViewerDevice::Local(Arc::new(move || {
                 let (attached, line) =
-                    attach_real(&real, mode, DEVICE_HZ, true).map_err(|error| error.to_string())?;
+                    attach_guarded(&real, mode, DEVICE_HZ, true).map_err(|error| error.to_string())?;
                 notify(&line);
                 Ok(attached)
             }))

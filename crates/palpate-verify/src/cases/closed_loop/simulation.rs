@@ -153,15 +153,7 @@ fn run(cell: &Cell, setup: &Setup) -> Result<LoopRun, VerifyError> {
 }
 
 /// No limits, so that the loop stays linear.
-const UNLIMITED: SafetyLimits = SafetyLimits {
-    force_n: f64::MAX,
-    slew_n_s: f64::MAX,
-    speed_m_s: f64::MAX,
-    watchdog_s: 1.0,
-    ramp_up_s: 0.0,
-    ramp_down_s: 0.02,
-    recovery_s: 0.0,
-};
+const UNLIMITED: SafetyLimits = SafetyLimits::NONE;
 
 /// Whether the oscillation grows of a hand that holds the point and is displaced a little.
 pub fn diverges(cell: &Cell, stiffness: f64) -> Result<bool, VerifyError> {
@@ -201,7 +193,13 @@ pub fn press_with_fingertip(
         traits: DeviceSpec { friction_n: 0.0, damping_n_s_m: device_damping, ..DeviceSpec::TOUCH },
         mode: DeviceMode::Touch,
         path,
-        limits: SafetyLimits { ramp_up_s: 0.01, ..SafetyLimits::default() },
+        // Delays are what the cases are about.
+        limits: SafetyLimits {
+            ramp_up_s: 0.01,
+            motion_age_s: 1.0,
+            round_trip_s: 1.0,
+            ..SafetyLimits::default()
+        },
         controlled,
         seconds: 4.0,
     };
