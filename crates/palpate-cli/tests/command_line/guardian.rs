@@ -1,8 +1,13 @@
 //! Ways out of a process that drives a real device: each leaves the device without force. The devices are stand-ins whose amplifier
 //! holds its force when the process is gone: a file. Each test prints how long the force stayed on.
 
+#[path = "../../../palpate-haptics/tests/standins/inverse_service.rs"]
+#[allow(dead_code)]
+mod inverse_service;
+
 use crate::devices::compile::compile;
 use crate::workplace::Workplace;
+use inverse_service::Service;
 use palpate_testkit::wait_until;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -200,4 +205,31 @@ fn without_its_guardian_a_device_gives_no_force() {
         failure,
         "the guardian of the device has ended (Broken pipe (os error 32)): without one it gives no force, start again"
     );
+}
+
+#[test]
+fn a_guardian_takes_the_force_of_a_haply_device_away() {
+    let service = Service::new();
+    // The vendor's service holds the last force of a client that has gone.
+    service.set(|world| world.cursor = [0.0; 3]);
+    let mut workplace = Workplace::with_scene();
+    workplace.set("PALPATE_HAPLY", &service.place());
+    let hand = "driver = { kind = \"haply\", armed = true, max_force = 0.4 }\n\
+                mount = { position = [-0.055, 0.0, 0.0] }\ncoupling = { stiffness = 200.0, damping = 0.5 }";
+    let scene = workplace.text("scene.toml").replace("path = { file = \"left.csv\" }", hand);
+    workplace.write("real.toml", scene);
+    let mut process = workplace
+        .command(&["run", "real.toml", "--realtime", "--duration", "600"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    wait_until("a force", || service.force()[0].abs() > PUSHES_N);
+    let begun = Instant::now();
+    process.kill().expect("it runs");
+    wait_until("no force", || service.force() == [0.0; 3]);
+    println!("haply, -KILL: without force after {:.1} ms", begun.elapsed().as_secs_f64() * 1e3);
+    let said = text(&process.wait_with_output().expect("a child").stderr);
+    let expected = "guardian: palpate ended and left haply 049D with its force: forces are off, after ";
+    assert!(said.lines().any(|line| line.starts_with(expected)), "{said}");
 }

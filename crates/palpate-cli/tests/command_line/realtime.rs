@@ -3,8 +3,8 @@
 use crate::cut_logs::logged_steps;
 use crate::workplace::{Table, Workplace};
 use palpate_testkit::wait_until;
-use std::io::Read;
-use std::process::{Command, Stdio};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
 
 /// Two fingers on the cube of `Workplace::with_scene`, which lies on a floor; the right one in a simulated hand.
 pub fn workplace() -> Workplace {
@@ -87,9 +87,7 @@ fn devices_in_other_processes_come_over_a_link() {
     workplace.write("linked.toml", &text);
     workplace.write("secret.txt", "a secret of this test\n");
     workplace.write("wrong.txt", "a secret of another test\n");
-    // A port that is free now is most likely free a moment later.
-    let address = std::net::UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr());
-    let address = address.expect("a free port").to_string();
+    let address = free_address();
     let run = [
         "run",
         "linked.toml",
@@ -116,6 +114,95 @@ fn devices_in_other_processes_come_over_a_link() {
     assert_eq!(scene["devices"][0]["kind"], "link");
     assert!(scene["links"]["motions"].as_u64() > Some(100), "{scene:#}");
     assert!(scene["links"]["refused"].as_u64() > Some(0), "{scene:#}");
+}
+
+/// An address that is free now, and most likely a moment later.
+fn free_address() -> String {
+    let address = std::net::UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr());
+    address.expect("a free port").to_string()
+}
+
+/// The workplace with a scene `linked.toml`, whose left finger comes over a link.
+fn linked_workplace(limits: &str) -> Workplace {
+    let workplace = workplace();
+    let linked = format!("linked = true\n{limits}");
+    let text = workplace.text("fingers.toml").replace("path = { file = \"left_finger.csv\" }", &linked);
+    workplace.write("linked.toml", text);
+    workplace
+}
+
+#[test]
+fn a_device_waits_for_a_name_that_is_taken_and_says_so() {
+    let (workplace, address) = (linked_workplace(""), free_address());
+    let run =
+        ["run", "linked.toml", "--realtime", "--duration", "600", "--pictures", "0", "--listen", &address];
+    let mut scene =
+        workplace.command(&run).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a scene");
+    let device = ["device", "left", "--path", "left_finger.csv", "--connect", &address];
+    let with = |more: &[&str]| {
+        let mut command = workplace.command(&[&device[..], more].concat());
+        command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("a device")
+    };
+    let line = |child: &mut Child| {
+        let mut line = String::new();
+        let stderr = child.stderr.as_mut().expect("standard error");
+        BufReader::with_capacity(1, stderr).read_line(&mut line).expect("text");
+        line
+    };
+    let linked = format!("linked to {address} as left\n");
+    let mut first = with(&["--duration", "600"]);
+    assert_eq!(line(&mut first), linked);
+    let taken = "the device \"left\" is taken";
+    assert_eq!(
+        workplace.fail(&[&device[..], &["--wait", "0.5"]].concat()),
+        format!("{taken}, also after 0.5 s (--wait)")
+    );
+    let mut second = with(&["--duration", "0.2", "--wait", "600"]);
+    assert_eq!(line(&mut second), format!("{taken}: waiting for it\n"));
+    first.kill().and_then(|()| first.wait()).expect("it runs");
+    assert_eq!(line(&mut second), linked);
+    assert_eq!(second.wait().expect("a child").code(), Some(0));
+    scene.kill().and_then(|()| scene.wait()).expect("it runs");
+}
+
+#[test]
+fn millimetres_over_a_link_are_refused_and_the_device_is_named() {
+    for (limits, expected) in [
+        ("", Some("within 2 m (limit range): is it in millimetres?")),
+        ("limits = { range = 100.0, speed = 1000.0 }", None),
+    ] {
+        let (workplace, address) = (linked_workplace(limits), free_address());
+        // On its way to the cube, of which it would be inside.
+        workplace.write("mm.csv", "0,-58,0,50\n0.2,-53,0,50\n");
+        let run = [
+            "run",
+            "linked.toml",
+            "--realtime",
+            "--duration",
+            "3",
+            "--json",
+            "--pictures",
+            "0",
+            "--listen",
+            &address,
+        ];
+        let device = ["device", "left", "--path", "mm.csv", "--connect", &address, "--duration", "1"];
+        let report = std::thread::scope(|scope| {
+            let scene = scope.spawn(|| workplace.json(&run));
+            workplace.succeed(&device);
+            scene.join().expect("no panic")
+        });
+        assert_eq!(report["unsolved_steps"], 0);
+        let left = &report["devices"][0];
+        assert_eq!(left["refused_motions"].as_u64() > Some(0), expected.is_some(), "{left:#}");
+        let Some(expected) = expected else { continue };
+        let warnings = report["warnings"].as_array().expect("warnings");
+        let warning =
+            warnings.iter().find(|warning| warning["kind"] == "refused_motions").expect("a warning");
+        let message = warning["message"].as_str().expect("text");
+        assert!(message.starts_with("the device \"left\": ") && message.ends_with(expected), "{message}");
+        assert_eq!(warning["part"], "left");
+    }
 }
 
 #[test]
@@ -185,6 +272,14 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
         (&["device", "left", "--path", "none.csv"], "cannot read the path none.csv"),
         (&["device", "left", "--path", "left.csv", "--rate", "1"], "--rate is 1 Hz, expected 50 to 5000"),
         (
+            &["device", "left", "--path", "left.csv", "--limit", "speed"],
+            "--limit is \"speed\", expected NAME=VALUE, as speed=3",
+        ),
+        (
+            &["device", "left", "--path", "left.csv", "--limit", "speed=-1"],
+            "--limit: speed is -1 m/s, expected above 0 and at most 100",
+        ),
+        (
             &["device", "left", "--path", "left.csv", "--simulated", "phantom"],
             "device is \"phantom\", expected one of",
         ),
@@ -223,6 +318,21 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
             "simulated = {",
             "linked = true\nsimulated = {",
             "line 26: a linked device has its path, or its hand, in the process",
+        ),
+        (
+            "path = { file = \"left_finger.csv\" }",
+            "linked = true\nlimits = { slew = 1.0 }",
+            "line 19: there is no limit \"slew\", only range, speed",
+        ),
+        (
+            "path = { file = \"left_finger.csv\" }",
+            "driver = { kind = \"dhd\" }\nlimits = { watchdog = 2.0 }",
+            "line 19: watchdog is 2 s, expected above 0 and at most 1",
+        ),
+        (
+            "path = { file = \"left_finger.csv\" }",
+            "path = { file = \"left_finger.csv\" }\nlimits = { speed = 2.0 }",
+            "line 19: limits are of a real device or a linked one: leave them out",
         ),
         ("step = 0.002", "step = 0.02", "the step is 0.02 s: in real time it is 0.0002 s to 0.01 s"),
     ] {

@@ -104,14 +104,16 @@ impl Workplace {
 
     /// Run `palpate` in this folder, away from the home of whoever runs the tests.
     pub fn palpate(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_palpate"))
-            .args(arguments)
-            .current_dir(self.folder.path())
-            .env("HOME", self.folder.path())
-            .env("XDG_CACHE_HOME", self.path("cache"))
-            .envs(self.variables.iter().map(|(name, value)| (name, value)))
-            .output()
-            .expect("the command starts")
+        self.command(arguments).output().expect("the command starts")
+    }
+
+    /// The command that [`Self::palpate`] runs.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+        command.args(arguments).current_dir(self.folder.path()).env("HOME", self.folder.path());
+        command.env("XDG_CACHE_HOME", self.path("cache"));
+        command.envs(self.variables.iter().map(|(name, value)| (name, value)));
+        command
     }
 
     /// Run `palpate` here with room for so many blocks of 512 bytes in every file: a limit on the size of files acts as a full disk does.

@@ -6,7 +6,7 @@
 //! the vendor's tools, or they report no position.
 
 use super::driver::{DiscoveredDevice, select};
-use super::library::{Vendor, functions};
+use super::library::{LibraryFiles, Vendor, functions};
 use super::{Device, DeviceSpec, Reading, handle_orientation};
 use crate::error::{DeviceError, Error};
 use crate::safety_limits::SafetyLimits;
@@ -16,7 +16,11 @@ use std::time::{Duration, Instant};
 
 pub(super) static VENDOR: Vendor = Vendor {
     driver: "dhd",
-    files: &["libdhd.so", "libdhd.so.3"],
+    files: LibraryFiles {
+        linux: &["libdhd.so", "libdhd.so.3"],
+        macos: &["libdhd.dylib", "libdhd.3.dylib"],
+        windows: &["dhd64.dll", "dhd.dll"],
+    },
     software: "Force Dimension's SDK (3.3 or later)",
     variable: "PALPATE_LIBDHD",
 };
@@ -76,8 +80,10 @@ pub(super) struct ForceDimension {
     spec: DeviceSpec,
     failing_since: Option<f64>,
     next_try_s: f64,
-    /// Time of the last command; `None` before the first.
+    /// Time before the last command; `None` before the first.
     commanded: Option<Instant>,
+    /// Whether the watchdog may have disabled forces.
+    may_be_off: bool,
 }
 
 /// Connected devices.
@@ -102,6 +108,7 @@ pub(super) fn open(which: &str, location: Option<&str>) -> Result<(DiscoveredDev
         failing_since: None,
         next_try_s: f64::NEG_INFINITY,
         commanded: None,
+        may_be_off: false,
     };
     Ok((found, device))
 }
@@ -337,15 +344,22 @@ impl Device for ForceDimension {
 
     fn set_force(&mut self, force: DVec3, _: f64) -> Result<(), Error> {
         let force = if force.is_finite() { force } else { DVec3::ZERO };
-        let before = self.commanded.replace(Instant::now());
-        match self.id {
-            // The device's watchdog has disabled forces: they come back from zero.
-            Some(id) if before.is_some_and(|time| time.elapsed() > WATCHDOG) => self.dhd.enable_again(id),
-            Some(id) => self.dhd.command(id, dhd_from_ours(force)),
+        let Some(id) = self.id else {
             // A lost device gives no force.
-            None if force == DVec3::ZERO => Ok(()),
-            None => Err(self.disconnected()),
-        }
+            return if force == DVec3::ZERO { Ok(()) } else { Err(self.disconnected()) };
+        };
+        let before = self.commanded.replace(Instant::now());
+        let is_late = || before.is_some_and(|time| time.elapsed() > WATCHDOG);
+        let done = if self.may_be_off || is_late() {
+            // Forces come back from zero.
+            self.may_be_off = false;
+            self.dhd.enable_again(id)
+        } else {
+            self.dhd.command(id, dhd_from_ours(force))
+        };
+        // The command itself may have been late, and was not heard.
+        self.may_be_off |= is_late();
+        done
     }
 }
 

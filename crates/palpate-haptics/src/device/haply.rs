@@ -271,16 +271,20 @@ impl State {
 }
 
 impl Connection {
-    /// Exchanges messages with the service, and reconnects when it disappears, until the device is dropped.
+    /// Exchanges messages with the service, and reconnects when it disappears, until the device is dropped. Also one that is dropped at
+    /// once commands zero force.
     fn run(mut self, socket: Socket) {
         let mut socket = Some(socket);
-        while !self.ending() {
+        loop {
             let failure = match socket.take().map_or_else(|| self.reconnect(), Ok) {
                 Ok(mut socket) => self.exchange_messages(&mut socket),
                 Err(failure) => Some(failure),
             };
             let Some(failure) = failure else { return };
             *self.shared.last_failure.lock().unwrap_or_else(PoisonError::into_inner) = failure;
+            if self.ending() {
+                return;
+            }
             std::thread::sleep(RETRY_INTERVAL);
         }
     }

@@ -7,12 +7,34 @@ use libloading::Library;
 pub(super) struct Vendor {
     /// Name of the driver.
     pub driver: &'static str,
-    /// File names, in the order in which the system's loader tries them.
-    pub files: &'static [&'static str],
+    /// File names of the library on every system.
+    pub files: LibraryFiles,
     /// Software that brings the library.
     pub software: &'static str,
     /// Environment variable that names another file.
     pub variable: &'static str,
+}
+
+/// File names of a library, in the order in which the system's loader tries them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LibraryFiles {
+    /// Shared objects of Linux.
+    pub linux: &'static [&'static str],
+    /// Libraries and frameworks of macOS.
+    pub macos: &'static [&'static str],
+    /// DLLs of Windows.
+    pub windows: &'static [&'static str],
+}
+
+impl LibraryFiles {
+    /// Names on a system, as [`std::env::consts::OS`] calls it. Other systems are taken for Linux.
+    pub fn on(&self, system: &str) -> &'static [&'static str] {
+        match system {
+            "macos" => self.macos,
+            "windows" => self.windows,
+            _ => self.linux,
+        }
+    }
 }
 
 /// Loaded library. It is never unloaded: threads of the vendor may outlive the last device.
@@ -25,7 +47,7 @@ pub(super) struct Loaded {
 impl Vendor {
     /// Loads the library from a file, or from the system's search path.
     pub fn load(&'static self, location: Option<&str>) -> Result<Loaded, Error> {
-        let files = location.map_or(self.files.to_vec(), |file| vec![file]);
+        let files = location.map_or(self.files.on(std::env::consts::OS).to_vec(), |file| vec![file]);
         let mut reason = String::new();
         for file in &files {
             // SAFETY: loading runs the library's initialisers, as it would for any program that is linked with it; which file
@@ -80,3 +102,26 @@ macro_rules! functions {
     };
 }
 pub(super) use functions;
+
+#[cfg(test)]
+mod tests {
+    use crate::device::{dhd, openhaptics};
+
+    #[test]
+    fn every_system_has_its_names_of_the_vendors_libraries() {
+        for (system, ending) in [("linux", ".so"), ("macos", ".dylib"), ("windows", ".dll")] {
+            for vendor in [&dhd::VENDOR, &openhaptics::VENDOR] {
+                let files = vendor.files.on(system);
+                let fits =
+                    |file: &&str| file.contains(ending) || system == "macos" && file.contains(".framework/");
+                assert!(
+                    !files.is_empty() && files.iter().all(fits),
+                    "{} on {system}: {files:?}",
+                    vendor.driver
+                );
+            }
+        }
+        assert_eq!(dhd::VENDOR.files.on("windows"), ["dhd64.dll", "dhd.dll"]);
+        assert_eq!(openhaptics::VENDOR.files.on("linux")[0], "libHD.so");
+    }
+}

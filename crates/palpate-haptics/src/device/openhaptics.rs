@@ -7,7 +7,7 @@
 
 use super::driver::DiscoveredDevice;
 use super::exchange::{DriverSide, UpdateSide, exchange};
-use super::library::{Vendor, functions};
+use super::library::{LibraryFiles, Vendor, functions};
 use super::{Device, DeviceSpec, Reading, handle_orientation};
 use crate::error::{DeviceError, Error};
 use glam::{DMat3, DVec3};
@@ -19,7 +19,12 @@ use std::time::{Duration, Instant};
 
 pub(super) static VENDOR: Vendor = Vendor {
     driver: "openhaptics",
-    files: &["libHD.so", "libHD.so.3.4", "libHD.so.3.0"],
+    files: LibraryFiles {
+        linux: &["libHD.so", "libHD.so.3.4", "libHD.so.3.0"],
+        // The vendor has a framework for old versions only.
+        macos: &["/Library/Frameworks/HD.framework/HD", "libHD.dylib"],
+        windows: &["hd.dll"],
+    },
     software: "3D Systems' OpenHaptics and the driver of the device",
     variable: "PALPATE_LIBHD",
 };

@@ -152,3 +152,21 @@ impl Drop for GuardedDevice {
         drop(self.device.take());
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_guardian_there_is_no_device() {
+        let error = |program: &str| Guardian::start(Command::new(program)).err().expect("none").to_string();
+        let because = |reason: &str| {
+            format!(
+                "no guardian could be started ({reason}): a real device is not opened without one, since nothing would take its \
+                 force away after a crash"
+            )
+        };
+        assert_eq!(error("/nowhere/palpate"), because("No such file or directory (os error 2)"));
+        assert_eq!(error("true"), because("it says \"\""));
+    }
+}

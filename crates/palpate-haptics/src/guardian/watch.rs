@@ -2,9 +2,10 @@
 
 use super::system;
 use super::{BEAT, GOOD_BYE, PAUSE, READY};
-use crate::device::Driver;
+use crate::device::{Device, Driver};
 use crate::error::Error;
 use crate::scheduling::Scheduling;
+use glam::DVec3;
 use std::fmt;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -21,6 +22,9 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(2);
 
 /// Timeout of the device, after which the guardian gives up.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Timeout of a reading of the opened device: it may not be initialised.
+const READING_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Watch over a process that drives a device.
 #[derive(Debug, Clone, Copy)]
@@ -107,17 +111,33 @@ impl GuardianWatch {
         }
     }
 
-    /// Opens the device and closes it, which leaves it without force.
+    /// Opens the device, commands zero force and closes it.
     fn take_force_away(&self, name: &str) -> Result<(), Error> {
         let deadline = Instant::now() + OPEN_TIMEOUT;
         loop {
             match self.driver.open(name, None) {
-                // The drivers command zero force first and last, and disable forces.
-                Ok((_, device)) => return Ok(drop(device)),
+                Ok((_, mut device)) => {
+                    command_zero(&mut *device);
+                    // The driver commands zero force again, and disables forces.
+                    drop(device);
+                    return Ok(());
+                }
                 Err(error) if Instant::now() > deadline => return Err(error),
                 Err(_) => std::thread::sleep(RETRY_INTERVAL),
             }
         }
+    }
+}
+
+/// Commands zero force until the device gives a reading, which shows that it has heard of it, or has none to give.
+fn command_zero(device: &mut dyn Device) {
+    let begun = Instant::now();
+    while begun.elapsed() < READING_TIMEOUT {
+        let now_s = begun.elapsed().as_secs_f64();
+        if device.set_force(DVec3::ZERO, now_s).and_then(|()| device.read(now_s)).is_ok() {
+            return;
+        }
+        std::thread::sleep(RETRY_INTERVAL);
     }
 }
 

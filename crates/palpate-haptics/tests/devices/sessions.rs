@@ -1,27 +1,24 @@
-//! Session in which a device (a stand-in) presses a body.
+//! Sessions in which a device (a stand-in) presses a body.
 
 #[path = "../processes/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
 
 use super::standin::Standin;
-use palpate::{DeviceMode, Pose};
-use palpate_haptics::device::{Driver, Mount};
-use palpate_haptics::{AttachedDevice, SafetyLimits, Scheduling, Session, SessionDevice};
+use glam::DVec3;
+use palpate::{DeviceMode, Model, Pose};
+use palpate_haptics::device::{Device, DeviceSpec, Driver, Mount, Reading};
+use palpate_haptics::{
+    AttachedDevice, Error, ObstacleTrajectory, SafetyLimits, Scheduling, Session, SessionDevice,
+};
+use palpate_testkit::wait_until;
 use std::io::Cursor;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
-#[test]
-fn a_hand_with_a_device_presses_a_body_and_feels_it() {
-    let standin = Standin::new("libdhd");
-    let place = standin.function::<extern "C" fn(usize, f64, f64, f64)>("standin_place");
-    let model = scenes::model(1, 300.0);
-    let edge = scenes::half_width(&model) + 0.004;
-    // From the right: theirs is y.
-    place(0, 0.0, 1.05 * edge, 0.0);
-    let device = Driver::Dhd.open("0", Some(standin.place())).expect("a device").1;
+/// Session with one armed device and a floor.
+fn session(model: Arc<Model>, device: Box<dyn Device>, floor: ObstacleTrajectory) -> Session {
     let attached = AttachedDevice {
         device,
         mode: DeviceMode::Touch,
@@ -31,12 +28,11 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         passive: true,
         arm_by_button: false,
     };
-    let floor = model.parameters().obstacles[0].pose;
-    let session = Session {
+    Session {
         model,
         start: Instant::now(),
         devices: vec![SessionDevice::Local(attached)],
-        obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
+        obstacle_trajectories: vec![floor],
         clamp_paths: Vec::new(),
         base_paths: Vec::new(),
         gravity: None,
@@ -47,7 +43,95 @@ fn a_hand_with_a_device_presses_a_body_and_feels_it() {
         state: None,
         playback: Arc::default(),
         cycles: None,
-    };
+    }
+}
+
+/// Device whose reading panics once its hand is pushed.
+struct PanicsWhenPushed {
+    device: Box<dyn Device>,
+    pushes: bool,
+}
+
+impl Device for PanicsWhenPushed {
+    fn spec(&self) -> DeviceSpec {
+        self.device.spec()
+    }
+
+    fn read(&mut self, now_s: f64) -> Result<Reading, Error> {
+        assert!(!self.pushes, "a bug in the haptic update");
+        self.device.read(now_s)
+    }
+
+    fn set_force(&mut self, force: DVec3, now_s: f64) -> Result<(), Error> {
+        self.pushes = force.length() > 0.01;
+        self.device.set_force(force, now_s)
+    }
+}
+
+/// Thread that panics.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Panics {
+    ForceProcess,
+    HapticUpdate,
+}
+
+#[test]
+fn a_panic_of_a_thread_leaves_the_device_without_force() {
+    for (panics, expected) in [
+        (Panics::ForceProcess, "the thread of the force process panicked: a bug"),
+        (Panics::HapticUpdate, "the thread of the haptic update panicked: a bug"),
+    ] {
+        let standin = Standin::new("libdhd");
+        let place = standin.function::<extern "C" fn(usize, f64, f64, f64)>("standin_place");
+        let pushed = Arc::new(AtomicBool::new(false));
+        let model = scenes::model(1, 300.0);
+        let edge = scenes::half_width(&model) + 0.004;
+        place(0, 0.0, 1.05 * edge, 0.0);
+        let device = Driver::Dhd.open("0", Some(standin.place())).expect("a device").1;
+        let device: Box<dyn Device> = match panics {
+            Panics::ForceProcess => device,
+            Panics::HapticUpdate => Box::new(PanicsWhenPushed { device, pushes: false }),
+        };
+        let floor = model.parameters().obstacles[0].pose;
+        let has_pushed = pushed.clone();
+        let trajectory: ObstacleTrajectory = Box::new(move |_| {
+            assert!(!has_pushed.load(Ordering::Relaxed), "a bug in the force process");
+            floor
+        });
+        let session = session(model, device, trajectory);
+        let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
+        let done = std::thread::scope(|scope| {
+            let running = scope.spawn(|| session.run::<Cursor<Vec<u8>>>(None, &stop, &steps, |_| ()));
+            let mut deep = 0.0;
+            let is_open = standin.function::<extern "C" fn(usize) -> bool>("standin_is_open");
+            wait_until("a force", || {
+                deep = f64::min(deep + 2e-5, 0.3 * edge);
+                place(0, 0.0, 1.05 * edge - deep, 0.0);
+                // One that panics has pushed, and is closed.
+                standin.force(0)[1] > 0.01 || !is_open(0)
+            });
+            pushed.store(panics == Panics::ForceProcess, Ordering::Relaxed);
+            wait_until("the device is closed", || !is_open(0));
+            stop.store(true, Ordering::Relaxed);
+            running.join().expect("no panic")
+        });
+        assert_eq!(done.err().expect("a bug").to_string(), expected);
+        assert_eq!(standin.force(0), [0.0; 3]);
+        assert!(!standin.function::<extern "C" fn(usize) -> bool>("standin_is_on")(0));
+    }
+}
+
+#[test]
+fn a_hand_with_a_device_presses_a_body_and_feels_it() {
+    let standin = Standin::new("libdhd");
+    let place = standin.function::<extern "C" fn(usize, f64, f64, f64)>("standin_place");
+    let model = scenes::model(1, 300.0);
+    let edge = scenes::half_width(&model) + 0.004;
+    // From the right: theirs is y.
+    place(0, 0.0, 1.05 * edge, 0.0);
+    let device = Driver::Dhd.open("0", Some(standin.place())).expect("a device").1;
+    let floor = model.parameters().obstacles[0].pose;
+    let session = session(model, device, Box::new(move |_: f64| -> Pose { floor }));
     let (stop, steps) = (AtomicBool::new(false), AtomicU64::new(0));
     let (report, felt) = std::thread::scope(|scope| {
         let running = scope.spawn(|| session.run::<Cursor<Vec<u8>>>(None, &stop, &steps, |_| ()));

@@ -24,6 +24,8 @@ struct One {
     /// Watchdog [125 µs]; 0 for none.
     watchdog: c_uchar,
     commanded: Option<Instant>,
+    /// Whether the watchdog has disabled forces.
+    expired: bool,
 }
 
 struct World {
@@ -40,7 +42,8 @@ const UNTURNED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.
 
 const fn one(serial: c_ushort) -> One {
     let (position, force) = ([0.0; 3], [0.0; 3]);
-    One { open: false, forces_on: false, position, frame: UNTURNED, buttons: 0, force, serial, watchdog: 0, commanded: None }
+    let (open, forces_on, expired) = (false, false, false);
+    One { open, forces_on, position, frame: UNTURNED, buttons: 0, force, serial, watchdog: 0, commanded: None, expired }
 }
 
 static WORLD: Mutex<World> = Mutex::new(World {
@@ -88,7 +91,8 @@ impl One {
     fn watch(&mut self) {
         let limit = Duration::from_micros(125) * u32::from(self.watchdog);
         let late = self.commanded.replace(Instant::now()).is_some_and(|time| time.elapsed() > limit);
-        self.forces_on &= self.watchdog == 0 || !late;
+        self.expired |= self.watchdog > 0 && late;
+        self.forces_on &= !self.expired;
     }
 }
 
@@ -157,7 +161,7 @@ pub extern "C" fn dhdGetMaxForce(_: c_char) -> c_double {
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdEnableForce(on: c_uchar, id: c_char) -> c_int {
-    world().on(id, |one| one.forces_on = on != 0)
+    world().on(id, |one| (one.forces_on, one.expired) = (on != 0, false))
 }
 
 #[unsafe(no_mangle)]
@@ -191,7 +195,8 @@ pub extern "C" fn dhdSetForceAndTorqueAndGripperForce(
     assert_eq!((tx, ty, tz, grip), (0.0, 0.0, 0.0, 0.0));
     world().on(id, |one| {
         one.watch();
-        one.force = if one.forces_on || [x, y, z] == [0.0; 3] { [x, y, z] } else { [f64::NAN; 3] };
+        let is_heard = one.forces_on || [x, y, z] == [0.0; 3];
+        one.force = if is_heard { [x, y, z] } else { [if one.expired { 0.0 } else { f64::NAN }; 3] };
     })
 }
 
@@ -239,7 +244,7 @@ pub extern "C" fn standin_fail(failing: bool) {
     world().failing = failing;
 }
 
-/// The force that a device gives; not a number for one that was set while forces were off.
+/// The force that a device gives; not a number for one that was set before forces were on.
 #[unsafe(no_mangle)]
 pub extern "C" fn standin_force(id: usize, force: &mut [f64; 3]) {
     *force = world().devices[id].force;

@@ -1,15 +1,18 @@
 //! Real-time scheduling of a thread: priority, core affinity, locked memory; steal time.
 
+#[cfg(unix)]
+#[path = "unix.rs"]
+mod system;
+#[cfg(windows)]
+#[path = "windows.rs"]
+mod system;
+
 use std::fmt;
-use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
-    set_thread_priority_and_policy, thread_native_id,
-};
 
 /// Requested scheduling of a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scheduling {
-    /// Real-time priority, 1 to 99 (SCHED_FIFO); `None` keeps the ordinary one.
+    /// Real-time priority, 1 to 99 (SCHED_FIFO; on Windows any is time-critical); `None` keeps the ordinary one.
     pub priority: Option<u8>,
     /// Core that the thread is pinned to, from 0; `None` leaves the choice to the system.
     pub core: Option<usize>,
@@ -29,21 +32,16 @@ pub struct GrantedScheduling {
 impl Scheduling {
     /// Applies the request to the calling thread. The thread goes on without what the system refuses.
     pub fn apply(&self) -> GrantedScheduling {
-        GrantedScheduling { priority: self.apply_priority(), core: self.apply_core(), memory: lock_memory() }
+        GrantedScheduling {
+            priority: self.apply_priority(),
+            core: self.apply_core(),
+            memory: system::lock_memory(),
+        }
     }
 
     pub(crate) fn apply_priority(&self) -> Result<Option<u8>, String> {
         let Some(priority) = self.priority else { return Ok(None) };
-        let value =
-            ThreadPriorityValue::try_from(priority).map_err(|what| format!("priority {priority}: {what}"))?;
-        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let set =
-            set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy);
-        set.map(|()| Some(priority)).map_err(|_| {
-            "the system grants no real-time priority: run as root, or allow it (`ulimit -r 99`, or rtprio in \
-             /etc/security/limits.conf)"
-                .to_string()
-        })
+        system::set_priority(priority).map(|()| Some(priority))
     }
 
     fn apply_core(&self) -> Result<Option<usize>, String> {
@@ -68,14 +66,6 @@ fn parse_steal_time(text: &str, core: Option<usize>) -> Option<f64> {
     let mut numbers =
         text.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(&name))?;
     numbers.nth(8)?.parse::<f64>().ok().map(|hundredths| hundredths / 100.0)
-}
-
-/// Locks all present and future memory of the process.
-fn lock_memory() -> Result<(), String> {
-    use rustix::mm::{MlockAllFlags, mlockall};
-    mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|_| {
-        "the system does not lock memory: run as root, or allow it (`ulimit -l unlimited`)".to_string()
-    })
 }
 
 impl fmt::Display for GrantedScheduling {
