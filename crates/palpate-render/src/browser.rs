@@ -36,14 +36,14 @@ pub fn render_log(
     let frames = log.frames.clone();
     log.compute(stop, progress)?;
     let (sender, images) = channel();
-    let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
+    let settings = Settings::new((Ipv4Addr::LOCALHOST, 0).into());
     let server = Server::bind(&settings)?;
     let address = format!("http://{}/", server.address()?);
     let done = AtomicBool::new(false);
     let (size, count) = ((request.width, request.height), request.frames.len() as u64);
     std::thread::scope(|scope| {
         let serving = scope.spawn(|| {
-            server.run(ServedContent::Render(frames, RenderJob { request, images: sender }), &done)
+            server.run(ServedContent::Render(frames, RenderJob { request, images: sender }), &done, &|_| {})
         });
         let drawn = Browser::open(browser, &address, size)
             .and_then(|mut browser| collect(&mut browser, (&images, count), stop, progress, sink));

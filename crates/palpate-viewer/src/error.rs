@@ -3,15 +3,16 @@
 use std::error::Error;
 use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 /// Error of the HTTP server.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServerError {
-    /// An address beyond loopback without a token of sufficient length.
+    /// An address beyond loopback without a token.
     #[error(
-        "{0} can be reached from other machines: give a token of 8 characters or more (--token), without which \
-         nobody gets in"
+        "{0} can be reached from other machines: give a token (--token-file, or PALPATE_TOKEN), without which nobody \
+         gets in"
     )]
     MissingToken(SocketAddr),
     /// The address is in use.
@@ -28,6 +29,53 @@ pub enum ServerError {
     /// A socket or thread cannot be set up.
     #[error(transparent)]
     Io(#[from] io::Error),
+}
+
+/// Error of a token.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum TokenError {
+    /// A token that could be guessed.
+    #[error(
+        "the token has {characters} characters, expected {least} or more: random hexadecimal digits have 4 bits each, \
+         and 64 bits can't be guessed; `openssl rand -hex 16` makes a good one"
+    )]
+    Short {
+        /// Characters of the token.
+        characters: usize,
+        /// Fewest characters.
+        least: usize,
+    },
+    /// The operating system gives no random numbers.
+    #[error("cannot make a token: {0}")]
+    NoRandomness(String),
+}
+
+/// Error of the files of TLS.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum TlsError {
+    /// A file cannot be read, or is not PEM.
+    #[error("cannot read {}: {reason}; expected a PEM file", path.display())]
+    Unreadable {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        reason: String,
+    },
+    /// A file without a certificate.
+    #[error("{} has no certificate: expected a PEM file with the server's, and those that sign it", .0.display())]
+    NoCertificate(PathBuf),
+    /// Certificate and key cannot be used together.
+    #[error("cannot serve with the certificate {} and the key {}: {reason}", certificate.display(), key.display())]
+    Refused {
+        /// File of the certificate.
+        certificate: PathBuf,
+        /// File of the key.
+        key: PathBuf,
+        /// Cause.
+        reason: String,
+    },
 }
 
 /// Error of a scene provider, or of starting a scene.

@@ -17,7 +17,7 @@ mod protocol;
 mod scene_provider;
 mod server;
 
-pub use error::{SceneError, ServerError};
+pub use error::{SceneError, ServerError, TlsError, TokenError};
 pub use log_frames::{LogFrameBuilder, LogFrames};
 pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
@@ -25,7 +25,7 @@ pub use protocol::{
     SceneDescription, SceneSummary, ShapeDescription, View,
 };
 pub use scene_provider::{
-    DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier, ProgressCallback, SceneProvider,
-    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+    DeviceOpener, JobControl, LogFile, LogOpener, OpenLog, PageNotifier, SceneProvider, SharedTrajectory,
+    Upload, ViewerDevice, ViewerScene,
 };
-pub use server::{Live, RenderJob, ServedContent, Server, Settings};
+pub use server::{Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token};

@@ -7,6 +7,7 @@ use palpate_haptics::log::{LogSender, LogSummary, LogWriter};
 use palpate_haptics::{AttachedDevice, MotionPath};
 use std::io::{Seek, Write};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Pose of an obstacle as a function of simulation time [s]. Must not allocate.
 pub type SharedTrajectory = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
@@ -76,8 +77,13 @@ pub struct Upload {
     pub modes: usize,
 }
 
-/// Progress of a job: its phase, and the completed fraction of the phase, if known.
-pub type ProgressCallback<'a> = &'a mut (dyn FnMut(&str, Option<f64>) + Send);
+/// Listener of a job.
+pub struct JobControl<'a> {
+    /// Receives the phase of the job, and the completed fraction of the phase, if known.
+    pub report: &'a mut (dyn FnMut(&str, Option<f64>) + Send),
+    /// Set when the job is to end with an error at the next opportunity.
+    pub cancelled: &'a AtomicBool,
+}
 
 /// Makes the scenes of the server. Pages show the errors as text.
 pub trait SceneProvider: Send + Sync + 'static {
@@ -88,7 +94,7 @@ pub trait SceneProvider: Send + Sync + 'static {
     ///
     /// # Errors
     /// If there is none, or it cannot be made.
-    fn open(&self, id: &str, progress: ProgressCallback) -> Result<ViewerScene, SceneError>;
+    fn open(&self, id: &str, job: JobControl) -> Result<ViewerScene, SceneError>;
 
     /// Most recent scene with changed physics settings.
     ///
@@ -104,12 +110,12 @@ pub trait SceneProvider: Send + Sync + 'static {
         &self,
         object: usize,
         material: MaterialDescription,
-        progress: ProgressCallback,
+        job: JobControl,
     ) -> Result<ViewerScene, SceneError>;
 
     /// Scene of an uploaded mesh.
     ///
     /// # Errors
     /// If the file is not a mesh, or cannot be recorded.
-    fn record(&self, upload: Upload, progress: ProgressCallback) -> Result<ViewerScene, SceneError>;
+    fn record(&self, upload: Upload, job: JobControl) -> Result<ViewerScene, SceneError>;
 }

@@ -1,13 +1,12 @@
 //! Channels between the manager, the running scene and the page sessions.
 
-use super::command::Command;
+use super::command_queue::CommandQueue;
 use super::current::CurrentScene;
 use super::frames::FramePublisher;
 use super::job::JobSlot;
 use crate::pointers::SharedPointers;
 use palpate_haptics::Playback;
 use std::sync::Arc;
-use std::sync::mpsc::Sender;
 use tokio::sync::{broadcast, watch};
 
 /// Manager's ends of the channels.
@@ -16,7 +15,7 @@ pub(super) struct SceneChannels {
     pub frames: FramePublisher,
     /// JSON messages to all pages.
     pub events: broadcast::Sender<Arc<str>>,
-    pub commands: Sender<Command>,
+    pub commands: Arc<CommandQueue>,
     pub pointers: SharedPointers,
     pub playback: Arc<Playback>,
     pub job_slot: Arc<JobSlot>,

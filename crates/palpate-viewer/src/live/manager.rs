@@ -3,20 +3,23 @@
 use super::channels::SceneChannels;
 use super::command::Command;
 use super::current::CurrentScene;
+use super::job::JobPermit;
 use super::running::{DeviceInputs, RunningScene, initial_snapshot, is_resumable};
 use crate::error::SceneError;
 use crate::pointers::{Pointers, lock};
 use crate::protocol::{FrameEncoder, ServerMessage};
-use crate::scene_provider::{PageNotifier, ProgressCallback, SceneProvider, ViewerScene};
+use crate::scene_provider::{JobControl, PageNotifier, SceneProvider, ViewerScene};
 use palpate::{ObjectSnapshot, State};
 use palpate_haptics::Scheduling;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
 /// Interval of status messages.
 const STATUS_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Message to all pages after a job that was cancelled.
+const CANCELLED: &str = "the recording was cancelled";
 
 /// State of the manager thread.
 pub(super) struct Manager {
@@ -33,13 +36,14 @@ impl Manager {
     }
 
     /// Executes commands until [`Command::End`].
-    pub fn run(&mut self, commands: &Receiver<Command>) {
+    pub fn run(&mut self) {
         let mut status_at = Instant::now();
+        let commands = self.channels.commands.clone();
         loop {
-            match commands.recv_timeout(status_at.saturating_duration_since(Instant::now())) {
-                Ok(Command::End) | Err(RecvTimeoutError::Disconnected) => break,
-                Ok(command) => self.execute(command),
-                Err(RecvTimeoutError::Timeout) => {
+            match commands.next(status_at) {
+                Some(Command::End) => break,
+                Some(command) => self.execute(command),
+                None => {
                     status_at = Instant::now() + STATUS_INTERVAL;
                     self.send_status();
                 }
@@ -50,21 +54,18 @@ impl Manager {
 
     fn execute(&mut self, command: Command) {
         match command {
-            Command::Open(_) | Command::ChangeMaterial(..) if !self.channels.job_slot.claim() => {
-                self.send_error(&SceneError::BUSY_JOB);
+            Command::Open(id, viewer) => {
+                self.claim_and_spawn_job("scene", viewer, move |provider, job| provider.open(&id, job));
             }
-            Command::Open(id) => {
-                self.spawn_job("scene", move |provider, progress| provider.open(&id, progress));
-            }
-            Command::ChangeMaterial(object, material) => {
-                self.spawn_job("material", move |provider, progress| {
-                    provider.change_material(object, material, progress)
+            Command::ChangeMaterial(object, material, viewer) => {
+                self.claim_and_spawn_job("material", viewer, move |provider, job| {
+                    provider.change_material(object, material, job)
                 });
             }
-            Command::Record(upload) => {
-                self.spawn_job("mesh", move |provider, progress| provider.record(upload, progress));
+            Command::Record(upload, permit) => {
+                self.spawn_job("mesh", permit, move |provider, job| provider.record(upload, job));
             }
-            Command::ChangePhysics(_) if self.channels.job_slot.is_busy() => {
+            Command::ChangePhysics(_) if self.channels.job_slot.is_taken() => {
                 self.send_error(&SceneError::BUSY_CHANGE);
             }
             Command::ChangePhysics(settings) => match self.provider.change_physics(&settings) {
@@ -79,13 +80,15 @@ impl Manager {
                 let scene = self.channels.current.borrow().scene.clone();
                 self.start_scene(scene, None);
             }
-            Command::JobDone(result) => {
-                self.channels.job_slot.release();
+            Command::JobDone(result, permit) => {
+                let cancelled = permit.is_cancelled();
+                drop(permit);
                 match result {
                     Ok(scene) => {
                         self.stop();
                         self.start_scene(*scene, None);
                     }
+                    Err(_) if cancelled => self.send(&ServerMessage::Info { text: CANCELLED }),
                     Err(error) => self.send_error(&error),
                 }
             }
@@ -94,13 +97,25 @@ impl Manager {
         }
     }
 
-    /// Runs a job on its own thread while the scene keeps running; the job slot must be claimed.
+    /// Runs a job of a viewer, unless one runs already.
+    fn claim_and_spawn_job(
+        &mut self,
+        job: &'static str,
+        viewer: u64,
+        make: impl FnOnce(&dyn SceneProvider, JobControl) -> Result<ViewerScene, SceneError> + Send + 'static,
+    ) {
+        match self.channels.job_slot.claim(Some(viewer)) {
+            Some(permit) => self.spawn_job(job, permit, make),
+            None => self.send_error(&SceneError::BUSY_JOB),
+        }
+    }
+
+    /// Runs a job on its own thread while the scene keeps running.
     fn spawn_job(
         &mut self,
         job: &'static str,
-        make: impl FnOnce(&dyn SceneProvider, ProgressCallback) -> Result<ViewerScene, SceneError>
-        + Send
-        + 'static,
+        permit: JobPermit,
+        make: impl FnOnce(&dyn SceneProvider, JobControl) -> Result<ViewerScene, SceneError> + Send + 'static,
     ) {
         let provider = self.provider.clone();
         let (events, commands) = (self.channels.events.clone(), self.channels.commands.clone());
@@ -108,12 +123,13 @@ impl Manager {
             let send_progress = |phase: &str, fraction: Option<f64>, done: bool| {
                 let _ = events.send(ServerMessage::Progress { job, phase, fraction, done }.to_json().into());
             };
-            let result = make(&*provider, &mut |phase, fraction| send_progress(phase, fraction, false));
+            let mut report = |phase: &str, fraction| send_progress(phase, fraction, false);
+            let control = JobControl { report: &mut report, cancelled: permit.cancelled() };
+            let result = make(&*provider, control);
             send_progress("", Some(1.0), true);
-            let _ = commands.send(Command::JobDone(result.map(Box::new)));
+            commands.push(Command::JobDone(result.map(Box::new), permit));
         };
         if let Err(error) = Builder::new().name(format!("palpate {job}")).spawn(work) {
-            self.channels.job_slot.release();
             self.send_error(&SceneError::Thread(error));
         }
     }

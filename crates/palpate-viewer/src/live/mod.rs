@@ -2,6 +2,7 @@
 
 mod channels;
 mod command;
+mod command_queue;
 mod current;
 mod frames;
 mod job;
@@ -9,18 +10,18 @@ mod manager;
 mod running;
 
 pub(crate) use command::Command;
+pub(crate) use command_queue::CommandQueue;
 pub(crate) use current::CurrentScene;
 pub(crate) use frames::Viewers;
+pub(crate) use job::JobSlot;
 
 use crate::pointers::SharedPointers;
 use crate::scene_provider::{SceneProvider, ViewerScene};
 use axum::body::Bytes;
 use channels::SceneChannels;
 use frames::FramePublisher;
-use job::JobSlot;
 use manager::Manager;
 use palpate_haptics::{Playback, Scheduling};
-use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use tokio::sync::{broadcast, watch};
@@ -37,11 +38,11 @@ pub(crate) struct LiveScene {
     pub vertices: watch::Receiver<Bytes>,
     /// JSON messages to all pages.
     pub events: broadcast::Sender<Arc<str>>,
-    pub commands: Sender<Command>,
+    pub commands: Arc<CommandQueue>,
     pub pointers: SharedPointers,
     pub playback: Arc<Playback>,
     pub viewers: Arc<Viewers>,
-    job_slot: Arc<JobSlot>,
+    pub job_slot: Arc<JobSlot>,
     manager: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -55,7 +56,7 @@ impl LiveScene {
         first: ViewerScene,
         scheduling: Scheduling,
     ) -> std::io::Result<Self> {
-        let (commands, received) = channel();
+        let commands = Arc::new(CommandQueue::new());
         let (modal_sender, modal) = watch::channel(Bytes::new());
         let (vertices_sender, vertices) = watch::channel(Bytes::new());
         let (events, _) = broadcast::channel(EVENT_CAPACITY);
@@ -76,7 +77,7 @@ impl LiveScene {
         let mut manager = Manager::new(provider, scheduling, channels);
         // Before the first page connects, so that it gets this scene.
         manager.start_scene(first, None);
-        let manager = Builder::new().name("palpate scene".into()).spawn(move || manager.run(&received))?;
+        let manager = Builder::new().name("palpate scene".into()).spawn(move || manager.run())?;
         let manager = Mutex::new(Some(manager));
         Ok(Self {
             current,
@@ -92,14 +93,10 @@ impl LiveScene {
         })
     }
 
-    /// Claims the single job slot; returns false if a job is running.
-    pub fn claim_job(&self) -> bool {
-        self.job_slot.claim()
-    }
-
     /// Stops the scene and waits until its log is complete.
     pub fn end(&self) {
-        let _ = self.commands.send(Command::End);
+        self.job_slot.cancel();
+        self.commands.push(Command::End);
         let manager = self.manager.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(manager) = manager {
             let _ = manager.join();

@@ -32,6 +32,8 @@ pub(crate) struct Hello {
     pub protocol: u32,
     pub version: &'static str,
     pub kind: &'static str,
+    /// Number of the viewer, for the jobs that it asks for.
+    pub viewer: u64,
     pub scenes: Vec<SceneSummary>,
     pub logs: Vec<LogEntry>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -124,6 +126,9 @@ pub(crate) enum ServerMessage<'a> {
         fraction: Option<f64>,
         done: bool,
     },
+    Info {
+        text: &'a str,
+    },
     Error {
         text: &'a str,
     },
@@ -158,6 +163,18 @@ pub struct PhysicsSettings {
     pub coupling: Option<CouplingDescription>,
 }
 
+impl PhysicsSettings {
+    /// Settings, completed with those of an older change.
+    pub(crate) fn or(self, older: &Self) -> Self {
+        Self {
+            gravity: self.gravity.or(older.gravity),
+            step: self.step.or(older.step),
+            friction: self.friction.or(older.friction),
+            coupling: self.coupling.or(older.coupling),
+        }
+    }
+}
+
 /// Message from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
@@ -184,6 +201,7 @@ pub(crate) enum ClientMessage {
         slowdown: u32,
     },
     Reset,
+    CancelJob,
     OpenScene {
         scene: String,
     },

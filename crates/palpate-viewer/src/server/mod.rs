@@ -1,16 +1,27 @@
 //! HTTP and WebSocket server.
 
+mod attempts;
+mod body;
+mod connections;
 mod content;
 mod guard;
+mod headers;
+mod limits;
 mod page;
 mod routes;
 mod session;
 mod state;
+mod tls;
+mod token;
 mod upload;
 
 pub use content::{Live, RenderJob, ServedContent};
+pub use limits::Limits;
+pub use tls::TlsIdentity;
+pub use token::Token;
 
 use crate::error::ServerError;
+use connections::Connections;
 use guard::Guard;
 use state::ServerState;
 use std::io::ErrorKind;
@@ -19,8 +30,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Minimum length of a token [characters].
-const MIN_TOKEN_LENGTH: usize = 8;
+/// Threads that encode and copy large data: requests for it wait, and neither memory nor cores are flooded.
+const BLOCKING_THREADS: usize = 4;
 
 /// Interval at which the stop flag is polled.
 const STOP_POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -31,7 +42,18 @@ pub struct Settings {
     /// Address and port; port 0 takes a free one.
     pub listen: SocketAddr,
     /// Token of every request; required beyond loopback.
-    pub token: Option<String>,
+    pub token: Option<Token>,
+    /// Certificate and key; without them, nothing is encrypted.
+    pub tls: Option<TlsIdentity>,
+    /// Limits on clients.
+    pub limits: Limits,
+}
+
+impl Settings {
+    /// Settings of an address, without token and TLS.
+    pub fn new(listen: SocketAddr) -> Self {
+        Self { listen, token: None, tls: None, limits: Limits::default() }
+    }
 }
 
 /// Bound server that does not answer yet.
@@ -39,6 +61,8 @@ pub struct Settings {
 pub struct Server {
     listener: TcpListener,
     guard: Guard,
+    tls: Option<TlsIdentity>,
+    limits: Limits,
 }
 
 impl Server {
@@ -47,9 +71,8 @@ impl Server {
     /// # Errors
     /// If the address is in use, or beyond loopback without a token.
     pub fn bind(settings: &Settings) -> Result<Self, ServerError> {
-        let Settings { listen, token } = settings;
-        let short = |token: &String| token.len() < MIN_TOKEN_LENGTH;
-        if !listen.ip().is_loopback() && token.as_ref().is_none_or(short) {
+        let Settings { listen, token, tls, limits } = settings;
+        if !listen.ip().is_loopback() && token.is_none() {
             return Err(ServerError::MissingToken(*listen));
         }
         let listener = TcpListener::bind(listen).map_err(|source| match source.kind() {
@@ -57,8 +80,8 @@ impl Server {
             _ => ServerError::Bind { address: *listen, source },
         })?;
         listener.set_nonblocking(true)?;
-        let guard = Guard::new(listen.ip().is_loopback(), token.clone());
-        Ok(Self { listener, guard })
+        let guard = Guard::new(listen.ip().is_loopback(), token.as_ref());
+        Ok(Self { listener, guard, tls: tls.clone(), limits: limits.clone() })
     }
 
     /// Bound address.
@@ -69,24 +92,33 @@ impl Server {
         Ok(self.listener.local_addr()?)
     }
 
-    /// Serves the content until `stop` is set. On return the log of a live scene is complete.
+    /// Serves the content until `stop` is set. On return the log of a live scene is complete. `notify` gets what the one who
+    /// serves should know.
     ///
     /// # Errors
     /// If a thread cannot be started.
-    pub fn run(self, content: ServedContent, stop: &AtomicBool) -> Result<(), ServerError> {
-        let state = Arc::new(ServerState::new(self.guard, content)?);
+    pub fn run(
+        self,
+        content: ServedContent,
+        stop: &AtomicBool,
+        notify: &dyn Fn(&str),
+    ) -> Result<(), ServerError> {
+        let state = Arc::new(ServerState::new(self.guard, self.limits.clone(), content)?);
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
+            .max_blocking_threads(BLOCKING_THREADS)
             .thread_name("palpate viewer")
             .enable_all()
             .build()?;
         let served = runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener)?;
             let router = routes::routes(state.clone());
+            let connections = Connections { listener, router, tls: self.tls, limits: self.limits };
             tokio::select! {
-                served = axum::serve(listener, router) => served,
-                () = stopped(stop) => Ok(()),
+                () = connections.serve(notify) => {}
+                () = stopped(stop) => {}
             }
+            std::io::Result::Ok(())
         });
         // Sessions may still hold the state: the scene is ended explicitly.
         if let Some(live) = &state.live {

@@ -10,14 +10,9 @@ use rust_embed::{EmbeddedFile, RustEmbed};
 #[allow_missing = true]
 struct PageFiles;
 
-/// Content security policy: the page connects only to its own server.
-const CONTENT_SECURITY_POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; \
-                      connect-src 'self' ws: wss:; worker-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; \
-                      form-action 'none'";
-
 /// Page of a build without the viewer.
 const NOT_BUILT: &str = "<!doctype html><meta charset=utf-8><title>palpate</title>\
-<p style='font:1rem/1.5 system-ui;max-width:40rem;margin:4rem auto'>This palpate was built without its viewer. In the repository, with \
+<p>This palpate was built without its viewer. In the repository, with \
 Node.js 20 or newer: <code>cargo xtask viewer</code>, and build palpate again.";
 
 /// Handler of all other addresses: a file of the page.
@@ -33,16 +28,10 @@ pub(super) async fn file(uri: Uri) -> Response {
 
 /// Response with a file and its headers.
 fn response(path: &str, file: EmbeddedFile) -> Response {
-    // Asset names contain a content hash.
+    // Asset names contain a content hash, and their addresses no token.
     let cache_control =
-        if path.starts_with("assets/") { "public, max-age=31536000, immutable" } else { "no-cache" };
-    let headers = [
-        (header::CONTENT_TYPE, content_type(path)),
-        (header::CACHE_CONTROL, cache_control),
-        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-    ];
+        if path.starts_with("assets/") { "public, max-age=31536000, immutable" } else { "no-store" };
+    let headers = [(header::CONTENT_TYPE, content_type(path)), (header::CACHE_CONTROL, cache_control)];
     (headers, file.data.into_owned()).into_response()
 }
 

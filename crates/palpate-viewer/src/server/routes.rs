@@ -1,20 +1,25 @@
 //! HTTP routes.
 
+use super::body::read_body;
+use super::connections::Client;
+use super::headers::harden;
 use super::page;
 use super::session;
 use super::state::{ServerState, StaticDataKey};
 use super::upload;
 use crate::protocol::{mode_shapes_bytes, surface_bytes};
-use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::Extension;
+use axum::body::Body;
+use axum::extract::{Path, Query, Request, State};
 use axum::http::{StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::middleware::{Next, from_fn_with_state, map_response};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use palpate::Shape;
 use serde::Deserialize;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Size limit of a response with frames of a log [bytes].
 const MAX_FRAMES_BYTES: usize = 8 << 20;
@@ -31,15 +36,20 @@ pub(super) fn routes(state: Arc<ServerState>) -> Router {
         .route("/record", post(upload::record))
         .route("/image/{index}", post(image))
         .fallback(get(page::file))
-        .layer(DefaultBodyLimit::max(upload::MAX_BODY_BYTES))
         .layer(from_fn_with_state(state.clone(), check_access))
+        .layer(map_response(harden))
         .with_state(state)
 }
 
-async fn check_access(State(state): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
-    match state.guard.rejection(&request) {
-        Some(reason) => (StatusCode::FORBIDDEN, reason).into_response(),
-        None => next.run(request).await,
+async fn check_access(
+    State(state): State<Arc<ServerState>>,
+    Extension(client): Extension<Client>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match state.guard.check(&request, client.address, Instant::now()) {
+        Err(rejection) => rejection.into_response(),
+        Ok(()) => next.run(request).await,
     }
 }
 
@@ -60,10 +70,7 @@ async fn static_data(
     encode: impl FnOnce() -> Option<Vec<u8>> + Send + 'static,
 ) -> Response {
     blocking(move || {
-        let headers = [
-            (header::CONTENT_TYPE, "application/octet-stream"),
-            (header::CACHE_CONTROL, "private, max-age=3600, immutable"),
-        ];
+        let headers = [(header::CONTENT_TYPE, "application/octet-stream")];
         state.cache.get(key, encode).map_or_else(not_found, |bytes| (headers, bytes).into_response())
     })
     .await
@@ -129,9 +136,13 @@ async fn log_series(State(state): State<Arc<ServerState>>, Path(log): Path<usize
     blocking(move || Json(log.series()).into_response()).await
 }
 
-async fn image(State(state): State<Arc<ServerState>>, Path(index): Path<u64>, body: Bytes) -> Response {
+async fn image(State(state): State<Arc<ServerState>>, Path(index): Path<u64>, body: Body) -> Response {
     let Some(job) = &state.render else { return not_found() };
-    match job.images.send((index, body.to_vec())) {
+    let mut png = Vec::new();
+    if let Err(error) = read_body(body, &state.limits, |part| png.extend_from_slice(part)).await {
+        return error.into_response();
+    }
+    match job.images.send((index, png)) {
         Ok(()) => StatusCode::NO_CONTENT.into_response(),
         Err(_) => StatusCode::GONE.into_response(),
     }

@@ -1,11 +1,13 @@
 //! WebSocket session of one page.
 
+use super::connections::Client;
 use super::state::ServerState;
 use crate::live::{Command, LiveScene};
 use crate::pointers::{PointerId, lock};
 use crate::protocol::{
     ClientMessage, FrameFormat, Hello, LogEntry, MaterialDescription, PROTOCOL, PressMode, ServerMessage,
 };
+use axum::Extension;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
@@ -16,7 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 
 /// Size limit of a message from a page [bytes].
 const MAX_MESSAGE_BYTES: usize = 64 << 10;
@@ -30,9 +32,6 @@ const MAX_MESSAGE_BURST: f64 = 600.0;
 /// Maximum number of pages.
 const MAX_VIEWERS: usize = 32;
 
-/// Time after which a page that does not receive is disconnected.
-const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-
 /// Interval of progress messages of logs.
 const LOG_PROGRESS_INTERVAL: Duration = Duration::from_millis(300);
 
@@ -40,11 +39,17 @@ const LOG_PROGRESS_INTERVAL: Duration = Duration::from_millis(300);
 const MAX_POINTER_DISTANCE_M: f64 = 1e4;
 
 /// Handler of `/session`.
-pub(super) async fn connect(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
-    upgrade
-        .max_message_size(MAX_MESSAGE_BYTES)
-        .max_frame_size(MAX_MESSAGE_BYTES)
-        .on_upgrade(move |socket| async move { PageSession::new(&state, socket).serve().await })
+pub(super) async fn connect(
+    State(state): State<Arc<ServerState>>,
+    Extension(client): Extension<Client>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    upgrade.max_message_size(MAX_MESSAGE_BYTES).max_frame_size(MAX_MESSAGE_BYTES).on_upgrade(
+        move |socket| async move {
+            PageSession::new(&state, socket).serve().await;
+            drop(client.place);
+        },
+    )
 }
 
 /// End of a session.
@@ -62,6 +67,8 @@ struct PageSession<'s> {
     /// Every n-th frame is sent; 0: none.
     stride: u32,
     frames: u32,
+    /// Time of the newest message or pong.
+    heard: Instant,
 }
 
 impl<'s> PageSession<'s> {
@@ -75,6 +82,7 @@ impl<'s> PageSession<'s> {
             format: FrameFormat::Modal,
             stride: 1,
             frames: 0,
+            heard: Instant::now(),
         }
     }
 
@@ -87,6 +95,7 @@ impl<'s> PageSession<'s> {
                 (None, Some(_)) => "render",
                 (None, None) => "logs",
             },
+            viewer: self.viewer,
             scenes: self.state.scenes.clone(),
             logs: self.state.logs.iter().map(|log| LogEntry { name: log.name.clone() }).collect(),
             render: self.state.render.as_ref().map(|job| job.request.clone()),
@@ -106,6 +115,7 @@ impl<'s> PageSession<'s> {
                 self.count_vertex_stream(live, false);
                 live.viewers.all.fetch_sub(1, Ordering::Relaxed);
                 lock(&live.pointers).release_viewer(self.viewer);
+                live.job_slot.cancel_of(self.viewer);
             }
             None => {
                 let _ = self.serve_logs().await;
@@ -120,7 +130,8 @@ impl<'s> PageSession<'s> {
         self.send(Message::text(&*scene)).await?;
         let first = modal.borrow_and_update().clone();
         self.send(Message::Binary(first)).await?;
-        let _ = live.commands.send(Command::SendStatus);
+        live.commands.push(Command::SendStatus);
+        let mut pings = self.pings();
         loop {
             tokio::select! {
                 biased;
@@ -129,6 +140,7 @@ impl<'s> PageSession<'s> {
                     Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(SessionEnd),
                     Some(Ok(_)) => self.count_message().await?,
                 },
+                _ = pings.tick() => self.ping().await?,
                 event = events.recv() => match event {
                     Ok(text) => self.send(Message::text(&*text)).await?,
                     // Some messages were skipped, perhaps the scene message.
@@ -160,12 +172,14 @@ impl<'s> PageSession<'s> {
         let mut ticks = interval(LOG_PROGRESS_INTERVAL);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut finished = vec![false; self.state.logs.len()];
+        let mut pings = self.pings();
         loop {
             tokio::select! {
                 received = self.socket.recv() => match received {
                     Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(SessionEnd),
                     Some(Ok(_)) => self.count_message().await?,
                 },
+                _ = pings.tick() => self.ping().await?,
                 _ = ticks.tick() => {
                     for (log, finished) in self.state.logs.iter().zip(&mut finished).filter(|(_, finished)| !**finished) {
                         let (text, done) = log.progress();
@@ -186,7 +200,7 @@ impl<'s> PageSession<'s> {
     }
 
     async fn send(&mut self, message: Message) -> Result<(), SessionEnd> {
-        match timeout(SEND_TIMEOUT, self.socket.send(message)).await {
+        match timeout(self.state.limits.write_time, self.socket.send(message)).await {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) | Err(_) => Err(SessionEnd),
         }
@@ -196,6 +210,21 @@ impl<'s> PageSession<'s> {
         self.send(Message::text(message.to_json())).await
     }
 
+    fn pings(&self) -> Interval {
+        let mut pings = interval((self.state.limits.silence / 3).max(Duration::from_millis(1)));
+        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        pings
+    }
+
+    /// Pings the page; one that is silent is disconnected.
+    async fn ping(&mut self) -> Result<(), SessionEnd> {
+        if self.heard.elapsed() > self.state.limits.silence {
+            self.close(close_code::AWAY, "the page does not answer").await;
+            return Err(SessionEnd);
+        }
+        self.send(Message::Ping(Bytes::new())).await
+    }
+
     async fn close(&mut self, code: u16, reason: &'static str) {
         let _ = self.send(Message::Close(Some(CloseFrame { code, reason: reason.into() }))).await;
     }
@@ -203,6 +232,7 @@ impl<'s> PageSession<'s> {
     /// Counts a message; a page that exceeds the rate limit is disconnected.
     async fn count_message(&mut self) -> Result<(), SessionEnd> {
         let now = Instant::now();
+        self.heard = now;
         let earned = now.duration_since(self.allowance_updated).as_secs_f64() * MESSAGES_PER_S;
         (self.allowance, self.allowance_updated) =
             ((self.allowance + earned).min(MAX_MESSAGE_BURST) - 1.0, now);
@@ -259,14 +289,20 @@ impl<'s> PageSession<'s> {
                 live.playback.set_slowdown(slowdown.clamp(1, 1000));
                 Command::SendStatus
             }
+            ClientMessage::CancelJob => {
+                live.job_slot.cancel();
+                return Ok(());
+            }
             ClientMessage::Reset => Command::Reset,
-            ClientMessage::OpenScene { scene } => Command::Open(scene),
+            ClientMessage::OpenScene { scene } => Command::Open(scene, self.viewer),
             ClientMessage::SetPhysics(settings) => Command::ChangePhysics(settings),
             ClientMessage::SetMaterial { object, young, poisson, density } => {
-                Command::ChangeMaterial(object, MaterialDescription { young, poisson, density })
+                let material = MaterialDescription { young, poisson, density };
+                Command::ChangeMaterial(object, material, self.viewer)
             }
         };
-        live.commands.send(command).map_err(|_| SessionEnd)
+        live.commands.push(command);
+        Ok(())
     }
 
     async fn press(

@@ -2,6 +2,7 @@
 
 use super::content::{Live, RenderJob, ServedContent};
 use super::guard::Guard;
+use super::limits::Limits;
 use crate::live::LiveScene;
 use crate::log_frames::LogFrames;
 use crate::protocol::SceneSummary;
@@ -10,7 +11,6 @@ use palpate::Model;
 use std::collections::HashMap;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, PoisonError};
-use tokio::sync::Semaphore;
 
 /// Shared server state.
 pub(super) struct ServerState {
@@ -19,9 +19,8 @@ pub(super) struct ServerState {
     pub logs: Vec<Arc<LogFrames>>,
     pub render: Option<RenderJob>,
     pub guard: Guard,
+    pub limits: Limits,
     pub cache: StaticDataCache,
-    /// Permit of the one mesh upload at a time.
-    pub uploads: Semaphore,
     /// Number of the next viewer.
     pub next_viewer: AtomicU64,
 }
@@ -31,15 +30,15 @@ impl ServerState {
     ///
     /// # Errors
     /// If a thread cannot be started.
-    pub fn new(guard: Guard, content: ServedContent) -> std::io::Result<Self> {
+    pub fn new(guard: Guard, limits: Limits, content: ServedContent) -> std::io::Result<Self> {
         let mut state = Self {
             live: None,
             scenes: Vec::new(),
             logs: Vec::new(),
             render: None,
             guard,
+            limits,
             cache: StaticDataCache::default(),
-            uploads: Semaphore::new(1),
             next_viewer: AtomicU64::new(1),
         };
         match content {

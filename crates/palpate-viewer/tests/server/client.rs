@@ -5,7 +5,7 @@ use palpate::{Coupling, DeviceParameters, Model, ModelObject, ModelParameters, O
 use palpate_haptics::Scheduling;
 use palpate_testkit::{finger, floor, free_block, start_at};
 use palpate_viewer::{
-    Live, MaterialDescription, ObjectDescription, PhysicsSettings, ProgressCallback, SceneDescription,
+    JobControl, Limits, Live, MaterialDescription, ObjectDescription, PhysicsSettings, SceneDescription,
     SceneError, SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice,
     ViewerScene,
 };
@@ -13,7 +13,7 @@ use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -55,10 +55,13 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
 /// Time after which a wait has failed: it bounds a failure, not a success.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Provider of one scene, and of recordings that fail; one of `slow.msh` does so only when its gate is opened.
+/// Provider of one scene, and of recordings that fail; one of `slow.msh` does so only when its gate is opened, or it is cancelled.
 struct OneScene {
     gate: Gate,
 }
+
+/// Interval at which a recording asks whether it is cancelled.
+const CANCELLATION_POLL: Duration = Duration::from_millis(5);
 
 /// Gate that a recording waits at until a test opens it, or is over.
 type Gate = Arc<Mutex<Receiver<()>>>;
@@ -68,8 +71,8 @@ impl SceneProvider for OneScene {
         vec![SceneSummary { id: "float".into(), title: "A body".into(), about: "It floats.".into() }]
     }
 
-    fn open(&self, id: &str, progress: ProgressCallback) -> Result<ViewerScene, SceneError> {
-        progress("loading", Some(0.5));
+    fn open(&self, id: &str, job: JobControl) -> Result<ViewerScene, SceneError> {
+        (job.report)("loading", Some(0.5));
         if id == "float" {
             Ok(scene(DVec3::ZERO, 1e-3))
         } else {
@@ -86,15 +89,20 @@ impl SceneProvider for OneScene {
         &self,
         _: usize,
         material: MaterialDescription,
-        _: ProgressCallback,
+        _: JobControl,
     ) -> Result<ViewerScene, SceneError> {
         Err(format!("E = {}", material.young).into())
     }
 
-    fn record(&self, upload: Upload, _: ProgressCallback) -> Result<ViewerScene, SceneError> {
+    fn record(&self, upload: Upload, job: JobControl) -> Result<ViewerScene, SceneError> {
         if upload.name == "slow.msh" {
+            let gate = self.gate.lock().expect("no panic");
             // A test that has ended opens it as well.
-            let _ = self.gate.lock().expect("no panic").recv();
+            while gate.recv_timeout(CANCELLATION_POLL) == Err(RecvTimeoutError::Timeout) {
+                if job.cancelled.load(Ordering::Acquire) {
+                    return Err("interrupted".into());
+                }
+            }
         }
         Err(format!("{} bytes of {}", upload.bytes.len(), upload.name).into())
     }
@@ -103,6 +111,8 @@ impl SceneProvider for OneScene {
 /// Server on a free port that stops when dropped.
 pub struct TestServer {
     pub address: SocketAddr,
+    /// Lines for the terminal.
+    pub notices: Arc<Mutex<Vec<String>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -112,23 +122,38 @@ impl TestServer {
         Self::live_with_gate().0
     }
 
+    /// Server of the test scene with limits.
+    pub fn limited(limits: Limits) -> Self {
+        Self::bind(&Settings { limits, ..local() }, live_content().0)
+    }
+
     /// Server, and what opens the gate of recordings of `slow.msh`.
     pub fn live_with_gate() -> (Self, Sender<()>) {
-        let (open, gate) = channel();
-        let provider = Arc::new(OneScene { gate: Arc::new(Mutex::new(gate)) });
-        let scheduling = Scheduling { priority: None, core: None };
-        let first = scene(DVec3::ZERO, 1e-3);
-        (Self::new(ServedContent::Live(Box::new(Live { provider, first, scheduling }))), open)
+        let (content, open) = live_content();
+        (Self::new(content), open)
     }
 
     pub fn new(content: ServedContent) -> Self {
-        let settings = Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), token: None };
-        let server = Server::bind(&settings).expect("a free port");
+        Self::bind(&local(), content)
+    }
+
+    pub fn bind(settings: &Settings, content: ServedContent) -> Self {
+        let server = Server::bind(settings).expect("a free port");
         let address = server.address().expect("an address");
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
-        let thread = Some(std::thread::spawn(move || server.run(content, &stopped).expect("it runs")));
-        Self { address, stop, thread }
+        let notices: Arc<Mutex<Vec<String>>> = Arc::default();
+        let heard = notices.clone();
+        let notify = move |line: &str| heard.lock().expect("no panic").push(line.into());
+        let run = move || server.run(content, &stopped, &notify).expect("it runs");
+        Self { address, notices, stop, thread: Some(std::thread::spawn(run)) }
+    }
+
+    /// Connection on which nothing was sent yet.
+    pub fn connect(&self) -> TcpStream {
+        let stream = TcpStream::connect(self.address).expect("it listens");
+        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
+        stream
     }
 
     pub fn page(&self) -> Page {
@@ -142,19 +167,20 @@ impl TestServer {
 
     /// HTTP status and body.
     pub fn request(&self, head: &str, body: &[u8]) -> (u16, Vec<u8>) {
-        let mut stream = TcpStream::connect(self.address).expect("it listens");
-        stream.set_read_timeout(Some(TIMEOUT)).expect("a timeout");
+        let (status, _, body) = self.answer(head, body);
+        (status, body)
+    }
+
+    /// HTTP status, head and body.
+    pub fn answer(&self, head: &str, body: &[u8]) -> (u16, String, Vec<u8>) {
+        let mut stream = self.connect();
         let host = if head.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
         let length = body.len();
         write!(stream, "{head} HTTP/1.1\r\n{host}Content-Length: {length}\r\nConnection: close\r\n\r\n")
             .or_else(|_| Ok::<(), std::io::Error>(()))
             .expect("written or refused");
         let _ = stream.write_all(body);
-        let mut answer = Vec::new();
-        let _ = stream.read_to_end(&mut answer);
-        let end = answer.windows(4).position(|four| four == b"\r\n\r\n").map_or(answer.len(), |at| at + 4);
-        let status = String::from_utf8_lossy(&answer[..end]).split(' ').nth(1).and_then(|s| s.parse().ok());
-        (status.unwrap_or(0), answer[end..].to_vec())
+        read_answer(&mut stream)
     }
 
     pub fn get(&self, path: &str) -> (u16, Vec<u8>) {
@@ -169,6 +195,30 @@ impl Drop for TestServer {
             let _ = thread.join();
         }
     }
+}
+
+/// Settings of a free port on loopback.
+pub fn local() -> Settings {
+    Settings::new((Ipv4Addr::LOCALHOST, 0).into())
+}
+
+/// Test scene, and what opens the gate of recordings of `slow.msh`.
+pub fn live_content() -> (ServedContent, Sender<()>) {
+    let (open, gate) = channel();
+    let provider = Arc::new(OneScene { gate: Arc::new(Mutex::new(gate)) });
+    let scheduling = Scheduling { priority: None, core: None };
+    let first = scene(DVec3::ZERO, 1e-3);
+    (ServedContent::Live(Box::new(Live { provider, first, scheduling })), open)
+}
+
+/// HTTP status, head and body; zeros if the connection is closed without an answer.
+pub fn read_answer(stream: &mut TcpStream) -> (u16, String, Vec<u8>) {
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    let end = answer.windows(4).position(|four| four == b"\r\n\r\n").map_or(answer.len(), |at| at + 4);
+    let head = String::from_utf8_lossy(&answer[..end]).into_owned();
+    let status = head.split(' ').nth(1).and_then(|status| status.parse().ok());
+    (status.unwrap_or(0), head, answer[end..].to_vec())
 }
 
 /// Decoded frame of the test scene.

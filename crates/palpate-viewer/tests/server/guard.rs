@@ -1,7 +1,7 @@
 //! Access control and hostile pages.
 
-use super::client::{TestServer, mode_shapes};
-use palpate_viewer::{Server, ServerError, Settings};
+use super::client::{TestServer, live_content, local, mode_shapes};
+use palpate_viewer::{Server, ServerError, Settings, Token};
 use tungstenite::Message;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
@@ -42,17 +42,17 @@ fn foreign_hosts_foreign_origins_and_path_traversal_are_refused() {
 #[test]
 fn beyond_loopback_a_token_is_required() {
     let listen = ([0, 0, 0, 0], 0).into();
-    let refused = Server::bind(&Settings { listen, token: None }).expect_err("no token");
+    let refused = Server::bind(&Settings::new(listen)).expect_err("no token");
     assert!(matches!(refused, ServerError::MissingToken(address) if address == listen), "{refused}");
     assert_eq!(
         refused.to_string(),
-        "0.0.0.0:0 can be reached from other machines: give a token of 8 characters or more (--token), without which \
-         nobody gets in"
+        "0.0.0.0:0 can be reached from other machines: give a token (--token-file, or PALPATE_TOKEN), without which nobody \
+         gets in"
     );
-    assert!(Server::bind(&Settings { listen, token: Some("short".into()) }).is_err());
-    assert!(Server::bind(&Settings { listen, token: Some("long enough".into()) }).is_ok());
+    let token = Some(Token::new("a token, long enough").expect("a token"));
+    assert!(Server::bind(&Settings { token, ..Settings::new(listen) }).is_ok());
     let served = TestServer::live();
-    let taken = Server::bind(&Settings { listen: served.address, token: None }).expect_err("taken");
+    let taken = Server::bind(&Settings::new(served.address)).expect_err("taken");
     assert!(matches!(taken, ServerError::AddressInUse(address) if address == served.address), "{taken}");
     let text =
         format!("something listens at {} already: stop it, or take another port (--listen)", served.address);
@@ -98,4 +98,53 @@ fn a_flooding_page_is_disconnected_and_garbage_does_not_stop_the_scene() {
     assert!(ended < 10_000, "a message that is too large ends the session");
     let after = good.frame(&shapes, |frame| frame.step > before + 100);
     assert!(after.time_s > 0.0);
+}
+
+#[test]
+fn wrong_tokens_make_their_address_wait_and_the_right_one_gets_in() {
+    let token = Token::new("a&b#c d%20, and long").expect("a token");
+    let query = token.query();
+    let served = TestServer::bind(&Settings { token: Some(token), ..local() }, live_content().0);
+    assert_eq!(served.get("/").0, 200, "the page is public");
+    assert_eq!(served.get(&format!("/scene/1/object/0/surface?{query}")).0, 200);
+    let answers: Vec<_> = (0..200)
+        .map(|guess| served.answer(&format!("GET /scene/1/object/0/surface?token=guess-{guess}"), b""))
+        .collect();
+    let text = |body: &[u8]| String::from_utf8_lossy(body).into_owned();
+    let compared = answers.iter().filter(|(status, ..)| *status == 403).count();
+    assert_eq!(
+        (answers[0].0, text(&answers[0].2).as_str()),
+        (403, "the token is missing or wrong: open the address that palpate has printed")
+    );
+    // Five are free; each further one doubles the wait, so that ten more would take over a quarter of an hour.
+    assert!((6..16).contains(&compared), "{compared} guesses were compared");
+    let (status, head, body) =
+        answers.iter().find(|(status, ..)| *status == 429).expect("an address that waits");
+    assert_eq!(
+        (*status, text(body)),
+        (429, "too many wrong tokens came from your address: try again in 1 s".into())
+    );
+    assert!(head.contains("retry-after: 1\r\n"), "{head}");
+}
+
+#[test]
+fn every_answer_says_what_a_page_may_do_and_is_kept_by_no_cache() {
+    let served = TestServer::live();
+    for request in
+        ["GET /", "GET /nowhere", "GET /scene/1/object/0/surface", "POST /record?name=a", "PUT /record"]
+    {
+        let (status, head, _) = served.answer(request, b"");
+        for line in [
+            "content-security-policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+             connect-src 'self'; object-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n",
+            "x-content-type-options: nosniff\r\n",
+            "referrer-policy: no-referrer\r\n",
+            "cross-origin-resource-policy: same-origin\r\n",
+            "cache-control: no-store\r\n",
+        ] {
+            assert!(head.contains(line), "{request}, {status}: {line} is missing in {head}");
+        }
+    }
+    let (status, head, _) = served.answer("GET / HTTP/1.1\r\nHost: evil.example\r\nX:", b"");
+    assert!(status == 403 && head.contains("content-security-policy: "), "{head}");
 }

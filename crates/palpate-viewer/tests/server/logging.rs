@@ -7,8 +7,8 @@ use palpate_haptics::Scheduling;
 use palpate_haptics::log::{LogReader, LogSummary, LogWriter, SceneNames};
 use palpate_testkit::{GRAVITY_M_S2, free_block, half_extent};
 use palpate_viewer::{
-    Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, ProgressCallback,
-    SceneError, SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,
+    JobControl, Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, SceneError,
+    SceneProvider, SceneSummary, ServedContent, Upload, ViewerScene,
 };
 use std::collections::BTreeMap;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
@@ -93,7 +93,7 @@ impl SceneProvider for LoggedProvider {
         Vec::new()
     }
 
-    fn open(&self, _: &str, _: ProgressCallback) -> Result<ViewerScene, SceneError> {
+    fn open(&self, _: &str, _: JobControl) -> Result<ViewerScene, SceneError> {
         Err("there is no other scene".into())
     }
 
@@ -105,12 +105,12 @@ impl SceneProvider for LoggedProvider {
         &self,
         _: usize,
         _: MaterialDescription,
-        _: ProgressCallback,
+        _: JobControl,
     ) -> Result<ViewerScene, SceneError> {
         Err("there is no other material".into())
     }
 
-    fn record(&self, _: Upload, _: ProgressCallback) -> Result<ViewerScene, SceneError> {
+    fn record(&self, _: Upload, _: JobControl) -> Result<ViewerScene, SceneError> {
         Err("there is no other mesh".into())
     }
 }
