@@ -11,6 +11,7 @@ import { Notifications } from "./ui/notifications";
 import { SceneView } from "./rendering/scene_view";
 import type { DisplaySettings } from "./rendering/scene_graph";
 import { prefersDark, loadPreferences, savePreferences } from "./preferences";
+import { token } from "./protocol/token";
 import { Connection, type ConnectionState } from "./protocol/connection";
 import type { ServerMessage, Hello } from "./protocol/messages";
 import { RenderMode } from "./modes/render_mode";
@@ -24,6 +25,7 @@ let mode: PageMode | null = null;
 let modeName: Hello["kind"] | null = null;
 
 function start(): void {
+  token();
   const remembered = loadPreferences();
   themeChosen = remembered.themeChosen;
   let sceneView: SceneView;

@@ -9,6 +9,7 @@ mod growing_log;
 mod interrupt;
 mod log_kind;
 mod progress;
+mod secret_file;
 mod terminal;
 
 pub use failure::Failure;

@@ -13,6 +13,9 @@ impl Progress for WithoutRemarks<'_> {
         self.0.advance(units);
     }
     fn warn(&mut self, _text: &str) {}
+    fn is_interrupted(&self) -> bool {
+        self.0.is_interrupted()
+    }
 }
 
 /// Progress as calls of a function with the stage and its completed share, at most a hundred times a stage.

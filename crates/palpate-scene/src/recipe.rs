@@ -113,11 +113,12 @@ impl RecordingRecipe {
     }
 }
 
-/// Cache folder of recordings: the given one, or `palpate` in the user's cache; created if missing. None where it cannot be
-/// created.
+/// Cache folder of recordings: the given one, or `palpate` in the user's cache; created if missing, as an absolute path, since
+/// scenes elsewhere name its files. None where it cannot be created.
 pub fn cache_folder(given: Option<&Path>) -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let user_cache = || variable("XDG_CACHE_HOME").or_else(|| Some(variable("HOME")?.join(".cache")));
     let folder = given.map(Path::to_path_buf).or_else(|| Some(user_cache()?.join("palpate")))?;
+    let folder = std::path::absolute(folder).ok()?;
     std::fs::create_dir_all(&folder).is_ok().then_some(folder)
 }

@@ -55,9 +55,17 @@ pub enum TokenError {
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum TlsError {
-    /// A file cannot be read, or is not PEM.
-    #[error("cannot read {}: {reason}; expected a PEM file", path.display())]
+    /// A file cannot be read.
+    #[error("cannot read {}: {reason}", path.display())]
     Unreadable {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        reason: String,
+    },
+    /// A file without what it should hold.
+    #[error("cannot read {}: {reason}; expected a PEM file", path.display())]
+    NoPem {
         /// File.
         path: PathBuf,
         /// Cause.

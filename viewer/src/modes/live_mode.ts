@@ -38,7 +38,8 @@ export class LiveMode implements PageMode {
   private readonly toolbar: LiveToolbar;
   private readonly hint = new Hint();
   private readonly forceReadout = new ForceReadout();
-  private readonly jobs = new JobList();
+  private readonly jobs = new JobList(() => this.cancelJob());
+  private readonly meshUpload: MeshUpload;
   private readonly scenes: ScenesPanel;
   private readonly physics: PhysicsPanel;
   private readonly material: MaterialPanel;
@@ -87,7 +88,8 @@ export class LiveMode implements PageMode {
     this.scenes = new ScenesPanel((id) => send({ type: "open_scene", scene: id }));
     this.physics = new PhysicsPanel(send);
     this.material = new MaterialPanel(send);
-    const meshUpload = new MeshUpload(notifications);
+    const meshUpload = new MeshUpload(notifications, this.jobs);
+    this.meshUpload = meshUpload;
 
     this.viewers.hidden = true;
     this.outOfView.hidden = true;
@@ -110,12 +112,18 @@ export class LiveMode implements PageMode {
   hello(hello: Hello): void {
     this.touches.clear();
     this.scenes.setScenes(hello.scenes);
+    this.meshUpload.viewer = hello.viewer;
     this.stream();
   }
 
   /** Requests the frame stream; none while the page is hidden. */
   private stream(): void {
     this.connection.send({ type: "stream", format: this.sceneView.reconstructsOnGpu ? "modal" : "vertices", stride: document.hidden ? 0 : 1 });
+  }
+
+  private cancelJob(): void {
+    this.meshUpload.cancel();
+    this.connection.send({ type: "cancel_job" });
   }
 
   visibilityChanged(): void {

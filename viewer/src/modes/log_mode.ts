@@ -34,7 +34,7 @@ export class LogMode implements PageMode {
   private readonly logs: Log[] = [];
   private readonly player = new Player(0, 1 / 60);
   private readonly timeline: Timeline;
-  private readonly jobs = new JobList();
+  private readonly jobs = new JobList(null);
   private readonly accuracy = new AccuracyPanel();
   private readonly captions = element("div", { class: "captions" });
   private names: string[] = [];

@@ -22,6 +22,7 @@ export interface Hello {
   protocol: number;
   version: string;
   kind: "live" | "logs" | "render";
+  viewer: number;
   scenes: SceneSummary[];
   logs: { name: string }[];
   render?: RenderRequest;
@@ -160,6 +161,7 @@ export type ClientMessage =
   | { type: "single_step" }
   | { type: "slow_motion"; slowdown: number }
   | { type: "reset" }
+  | { type: "cancel_job" }
   | { type: "open_scene"; scene: string }
   | { type: "set_physics"; gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }
   | ({ type: "set_material"; object: number } & Material)
@@ -194,6 +196,7 @@ function isView(value: unknown): boolean {
 const CHECKS: Record<ServerMessage["type"], Check> = {
   hello: (m) =>
     typeof m.protocol === "number" &&
+    typeof m.viewer === "number" &&
     (m.kind === "live" || m.kind === "logs" || m.kind === "render") &&
     isList(m.scenes) &&
     isList(m.logs),

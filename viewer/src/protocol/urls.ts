@@ -1,12 +1,14 @@
 // Server URLs with the token that the page was opened with.
 
+import { token } from "./token";
+
 function here(): URL {
   return new URL(window.location.href);
 }
 
 function withToken(url: URL): URL {
-  const token = here().searchParams.get("token");
-  if (token !== null) url.searchParams.set("token", token);
+  const known = token();
+  if (known !== null) url.searchParams.set("token", known);
   return url;
 }
 

@@ -1,26 +1,31 @@
-// Progress of background jobs, such as recordings.
+// Progress of background jobs, such as recordings, which can be cancelled.
 
 import type { Progress } from "../protocol/messages";
-import { element } from "./elements";
+import { element, iconButton } from "./elements";
 
 const DISPLAY_MS = 4000;
 
 export class JobList {
   readonly box = element("div", { class: "job-list", attributes: { "aria-label": "Background jobs" } });
-  private readonly jobs = new Map<string, { row: HTMLElement; bar: HTMLProgressElement; phase: HTMLElement; timer: number }>();
+  private readonly jobs = new Map<string, { row: HTMLElement; bar: HTMLProgressElement; phase: HTMLElement; cancel: HTMLElement | null; timer: number }>();
+
+  /** `cancel`: cancels the job that runs, of which a server has one at a time; null if jobs cannot be cancelled. */
+  constructor(private readonly cancel: (() => void) | null) {}
 
   update(progress: Progress): void {
     let job = this.jobs.get(progress.job);
     if (job === undefined) {
       const bar = element("progress", { attributes: { max: "1", "aria-label": progress.job } });
       const phase = element("span", { class: "phase" });
-      const row = element("div", { class: "job" }, element("span", { class: "name", text: progress.job }), phase, bar);
-      job = { row, bar, phase, timer: 0 };
+      const cancel = this.cancel === null ? null : iconButton("close", `Cancel: ${progress.job}`, this.cancel);
+      const row = element("div", { class: "job" }, element("span", { class: "name", text: progress.job }), phase, bar, cancel);
+      job = { row, bar, phase, cancel, timer: 0 };
       this.jobs.set(progress.job, job);
       this.box.append(row);
     }
     window.clearTimeout(job.timer);
     job.phase.textContent = progress.done === true ? "done" : (progress.phase ?? "");
+    if (job.cancel !== null) job.cancel.hidden = progress.done === true;
     if (progress.done === true) job.bar.value = 1;
     else if (typeof progress.fraction === "number") job.bar.value = Math.min(1, Math.max(0, progress.fraction));
     else job.bar.removeAttribute("value");

@@ -1,8 +1,9 @@
-// Upload of a mesh file: asks for length unit, material and modes, and has the server record it.
+// Upload of a mesh file: asks for length unit, material and modes, and has the server record it. It can be cancelled.
 
 import { serverUrl } from "../protocol/urls";
 import { element, section } from "./elements";
 import { MaterialFields, PRESETS } from "./material_panel";
+import type { JobList } from "./job_list";
 import type { Notifications } from "./notifications";
 
 const EXTENSIONS = [".msh", ".vtk", ".obj", ".stl"];
@@ -22,8 +23,14 @@ export class MeshUpload {
   private readonly fields = new MaterialFields();
   private readonly fileName = element("strong");
   private file: File | null = null;
+  private upload: AbortController | null = null;
+  /** Number of this viewer: the recording is cancelled when the page leaves. */
+  viewer = 0;
 
-  constructor(private readonly notifications: Notifications) {
+  constructor(
+    private readonly notifications: Notifications,
+    private readonly jobs: JobList,
+  ) {
     const input = element("input", { type: "file", attributes: { accept: EXTENSIONS.join(","), hidden: true } });
     input.addEventListener("change", () => {
       if (input.files?.[0] !== undefined) this.open(input.files[0]);
@@ -107,13 +114,27 @@ export class MeshUpload {
       density: String(material.density),
       scale: this.scale.value,
       modes: this.modes.value,
+      viewer: String(this.viewer),
     });
+    const job = { type: "progress", job: "upload", phase: this.file.name, fraction: null } as const;
+    const upload = new AbortController();
+    this.upload = upload;
+    this.jobs.update(job);
     try {
-      const response = await fetch(serverUrl(`record?${query}`), { method: "POST", body: this.file });
+      const response = await fetch(serverUrl(`record?${query}`), { method: "POST", body: this.file, signal: upload.signal });
       if (!response.ok) throw new Error((await response.text()) || `${response.status} ${response.statusText}`);
       this.notifications.notify(`${this.file.name} is being recorded`);
     } catch (error) {
-      this.notifications.notify(`${this.file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
+      if (upload.signal.aborted) this.notifications.notify(`The upload of ${this.file.name} was cancelled`);
+      else this.notifications.notify(`${this.file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
+    } finally {
+      this.jobs.update({ ...job, done: true });
+      if (this.upload === upload) this.upload = null;
     }
+  }
+
+  /** Cancels an upload that is under way. */
+  cancel(): void {
+    this.upload?.abort();
   }
 }

@@ -266,6 +266,78 @@ export const liveCases = [
     },
   },
   {
+    name: "a recording is cancelled by its button",
+    standinOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      const { generation } = await latestFrame(page);
+      await page.evaluate(() => window.palpate.connection.send({ type: "set_material", object: 0, young: 1000, poisson: 0.3, density: 100 }));
+      await page.click('.job [aria-label^="Cancel: "]');
+      await page.waitForSelector("text=the recording was cancelled");
+      await page.waitForSelector(".job", { state: "detached" });
+      assert((await latestFrame(page)).generation === generation, "it was recorded");
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
+    name: "the token leaves the address bar, and the page reloads without it",
+    realOnly: true,
+    async run(browser) {
+      const token = "a&b#c d%20+é, long";
+      const server = browser.keep(await start({ token }));
+      assert(server.url.endsWith("/?token=a%26b%23c+d%2520%2B%C3%A9%2C+long"), server.url);
+      const page = await browser.page(server.url);
+      for (const visit of ["first", "reloaded"]) {
+        await waitForScene(page);
+        const address = page.url();
+        assert(!address.includes("token") && new URL(address).pathname === "/", `${visit}: ${address}`);
+        assertNoConsoleErrors(page);
+        if (visit === "first") await page.reload();
+      }
+      const kept = await page.evaluate(() => [sessionStorage.getItem("palpate.token"), localStorage.length, document.cookie]);
+      assert(JSON.stringify(kept) === JSON.stringify([token, 0, ""]), `kept: ${JSON.stringify(kept)}`);
+      // Another tab has no token, and gets no scene.
+      const other = await browser.page(page.url());
+      await other.waitForSelector(".banner:not([hidden])");
+      assert(await other.evaluate(() => window.palpate.sceneView.graphs.length === 0), "a scene without a token");
+    },
+  },
+  {
+    name: "the content security policy blocks inline code and foreign connections, and nothing that the page does",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      await page.keyboard.press("?");
+      await page.keyboard.press("Escape");
+      await page.click('[title="Measurements"]').catch(() => undefined);
+      for (const key of ["c", "c", "c", "a", "w", "t", "t", "v"]) await page.keyboard.press(key);
+      for (const summary of await page.locator("summary").all()) if (await summary.isVisible()) await summary.click();
+      await page.waitForTimeout(500);
+      assertNoConsoleErrors(page);
+      const blocked = await page.evaluate(async () => {
+        const directives = new Set();
+        document.addEventListener("securitypolicyviolation", (event) => directives.add(event.effectiveDirective));
+        const script = document.createElement("script");
+        script.textContent = "window.injected = true";
+        document.body.append(script);
+        const box = document.createElement("div");
+        box.innerHTML = '<img src="data:image/png;base64,x" onerror="window.injected = true"><p style="color:red"></p><base href="https://other.example/"><object data="x"></object>';
+        document.body.append(box);
+        await fetch("https://other.example/").catch(() => undefined);
+        // Later: what the browser's debugger calls may evaluate strings.
+        setTimeout(() => (0, eval)("window.injected = true"), 0);
+        await new Promise((wake) => setTimeout(wake, 300));
+        return { injected: window.injected === true, directives: [...directives].sort(), base: document.baseURI === location.href };
+      });
+      assert(!blocked.injected && blocked.base, `code was injected: ${JSON.stringify(blocked)}`);
+      const expected = ["base-uri", "connect-src", "object-src", "script-src", "script-src-attr", "script-src-elem", "style-src-attr"];
+      assert(JSON.stringify(blocked.directives) === JSON.stringify(expected), `blocked: ${blocked.directives}`);
+    },
+  },
+  {
     name: "two objects on each other have one number: the weight of the upper one",
     realOnly: true,
     async run(browser) {

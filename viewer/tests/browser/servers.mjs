@@ -16,10 +16,11 @@ async function freePort() {
   });
 }
 
-async function servePalpate(port, { log, scene = "bounce" }) {
+async function servePalpate(port, { log, scene = "bounce", token }) {
   const logged = log === undefined ? [] : ["--log", log];
   const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
     stdio: ["ignore", "pipe", "pipe"],
+    env: token === undefined ? process.env : { ...process.env, PALPATE_TOKEN: token },
   });
   let output = "";
   for (const stream of [child.stdout, child.stderr]) stream.on("data", (part) => (output += part));
@@ -37,7 +38,7 @@ async function servePalpate(port, { log, scene = "bounce" }) {
   }
 }
 
-/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene. */
+/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene; `token`: its token. */
 export async function start(options = {}) {
   const port = options.port ?? (await freePort());
   if (!process.env.PALPATE) return serve({ ...options, port });

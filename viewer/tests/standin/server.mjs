@@ -1,7 +1,7 @@
 // Stand-in server: speaks docs/viewer-protocol.md with a simplified model of a box.
 //   node tests/standin/server.mjs [--port 8123] [--kind live|logs|render] [--logs 2] [--cells 12] [--modes 60] [--garbage]
 
-import { createReadStream, existsSync, statSync } from "node:fs";
+import { createReadStream, existsSync, readFileSync, statSync } from "node:fs";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -13,6 +13,12 @@ import { makeScene, SCENES } from "./scenes.mjs";
 
 const DIST = fileURLToPath(new URL("../../dist/", import.meta.url));
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+
+/** Content security policy of the real server. */
+function contentSecurityPolicy() {
+  const source = readFileSync(new URL("../../../crates/palpate-viewer/src/server/headers.rs", import.meta.url), "utf8");
+  return source.match(/CONTENT_SECURITY_POLICY: &str = "([^"]+)"/)[1].replaceAll(/\\\n\s*/g, "");
+}
 
 function argument(name, otherwise) {
   const at = process.argv.indexOf(`--${name}`);
@@ -26,6 +32,8 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   let [paused, slowdown, pendingTime, boxBytes] = [false, 1, 0, null];
   const viewers = new Set();
   const images = [];
+  const policy = contentSecurityPolicy();
+  let recording = null;
   const recorded = kind === "live" ? [] : Array.from({ length: logs }, (_, i) => recordLog(i, options));
 
   const send = (viewer, message) => viewer.socket.send(JSON.stringify(message));
@@ -48,6 +56,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
 
   const http = createServer((request, response) => {
     const url = new URL(request.url, "http://localhost");
+    response.setHeader("content-security-policy", policy);
     const answer = (body, type = "application/octet-stream") => response.writeHead(200, { "content-type": type }).end(body);
     if (/^\/scene\/\d+\/object\/0\/surface$/.test(url.pathname)) return answer(surfaces().surface);
     if (/^\/scene\/\d+\/object\/0\/mode_shapes$/.test(url.pathname)) return answer(surfaces().shapes);
@@ -87,6 +96,15 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       return open(scene.message.id);
     }, 300);
     timer.unref();
+    recording = { job, timer };
+  }
+
+  function cancelJob() {
+    if (recording === null) return;
+    clearInterval(recording.timer);
+    broadcast({ type: "progress", job: recording.job, phase: "", fraction: 1, done: true });
+    broadcast({ type: "info", text: "the recording was cancelled" });
+    recording = null;
   }
 
   function press(viewer, message) {
@@ -128,6 +146,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       status();
     },
     reset: () => open(scene.message.id),
+    cancel_job: cancelJob,
     open_scene: (_, message) => open(message.scene),
     set_physics: (_, { gravity, friction, coupling }) => {
       if (gravity !== undefined) scene.box.gravity = gravity;
@@ -147,6 +166,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       protocol: 2,
       version: "stand-in",
       kind,
+      viewer: viewers.size,
       scenes: kind === "live" ? SCENES.map(({ id, title, about }) => ({ id, title, about })) : [],
       logs: recorded.map(({ name }) => ({ name })),
       ...(kind === "render" ? { render } : {}),

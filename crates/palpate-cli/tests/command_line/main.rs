@@ -17,4 +17,5 @@ mod reproduction;
 mod results;
 mod stores;
 mod viewer;
+mod viewer_access;
 mod workplace;

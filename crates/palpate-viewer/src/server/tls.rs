@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::crypto::aws_lc_rs;
-use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::pem::{Error as PemError, PemObject};
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{ServerConfig, version::TLS13};
 
@@ -28,7 +28,10 @@ impl TlsIdentity {
     pub fn read(certificate: &Path, key: &Path) -> Result<Self, TlsError> {
         let unreadable = |path: &Path| {
             let path: PathBuf = path.into();
-            move |error| TlsError::Unreadable { path: path.clone(), reason: format!("{error}") }
+            move |error| match error {
+                PemError::Io(error) => TlsError::Unreadable { path: path.clone(), reason: error.to_string() },
+                error => TlsError::NoPem { path: path.clone(), reason: error.to_string() },
+            }
         };
         let failed = unreadable(certificate);
         let chain = CertificateDer::pem_file_iter(certificate)

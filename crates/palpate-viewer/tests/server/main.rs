@@ -8,3 +8,4 @@ mod live;
 mod logging;
 mod logs;
 mod slow_clients;
+mod tls;

@@ -3,7 +3,7 @@
 use super::client::{TestServer, mode_shapes, read_answer};
 use palpate_testkit::wait_until;
 use palpate_viewer::Limits;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::time::Duration;
 
 /// Limit that a test waits for; the others stay as they are.
@@ -77,12 +77,10 @@ fn a_page_that_does_not_answer_is_disconnected_and_the_others_are_served() {
 
 #[test]
 fn a_page_that_answers_pings_stays_though_it_says_nothing() {
-    let served = TestServer::limited(Limits { silence: Duration::from_millis(200), ..Limits::default() });
+    let served = TestServer::limited(Limits { silence: SHORT, ..Limits::default() });
     let mut page = served.page();
     let first = page.wait("status")["steps"].as_u64().expect("steps");
-    // Ten times as long.
-    while page.wait("status")["steps"].as_u64().is_none_or(|steps| steps < first + 2000) {}
+    // Three times as long.
+    while page.wait("status")["steps"].as_u64().is_none_or(|steps| steps < first + 3000) {}
     assert_eq!(page.wait("status")["viewers"], 1);
-    let mut rest = [0; 1];
-    assert_eq!(served.connect().read(&mut rest).unwrap_or(0), 0, "other connections end");
 }

@@ -8,11 +8,11 @@ use crate::commands::guard::attach_guarded;
 use crate::failure::Failure;
 use crate::growing_log::GrowingLog;
 use crate::interrupt::stop_on_interrupt;
+use crate::secret_file::read_secret_file;
 use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate::{DeviceMode, Pose, State};
-use palpate_fem::read_regular_text;
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogSender, LogWriter, WrittenLog};
 use palpate_haptics::{
@@ -229,7 +229,7 @@ fn listen(
 /// Secret of a file; none without one.
 pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     let Some(file) = file else { return Ok(Secret::none()) };
-    let text = read_regular_text(file).map_err(|e| Failure::file("read the secret", file, &e))?;
+    let text = read_secret_file("the secret", file)?;
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
 }
 

@@ -1,5 +1,6 @@
 //! `palpate serve`: a scene, live, in the browser; or logs.
 
+mod access;
 mod log_series;
 mod scene_provider;
 
@@ -7,20 +8,20 @@ use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
 use crate::log_kind::is_log;
 use crate::progress::CountBar;
-use crate::terminal::{notify, warn_of_cut};
+use crate::terminal::warn_of_cut;
+use access::AccessOptions;
 use clap::Args;
 use indicatif::ProgressBar;
 use log_series::LogSeries;
 use palpate_haptics::Scheduling;
 use palpate_render::LogFramePlayer;
 use palpate_scene::BUILT_IN_SCENES;
-use palpate_viewer::{Live, SceneProvider, ServedContent, Server, Settings, ViewerScene};
+use palpate_viewer::{JobControl, Live, SceneProvider, ServedContent, ViewerScene};
 use scene_provider::LibraryProvider;
 use std::io::IsTerminal;
-use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Show a scene in the browser and touch it with mouse, pen or fingers
 ///
@@ -34,7 +35,7 @@ use std::sync::Arc;
   palpate serve scene.toml
   palpate serve scene.toml --log run.mcap   # with a log of what you do
   palpate serve run.mcap               # a log; two logs: side by side
-  palpate serve --listen 0.0.0.0:7400 --token 4f0c9d2e71   # for other machines, tablets and phones too")]
+  palpate serve --listen 0.0.0.0:7400 --tls-cert cert.pem --tls-key key.pem   # for other machines, tablets and phones too")]
 pub struct Arguments {
     /// A scene file, or one or two logs (.mcap); without one, the built-in scenes
     #[arg(value_name = "FILE", num_args = 0..=2)]
@@ -50,15 +51,9 @@ pub struct Arguments {
 /// Options of the viewer's server.
 #[derive(Args, Debug, Clone, Default)]
 pub struct Serving {
-    /// Address and port of the page [default: 127.0.0.1:7400, or a free port if that is taken]
-    #[arg(long, value_name = "ADDRESS:PORT")]
-    listen: Option<SocketAddr>,
-    /// Secret for access from other machines; part of the printed address
-    #[arg(long, value_name = "TEXT")]
-    token: Option<String>,
-    /// Do not open a browser
-    #[arg(long)]
-    no_browser: bool,
+    /// Access to the server
+    #[command(flatten)]
+    access: AccessOptions,
     /// Core of the force process, from 0; by default the last one
     #[arg(long, value_name = "CORE")]
     core: Option<usize>,
@@ -70,9 +65,6 @@ pub struct Serving {
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
 }
-
-/// Default port.
-const PORT: u16 = 7400;
 
 /// Frame rate of logs [Hz].
 const LOG_FRAMES_HZ: f64 = 60.0;
@@ -98,7 +90,7 @@ pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
-    let server = serving.bind()?;
+    let server = serving.access.bind()?;
     let read = |(number, path): (usize, &PathBuf)| LogFramePlayer::read(path, number, LOG_FRAMES_HZ);
     let logs: Result<Vec<LogFramePlayer>, _> = paths.iter().enumerate().map(read).collect();
     let logs = logs?;
@@ -108,7 +100,7 @@ fn serve_logs(serving: &Serving, paths: &[PathBuf]) -> Result<(), Failure> {
     std::thread::scope(|scope| {
         // The page reports a log that cannot be replayed, and shows the frames before.
         scope.spawn(|| logs.into_iter().for_each(|log| drop(log.compute(stop, &mut CountBar::steps()))));
-        serving.serve(server, ServedContent::Logs(frames))
+        server.serve(ServedContent::Logs(frames))
     })
 }
 
@@ -118,13 +110,15 @@ pub fn serve_built_in(serving: &Serving, id: &str) -> Result<(), Failure> {
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
         let mut shown = String::new();
-        let opened = provider.open(id, &mut |what, _| {
+        let mut report = |what: &str, _| {
             if shown != what {
                 shown = what.into();
                 bar.set_message(format!("recording (once): {what}"));
                 bar.tick();
             }
-        });
+        };
+        let opened =
+            provider.open(id, JobControl { report: &mut report, cancelled: &AtomicBool::new(false) });
         bar.finish_and_clear();
         opened.map_err(|e| Failure(e.to_string()))
     })
@@ -137,53 +131,12 @@ fn serve_live(
     // First what fails fast: a file that cannot be written, a port that is taken.
     let logs = serving.log.as_deref().map(LogSeries::new).transpose()?;
     let provider = LibraryProvider::new(serving.cache.as_deref(), logs.clone())?;
-    let server = serving.bind()?;
+    let server = serving.access.bind()?;
     let first = first(&provider)?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let core = serving.core.or(cores.checked_sub(1));
     let scheduling = Scheduling { priority: Some(PRIORITY), core };
     let live = Live { provider: Arc::new(provider), first, scheduling };
-    serving.serve(server, ServedContent::Live(Box::new(live)))?;
+    server.serve(ServedContent::Live(Box::new(live)))?;
     logs.map_or(Ok(()), |logs| logs.end())
-}
-
-impl Serving {
-    fn settings(&self, listen: SocketAddr) -> Settings {
-        Settings { listen, token: self.token.clone() }
-    }
-
-    /// Binds the given address, or the default port, or a free one.
-    pub fn bind(&self) -> Result<Server, Failure> {
-        if let Some(listen) = self.listen {
-            return Server::bind(&self.settings(listen)).map_err(|e| Failure(e.to_string()));
-        }
-        let here = |port| self.settings((Ipv4Addr::LOCALHOST, port).into());
-        Server::bind(&here(PORT)).or_else(|_| Server::bind(&here(0))).map_err(|e| Failure(e.to_string()))
-    }
-
-    /// Prints the address, opens a browser, and serves until Ctrl-C.
-    pub fn serve(&self, server: Server, content: ServedContent) -> Result<(), Failure> {
-        let mut address = format!("http://{}/", server.address().map_err(|e| Failure(e.to_string()))?);
-        if let Some(token) = &self.token {
-            address += &format!("?token={token}");
-        }
-        // Before the address is printed: its reader may interrupt at once.
-        let stop = stop_on_interrupt();
-        notify(&format!("open {address} in a browser (Ctrl-C ends it)"));
-        if !self.no_browser {
-            open_browser(&address);
-        }
-        server.run(content, stop).map_err(|e| Failure(e.to_string()))
-    }
-}
-
-/// Opens a browser where there is a screen.
-fn open_browser(address: &str) {
-    let screen = ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| std::env::var_os(name).is_some());
-    let program = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
-    if screen || cfg!(target_os = "macos") {
-        let quiet = Command::new(program).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        // The address is printed: a browser can be opened by hand.
-        drop(quiet);
-    }
 }

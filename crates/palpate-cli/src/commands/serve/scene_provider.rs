@@ -7,15 +7,16 @@ use crate::terminal::notify;
 use palpate::{DeviceMode, Material};
 use palpate_render::describe_scene;
 use palpate_scene::{
-    BUILT_IN_SCENES, MeshUpload, OpenedScene, ProgressFn, RealDevice, SceneDevice, SceneLibrary, SceneLog,
-    SettingsChange, attach_path,
+    BUILT_IN_SCENES, MeshUpload, OpenedScene, Progress, ProgressFn, RealDevice, SceneDevice, SceneLibrary,
+    SceneLog, SettingsChange, attach_path,
 };
 use palpate_viewer::{
-    MaterialDescription, PhysicsSettings, ProgressCallback, SceneError, SceneProvider, SceneSummary,
+    JobControl, MaterialDescription, PhysicsSettings, SceneError, SceneProvider, SceneSummary,
     SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Update rate of devices on this machine [Hz].
 const DEVICE_HZ: f64 = 1000.0;
@@ -82,8 +83,8 @@ impl SceneProvider for LibraryProvider {
         BUILT_IN_SCENES.iter().map(summary).collect()
     }
 
-    fn open(&self, id: &str, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
-        self.provided(self.library.open_built_in(id, &mut ProgressFn::new(tell)))
+    fn open(&self, id: &str, job: JobControl) -> Result<ViewerScene, SceneError> {
+        self.provided(self.library.open_built_in(id, &mut JobProgress::new(job)))
     }
 
     fn change_physics(&self, settings: &PhysicsSettings) -> Result<ViewerScene, SceneError> {
@@ -103,16 +104,43 @@ impl SceneProvider for LibraryProvider {
         &self,
         object: usize,
         material: MaterialDescription,
-        tell: ProgressCallback,
+        job: JobControl,
     ) -> Result<ViewerScene, SceneError> {
-        let progress = &mut ProgressFn::new(tell);
+        let progress = &mut JobProgress::new(job);
         self.provided(self.library.change_material(object, uniform(material), progress))
     }
 
-    fn record(&self, upload: Upload, tell: ProgressCallback) -> Result<ViewerScene, SceneError> {
+    fn record(&self, upload: Upload, job: JobControl) -> Result<ViewerScene, SceneError> {
         let Upload { name, bytes, scale, material, modes } = upload;
         let upload = MeshUpload { name, bytes, scale, material: uniform(material), modes };
-        self.provided(self.library.record_upload(upload, &mut ProgressFn::new(tell)))
+        self.provided(self.library.record_upload(upload, &mut JobProgress::new(job)))
+    }
+}
+
+/// Progress of a recording that a page can cancel.
+struct JobProgress<'a> {
+    report: ProgressFn<&'a mut (dyn FnMut(&str, Option<f64>) + Send)>,
+    cancelled: &'a AtomicBool,
+}
+
+impl<'a> JobProgress<'a> {
+    fn new(JobControl { report, cancelled }: JobControl<'a>) -> Self {
+        Self { report: ProgressFn::new(report), cancelled }
+    }
+}
+
+impl Progress for JobProgress<'_> {
+    fn begin(&mut self, stage: &str, total: u64) {
+        self.report.begin(stage, total);
+    }
+    fn advance(&mut self, units: u64) {
+        self.report.advance(units);
+    }
+    fn warn(&mut self, text: &str) {
+        self.report.warn(text);
+    }
+    fn is_interrupted(&self) -> bool {
+        self.cancelled.load(Ordering::Acquire)
     }
 }
 
