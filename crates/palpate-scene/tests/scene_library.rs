@@ -1,6 +1,6 @@
 //! Library of scenes: pointers are added, settings change the text, and the last scene stays when a change is refused.
 
-use palpate_scene::{SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
+use palpate_scene::{Progress, SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
 use palpate_testkit::FREE_BLOCK_FILE;
 use tempfile::TempDir;
 
@@ -45,4 +45,26 @@ fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
         error.to_string(),
         "there is no scene \"nothing\"; there are bounce, shake, pinch, stack, ball, slab"
     );
+}
+
+/// Listener that wants no recording any more.
+struct Cancelled;
+
+impl Progress for Cancelled {
+    fn begin(&mut self, _: &str, _: u64) {}
+    fn advance(&mut self, _: u64) {}
+    fn warn(&mut self, _: &str) {}
+    fn is_interrupted(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_recording_that_is_not_wanted_any_more_ends_and_leaves_nothing() {
+    let folder = TempDir::new().expect("a folder");
+    let cache = folder.path().join("cache");
+    let library = SceneLibrary::new(Some(&cache)).expect("a library");
+    let error = library.open_built_in("slab", &mut Cancelled).err().expect("an interruption");
+    assert_eq!(error.to_string(), "box:0.24x0.02x0.12/24x2x12: interrupted");
+    assert_eq!(std::fs::read_dir(&cache).expect("a folder").count(), 0);
 }

@@ -25,7 +25,7 @@ pub use protocol::{
     SceneDescription, SceneSummary, ShapeDescription, View,
 };
 pub use scene_provider::{
-    DeviceOpener, JobControl, LogFile, LogOpener, OpenLog, PageNotifier, SceneProvider, SharedTrajectory,
-    Upload, ViewerDevice, ViewerScene,
+    DeviceOpener, JobControl, JobReport, LogFile, LogOpener, OpenLog, PageNotifier, SceneProvider,
+    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 pub use server::{Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token};

@@ -77,10 +77,13 @@ pub struct Upload {
     pub modes: usize,
 }
 
+/// Function of the phase of a job, and of the completed fraction of the phase, if known.
+pub type JobReport<'a> = &'a mut (dyn FnMut(&str, Option<f64>) + Send);
+
 /// Listener of a job.
 pub struct JobControl<'a> {
-    /// Receives the phase of the job, and the completed fraction of the phase, if known.
-    pub report: &'a mut (dyn FnMut(&str, Option<f64>) + Send),
+    /// Receives the progress.
+    pub report: JobReport<'a>,
     /// Set when the job is to end with an error at the next opportunity.
     pub cancelled: &'a AtomicBool,
 }

@@ -29,7 +29,7 @@ pub(crate) enum Command {
 /// Class of commands whose rate is bounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pace {
-    /// What stops and starts threads, or a job.
+    /// Restart of the scene, or start of a job.
     Restart,
     /// Message to all pages.
     Status,

@@ -7,6 +7,7 @@
 //! During a delay no token of that address is compared, so that guesses in parallel gain nothing; other addresses are not
 //! affected. A token that was refused before is not another guess: a page that was left open repeats it.
 
+use super::client::network;
 use super::token::TokenHash;
 use std::collections::{HashMap, VecDeque};
 use std::net::IpAddr;
@@ -53,7 +54,7 @@ impl Guesses {
 impl WrongTokens {
     /// Time for which an address must wait.
     pub fn wait(&self, address: IpAddr, now: Instant) -> Option<Duration> {
-        let guesses = self.0.get(&guesser(address))?;
+        let guesses = self.0.get(&network(address))?;
         let until = guesses.last + guesses.delay();
         (until > now).then(|| until - now)
     }
@@ -61,7 +62,7 @@ impl WrongTokens {
     /// Counts a wrong token of an address.
     pub fn count(&mut self, address: IpAddr, token: TokenHash, now: Instant) {
         self.0.retain(|_, guesses| now < guesses.last + FORGET_AFTER);
-        let address = guesser(address);
+        let address = network(address);
         if self.0.len() >= MAX_ADDRESSES && !self.0.contains_key(&address) {
             let oldest = self.0.iter().min_by_key(|(_, guesses)| guesses.last).map(|(address, _)| *address);
             oldest.map(|oldest| self.0.remove(&oldest));
@@ -79,14 +80,6 @@ impl WrongTokens {
         }
         guesses.refused.push_back(token);
         (guesses.count, guesses.last) = (guesses.count.saturating_add(1), now);
-    }
-}
-
-/// Address that stands for a guesser: whoever has an IPv6 address has its /64.
-fn guesser(address: IpAddr) -> IpAddr {
-    match address.to_canonical() {
-        IpAddr::V6(address) => IpAddr::V6((address.to_bits() >> 64 << 64).into()),
-        address => address,
     }
 }
 

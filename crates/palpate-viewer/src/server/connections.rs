@@ -1,5 +1,6 @@
 //! Connections: a bounded number, each with a time for what it must send and take.
 
+use super::client::{Client, Place, Shares};
 use super::limits::Limits;
 use super::tls::TlsIdentity;
 use axum::Router;
@@ -7,7 +8,6 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::io::{self, ErrorKind};
-use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
@@ -29,14 +29,6 @@ const REFUSAL_TIME: Duration = Duration::from_secs(2);
 /// Pause after a connection that cannot be accepted: no file descriptor is left.
 const ACCEPT_RETRY_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Client of a request, with the place that its connection takes.
-#[derive(Clone)]
-pub(super) struct Client {
-    pub address: IpAddr,
-    /// Given back when the connection has ended, and the session on it.
-    pub place: Arc<OwnedSemaphorePermit>,
-}
-
 /// Listener with the rules of its connections.
 pub(super) struct Connections {
     pub listener: TcpListener,
@@ -50,6 +42,7 @@ impl Connections {
     pub async fn serve(self, notify: &dyn Fn(&str)) {
         let Self { listener, router, tls, limits } = self;
         let places = Arc::new(Semaphore::new(limits.connections));
+        let shares = Arc::new(Shares::default());
         let refusals = Arc::new(Semaphore::new(MAX_REFUSALS));
         let mut told = false;
         loop {
@@ -62,7 +55,11 @@ impl Connections {
                     continue;
                 }
             };
-            let Ok(place) = places.clone().try_acquire_owned() else {
+            let address = address.ip().to_canonical();
+            // Half of the places for one network: a stranger without the token does not keep all others out.
+            let most = if address.is_loopback() { limits.connections } else { share_of(limits.connections) };
+            let share = shares.take(address, most);
+            let (Ok(permit), Some(share)) = (places.clone().try_acquire_owned(), share) else {
                 if !told {
                     told = true;
                     notify(&refusal(limits.connections));
@@ -73,16 +70,23 @@ impl Connections {
                 }
                 continue;
             };
-            let client = Client { address: address.ip(), place: Arc::new(place) };
+            let client = Client { address, place: Arc::new(Place { _permit: permit, _share: share }) };
             tokio::spawn(serve_connection(stream, client, router.clone(), tls.clone(), limits.clone()));
         }
     }
 }
 
+/// Connections that one network beyond this machine may have.
+fn share_of(connections: usize) -> usize {
+    connections.div_ceil(2)
+}
+
 /// Text for a client that is refused, and for the terminal.
 fn refusal(connections: usize) -> String {
     format!(
-        "all {connections} connections of the viewer are taken: close a page and try again, or allow more (--max-connections)"
+        "no connection of the viewer is free, of {connections} in all and {} for an address of another machine: close a page and \
+         try again, or allow more (--max-connections)",
+        share_of(connections)
     )
 }
 

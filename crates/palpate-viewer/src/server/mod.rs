@@ -2,6 +2,7 @@
 
 mod attempts;
 mod body;
+mod client;
 mod connections;
 mod content;
 mod guard;

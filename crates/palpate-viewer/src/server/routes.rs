@@ -1,7 +1,7 @@
 //! HTTP routes.
 
 use super::body::read_body;
-use super::connections::Client;
+use super::client::Client;
 use super::headers::harden;
 use super::page;
 use super::session;

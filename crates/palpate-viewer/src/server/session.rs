@@ -1,6 +1,6 @@
 //! WebSocket session of one page.
 
-use super::connections::Client;
+use super::client::Client;
 use super::state::ServerState;
 use crate::live::{Command, LiveScene};
 use crate::pointers::{PointerId, lock};

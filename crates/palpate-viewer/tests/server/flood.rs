@@ -8,7 +8,8 @@ use std::net::TcpStream;
 /// Growth of the process under a flood of 2 GB [bytes], at most: 256 heads of 32 kB, and the test's own sockets.
 const MAX_GROWTH_BYTES: u64 = 96 << 20;
 
-const FULL: &str = "all 256 connections of the viewer are taken: close a page and try again, or allow more (--max-connections)";
+const FULL: &str = "no connection of the viewer is free, of 256 in all and 128 for an address of another machine: close a page and try \
+                    again, or allow more (--max-connections)";
 
 /// Resident memory of this process [bytes].
 #[cfg(target_os = "linux")]

@@ -69,7 +69,9 @@ fn a_page_is_served_encrypted_and_plain_requests_get_nothing() {
 fn files_that_are_no_identity_are_named() {
     let folder = tempfile::TempDir::new().expect("a temporary folder");
     let (one, two) = (folder.path().join("one"), folder.path().join("two"));
-    [&one, &two].map(|folder| std::fs::create_dir(folder).expect("a writable folder"));
+    for folder in [&one, &two] {
+        std::fs::create_dir(folder).expect("a writable folder");
+    }
     let (one, two) = (Certificate::new(&one), Certificate::new(&two));
     let read = |certificate: &Path, key: &Path| {
         let text = TlsIdentity::read(certificate, key).expect_err("no identity").to_string();

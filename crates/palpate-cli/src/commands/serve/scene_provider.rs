@@ -11,7 +11,7 @@ use palpate_scene::{
     SceneLog, SettingsChange, attach_path,
 };
 use palpate_viewer::{
-    JobControl, MaterialDescription, PhysicsSettings, SceneError, SceneProvider, SceneSummary,
+    JobControl, JobReport, MaterialDescription, PhysicsSettings, SceneError, SceneProvider, SceneSummary,
     SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 use std::path::Path;
@@ -119,7 +119,7 @@ impl SceneProvider for LibraryProvider {
 
 /// Progress of a recording that a page can cancel.
 struct JobProgress<'a> {
-    report: ProgressFn<&'a mut (dyn FnMut(&str, Option<f64>) + Send)>,
+    report: ProgressFn<JobReport<'a>>,
     cancelled: &'a AtomicBool,
 }
 
