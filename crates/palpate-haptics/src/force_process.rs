@@ -166,7 +166,7 @@ impl ForceProcess {
 
     /// Refused motions of every device, in the model's order.
     pub fn refused_motions(&self) -> impl Iterator<Item = RefusedMotions> {
-        self.slots.iter().map(|slot| slot.port.check.refused())
+        self.slots.iter().map(|slot| slot.port.refused_motions())
     }
 
     /// Number of steps since the start.
@@ -204,8 +204,7 @@ impl ForceProcess {
                 let position = path.at(time_s).position;
                 motion = Motion { sequence: self.steps, time_s: now_s, position, ..Motion::default() };
             }
-            let usable =
-                motion.position.is_finite() && slot.port.check.accepts(&motion, self.objects_at_start);
+            let usable = slot.port.accepts(&motion, self.objects_at_start);
             if usable {
                 slot.motion = motion;
             }

@@ -7,7 +7,6 @@
 //! v [m/s] is the largest speed, Δt [s] the time between two motions, which come in bursts over a network; c and r [m] are centre and
 //! radius of the objects at the start. Refused motions are not used, nor are those that follow within [`REFUSAL_S`].
 
-use crate::port::Motion;
 use crate::safety_limits::{ImplausibleMotion, MotionLimits, RefusedMotions};
 use glam::DVec3;
 
@@ -26,13 +25,24 @@ pub(crate) struct Ball {
     pub radius: f64,
 }
 
+/// Motion, as far as it is checked.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CheckedMotion {
+    /// Sequence number, from 1; 0 before the first motion.
+    pub sequence: u64,
+    /// Time of the reading, or of the arrival [s].
+    pub time_s: f64,
+    /// Position [m, world].
+    pub position: DVec3,
+}
+
 /// Check of one device's motions.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MotionCheck {
     /// Limits; `None` accepts all.
     pub limits: Option<MotionLimits>,
     /// Newest motion.
-    last: Option<Motion>,
+    last: Option<CheckedMotion>,
     /// Way that the next motion may take [m].
     allowance_m: f64,
     /// Time of the last implausible motion [s].
@@ -50,7 +60,7 @@ impl MotionCheck {
     ///
     /// # Real time
     /// No allocation, lock or system call.
-    pub fn accepts(&mut self, motion: &Motion, objects: Ball) -> bool {
+    pub fn accepts(&mut self, motion: &CheckedMotion, objects: Ball) -> bool {
         let Some(limits) = self.limits else { return true };
         if motion.sequence == 0 || self.last.is_some_and(|last| last.sequence == motion.sequence) {
             return self.is_past_refusal(motion);
@@ -66,13 +76,13 @@ impl MotionCheck {
         accepted
     }
 
-    fn is_past_refusal(&self, motion: &Motion) -> bool {
+    fn is_past_refusal(&self, motion: &CheckedMotion) -> bool {
         self.refused_s.is_none_or(|time| (motion.time_s - time).abs() > REFUSAL_S)
     }
 
     fn implausible(
         &mut self,
-        motion: &Motion,
+        motion: &CheckedMotion,
         limits: MotionLimits,
         objects: Ball,
     ) -> Option<ImplausibleMotion> {
@@ -97,8 +107,8 @@ mod tests {
 
     const OBJECTS: Ball = Ball { centre: DVec3::ZERO, radius: 0.1 };
 
-    fn motion(sequence: u64, x: f64, time_s: f64) -> Motion {
-        Motion { sequence, position: DVec3::X * x, time_s, ..Motion::default() }
+    fn motion(sequence: u64, x: f64, time_s: f64) -> CheckedMotion {
+        CheckedMotion { sequence, position: DVec3::X * x, time_s }
     }
 
     fn check() -> MotionCheck {

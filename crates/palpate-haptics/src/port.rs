@@ -1,7 +1,7 @@
 //! Port between a haptic update and the force process: two values, motion and effort, of which only the newest counts.
 
-use crate::motion_check::MotionCheck;
-use crate::safety_limits::MotionLimits;
+use crate::motion_check::{Ball, CheckedMotion, MotionCheck};
+use crate::safety_limits::{MotionLimits, RefusedMotions};
 use glam::{DQuat, DVec3};
 use palpate::DeviceMode;
 use triple_buffer::{Input, Output, triple_buffer};
@@ -76,7 +76,7 @@ pub(crate) enum MotionSink {
 /// Force process's side of a port.
 pub struct ForcePort {
     /// Check of the motions; without limits by default.
-    pub(crate) check: MotionCheck,
+    check: MotionCheck,
     motion: Output<Motion>,
     effort: Input<Effort>,
 }
@@ -137,6 +137,20 @@ impl ForcePort {
     /// No allocation, lock or system call.
     pub fn newest(&mut self) -> Motion {
         *self.motion.read()
+    }
+
+    /// Whether a motion is finite and plausible, with objects as they are at the start.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call.
+    pub(crate) fn accepts(&mut self, motion: &Motion, objects: Ball) -> bool {
+        let Motion { sequence, time_s, position, .. } = *motion;
+        position.is_finite() && self.check.accepts(&CheckedMotion { sequence, time_s, position }, objects)
+    }
+
+    /// Refused motions since the start.
+    pub fn refused_motions(&self) -> RefusedMotions {
+        self.check.refused()
     }
 
     /// Sends an effort.

@@ -166,10 +166,11 @@ impl Safety {
         }
         fault(&mut counts.gaps, since_update_s.is_some_and(|gap_s| !limits.is_regular(gap_s)));
         if let Some(Reply { force_age_s, motion_age_s, is_new }) = reply {
-            // An age that is negative, or no number, is a clock's fault.
-            fault(&mut counts.stale, !(force_age_s.abs() <= limits.watchdog_s));
-            fault(&mut counts.old_motions, !(motion_age_s.abs() <= limits.motion_age_s));
-            fault(&mut counts.slow_replies, is_new && !(motion_age_s <= limits.round_trip_s));
+            // An age that is far below 0, or no number, is a clock's fault.
+            let exceeds = |age_s: f64, limit_s: f64| !(-limit_s..=limit_s).contains(&age_s);
+            fault(&mut counts.stale, exceeds(force_age_s, limits.watchdog_s));
+            fault(&mut counts.old_motions, exceeds(motion_age_s, limits.motion_age_s));
+            fault(&mut counts.slow_replies, is_new && exceeds(motion_age_s, limits.round_trip_s));
         }
         fault(&mut counts.not_finite, !speed_m_s.is_finite());
         fault(&mut counts.overspeed, speed_m_s.is_finite() && speed_m_s > limits.speed_m_s);

@@ -40,8 +40,7 @@ pub fn attach_real(
     guardian: Guardian,
 ) -> Result<(AttachedDevice, String), SceneError> {
     let RealDevice { driver, id, mount, max_force_n, limits, armed } = real;
-    let opened =
-        driver.open_guarded(id, guardian).map_err(|error| SceneError::new(SceneErrorKind::Device, error));
+    let opened = guardian.open(*driver, id).map_err(|error| SceneError::new(SceneErrorKind::Device, error));
     let (found, device) = opened?;
     let limits = SafetyLimits { force_n: max_force_n.unwrap_or(limits.force_n), ..*limits };
     let force_n = limits.force_n.min(device.spec().force_n);

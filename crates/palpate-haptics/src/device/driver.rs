@@ -2,7 +2,6 @@
 
 use super::{Device, DeviceSpec, dhd, haply, openhaptics};
 use crate::error::{DeviceError, Error};
-use crate::guardian::Guardian;
 
 /// Driver of real devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,25 +106,6 @@ impl Driver {
                 (found, Box::new(device))
             }
         })
-    }
-
-    /// Opens a device as [`Self::open`], with a guardian that takes its force away if this process ends or hangs.
-    ///
-    /// # Errors
-    /// If it is missing, or in use, or the guardian has ended.
-    pub fn open_guarded(
-        self,
-        which: &str,
-        guardian: Guardian,
-    ) -> Result<(DiscoveredDevice, Box<dyn Device>), Error> {
-        let (found, device) = self.open(which, None)?;
-        // Indices may change; OpenHaptics opens by the names of configurations only.
-        let name = match self {
-            Self::OpenHaptics => which,
-            Self::Dhd | Self::Haply => found.serial.as_deref().unwrap_or(which),
-        };
-        let guarded = guardian.guard(device, name)?;
-        Ok((found, Box::new(guarded)))
     }
 
     fn default_location(self) -> Option<String> {

@@ -14,7 +14,7 @@ mod watch;
 
 pub use watch::{Cause, GuardianWatch, Takeover};
 
-use crate::device::{Device, DeviceSpec, Reading};
+use crate::device::{Device, DeviceSpec, DiscoveredDevice, Driver, Reading};
 use crate::error::{DeviceError, Error};
 use glam::DVec3;
 use std::io::{BufRead, BufReader, Write};
@@ -71,16 +71,22 @@ impl Guardian {
         Ok(guardian)
     }
 
-    /// Device that this guardian takes over by its name if the process ends or hangs.
+    /// Opens a device as [`Driver::open`], for this guardian to take over if the process ends or hangs.
     ///
     /// # Errors
-    /// If the guardian has ended.
-    pub(crate) fn guard(mut self, device: Box<dyn Device>, name: &str) -> Result<GuardedDevice, Error> {
+    /// If it is missing, or in use, or the guardian has ended.
+    pub fn open(mut self, driver: Driver, which: &str) -> Result<(DiscoveredDevice, Box<dyn Device>), Error> {
+        let (found, device) = driver.open(which, None)?;
+        // Indices may change; OpenHaptics opens by the names of configurations only.
+        let name = match driver {
+            Driver::OpenHaptics => which,
+            Driver::Dhd | Driver::Haply => found.serial.as_deref().unwrap_or(which),
+        };
         let line = format!("{}\n", name.replace('\n', " "));
         if let Err(error) = self.messages.write_all(line.as_bytes()) {
             return Err(DeviceError::NoGuardian { reason: error.to_string() }.into());
         }
-        Ok(GuardedDevice { device: Some(device), guardian: self })
+        Ok((found, Box::new(GuardedDevice { device: Some(device), guardian: self })))
     }
 
     /// Sends a beat, or another message, if one is due.
@@ -116,7 +122,7 @@ impl Drop for Guardian {
 }
 
 /// Real device with its guardian. Without the guardian it gives no readings, so that no force passes.
-pub(crate) struct GuardedDevice {
+struct GuardedDevice {
     /// Device; `None` once it is closed.
     device: Option<Box<dyn Device>>,
     guardian: Guardian,

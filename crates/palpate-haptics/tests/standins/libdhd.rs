@@ -87,7 +87,7 @@ impl World {
 }
 
 impl One {
-    /// What the firmware does when no command came for too long.
+    /// Firmware: forces are off when no command came for too long.
     fn watch(&mut self) {
         let limit = Duration::from_micros(125) * u32::from(self.watchdog);
         let late = self.commanded.replace(Instant::now()).is_some_and(|time| time.elapsed() > limit);

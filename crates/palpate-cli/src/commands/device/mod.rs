@@ -185,12 +185,14 @@ fn connect(
     let Arguments { connect, name, wait, .. } = arguments;
     let mut was_taken = false;
     loop {
-        let over = start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || stop.load(Ordering::Relaxed);
+        let interrupted = stop.load(Ordering::Relaxed);
+        let over = start.elapsed().as_secs_f64() >= *wait || wait.is_nan() || interrupted;
         let why = match client.state() {
             LinkState::Connected => {
                 notify(&format!("linked to {connect} as {name}"));
                 return Ok(());
             }
+            LinkState::Taken(why) if interrupted => return Err(Failure(why)),
             LinkState::Taken(why) if over => {
                 return Err(Failure(format!("{why}, also after {wait} s (--wait)")));
             }
