@@ -88,7 +88,7 @@ impl Run {
     }
 
     /// Waits until the device is left and the guardian has ended, prints how long the force stayed on, and gives what palpate printed.
-    fn is_left_by(mut self, way: &str, act: impl FnOnce(&mut Self)) -> Output {
+    fn end_by(mut self, way: &str, act: impl FnOnce(&mut Self)) -> Output {
         let begun = Instant::now();
         act(&mut self);
         wait_until("no force", || self.amplifier().is_some_and(|one| one.force == [0.0; 3]));
@@ -134,7 +134,7 @@ fn text(bytes: &[u8]) -> String {
 fn signals_leave_a_device_without_force_and_its_guardian_ends_with_the_run() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let run = Run::start("dhd", "libdhd", &[]);
-        let output = run.is_left_by(signal, |run| send(signal, run.palpate()));
+        let output = run.end_by(signal, |run| send(signal, run.palpate()));
         assert_eq!(output.status.code(), Some(0), "{signal}: {}", text(&output.stderr));
         assert!(!text(&output.stderr).contains("guardian"), "{}", text(&output.stderr));
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a report");
@@ -153,7 +153,7 @@ fn a_guardian_takes_the_force_away_when_the_process_is_killed_aborts_or_faults()
     ] {
         let run = Run::start(driver, library, &[]);
         let palpate = run.palpate();
-        let output = run.is_left_by(&format!("{driver}, {signal}"), |_| {
+        let output = run.end_by(&format!("{driver}, {signal}"), |_| {
             (0..times).for_each(|_| {
                 let _ = Command::new("kill").args([signal, &palpate.to_string()]).status();
             });
@@ -170,7 +170,7 @@ fn a_guardian_takes_the_force_away_when_the_process_is_killed_aborts_or_faults()
 #[test]
 fn a_process_that_hangs_is_killed_and_its_device_left_without_force() {
     let run = Run::start("dhd", "libdhd", &[]);
-    let output = run.is_left_by("-STOP", |run| send("-STOP", run.palpate()));
+    let output = run.end_by("-STOP", |run| send("-STOP", run.palpate()));
     assert_eq!(output.status.code(), None, "killed");
     let said = text(&output.stderr);
     let expected = "guardian: palpate hung for 0.5 s with dhd 301, and was killed: forces are off, after ";
@@ -182,7 +182,7 @@ fn a_run_ends_in_good_order_with_the_process_that_started_it() {
     let run = Run::start("dhd", "libdhd", &["sh", "-c", "\"$@\"; true", "sh"]);
     let (shell, palpate) = (run.process.id(), run.palpate());
     assert_ne!(shell, palpate);
-    let output = run.is_left_by("parent killed", |run| run.process.kill().expect("it runs"));
+    let output = run.end_by("parent killed", |run| run.process.kill().expect("it runs"));
     wait_until("palpate has ended", || !runs(palpate));
     assert!(text(&output.stdout).contains("\"steps\""), "with its report: {}", text(&output.stderr));
     assert!(!text(&output.stderr).contains("guardian"), "{}", text(&output.stderr));
@@ -198,7 +198,7 @@ fn without_its_guardian_a_device_gives_no_force() {
     println!("guardian killed: without force after {:.1} ms", begun.elapsed().as_secs_f64() * 1e3);
     std::thread::sleep(Duration::from_millis(50));
     assert_eq!(run.amplifier().map(|one| one.force), Some([0.0; 3]), "and it stays away");
-    let output = run.is_left_by("-INT without a guardian", |_| send("-INT", palpate));
+    let output = run.end_by("-INT without a guardian", |_| send("-INT", palpate));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a report");
     let failure = report["devices"][0]["failure"].as_str().expect("a failure");
     assert_eq!(
