@@ -104,11 +104,9 @@ impl Running {
         kib.unwrap_or(0.0) / 1024.0
     }
 
-    /// Threads and open files.
-    pub fn threads_and_files(&self) -> (usize, usize) {
-        let count =
-            |what| std::fs::read_dir(format!("/proc/{}/{what}", self.id())).map_or(0, Iterator::count);
-        (count("task"), count("fd"))
+    /// Number of open files.
+    pub fn open_files(&self) -> usize {
+        std::fs::read_dir(format!("/proc/{}/fd", self.id())).map_or(0, Iterator::count)
     }
 }
 

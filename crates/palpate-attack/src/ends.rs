@@ -29,6 +29,8 @@ fn wait_for_log(workplace: &Workplace, run: &mut Running) -> Result<(), String> 
             .max()
     };
     let grown = wait_until(Duration::from_secs(20), || size() > Some(100_000) || !run.is_alive());
+    // A log begins with its scene, and steps follow.
+    std::thread::sleep(Duration::from_secs(1));
     require(grown && run.is_alive(), || format!("no log has grown: {}", run.printed()))
 }
 
@@ -51,7 +53,7 @@ fn readable(workplace: &Workplace) -> Result<(u64, String), String> {
 fn killed_run(workplace: &Workplace) -> Verdict {
     let mut run = workplace.start("run fingers.toml --realtime --duration 60 --log run.mcap")?;
     wait_for_log(workplace, &mut run)?;
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(Duration::from_secs(3));
     run.signal("KILL");
     let _ = run.end();
     let (steps, told) = readable(workplace)?;
@@ -64,7 +66,7 @@ fn killed_serve(workplace: &Workplace) -> Verdict {
     let mut run =
         workplace.start(&format!("serve fingers.toml --no-browser --listen {address} --log run.mcap"))?;
     wait_for_log(workplace, &mut run)?;
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(Duration::from_secs(3));
     run.signal("KILL");
     let _ = run.end();
     let (steps, told) = readable(workplace)?;
@@ -111,7 +113,7 @@ fn signalled_record(workplace: &Workplace) -> Verdict {
 
 fn full_disk(workplace: &Workplace) -> Verdict {
     // A limit on the size of a file acts as a full disk does: writes fail from there on.
-    let limit = "trap '' XFSZ; ulimit -f 600";
+    let limit = "trap '' XFSZ; ulimit -f 4000";
     let arguments = "run fingers.toml --realtime --duration 6 --json --log run.mcap";
     let run = Running::start(&mut workplace.palpate_after(limit, arguments))?;
     let mut run = run;

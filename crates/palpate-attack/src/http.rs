@@ -1,7 +1,8 @@
 //! Requests by hand: what a browser would never send.
 
+use socket2::{Domain, Socket, Type};
 use std::io::{Read, Write};
-use std::net::TcpStream;
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::time::Duration;
 
 /// Answer of a server.
@@ -16,8 +17,19 @@ pub struct Answer {
 
 /// Connection with a time-out for each read and write.
 pub fn connect(address: &str, patience: Duration) -> Result<TcpStream, String> {
-    let parsed = address.parse().map_err(|error| format!("{address}: {error}"))?;
-    let stream = TcpStream::connect_timeout(&parsed, patience).map_err(|error| error.to_string())?;
+    connect_from(Ipv4Addr::LOCALHOST, address, patience)
+}
+
+/// Connection from another address of loopback.
+pub fn connect_from(from: Ipv4Addr, address: &str, patience: Duration) -> Result<TcpStream, String> {
+    let parsed: SocketAddr = address.parse().map_err(|error| format!("{address}: {error}"))?;
+    let connected = || {
+        let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
+        socket.bind(&SocketAddr::from((from, 0)).into())?;
+        socket.connect_timeout(&parsed.into(), patience)?;
+        Ok::<_, std::io::Error>(TcpStream::from(socket))
+    };
+    let stream = connected().map_err(|error| error.to_string())?;
     let set = stream.set_read_timeout(Some(patience)).and_then(|()| stream.set_write_timeout(Some(patience)));
     set.map_err(|error| error.to_string())?;
     Ok(stream)

@@ -1,7 +1,7 @@
 //! Attacks on a running palpate, and a soak: `cargo xtask attack`, `cargo xtask soak`.
 //!
 //! ```text
-//! attack (server, link, files, ends, numbers) → child processes of `palpate` on loopback → what came out → verdict
+//! attack (hand, server, link, files, ends, numbers) → child processes of `palpate` on loopback → what came out → verdict
 //! ```
 //!
 //! Nothing leaves the machine, every attack is bounded in time and size, and all files lie in one temporary folder. An attack that is
@@ -11,7 +11,11 @@ mod attack;
 mod child;
 mod ends;
 mod files;
+mod hand;
 mod http;
+#[path = "../../palpate-haptics/tests/standins/inverse_service.rs"]
+#[allow(dead_code)]
+mod inverse_service;
 mod link;
 mod numbers;
 mod page;
@@ -56,7 +60,7 @@ fn main() -> ExitCode {
         }
     };
     let attacks: Vec<&Attack> =
-        [server::ATTACKS, link::ATTACKS, files::ATTACKS, ends::ATTACKS, numbers::ATTACKS]
+        [hand::ATTACKS, server::ATTACKS, link::ATTACKS, files::ATTACKS, ends::ATTACKS, numbers::ATTACKS]
             .into_iter()
             .flatten()
             .filter(|attack| attack.group.contains(&options.only) || attack.name.contains(&options.only))
@@ -129,7 +133,8 @@ mod tests {
 
     #[test]
     fn every_attack_has_a_name_of_its_own() {
-        let all = [server::ATTACKS, link::ATTACKS, files::ATTACKS, ends::ATTACKS, numbers::ATTACKS];
+        let all =
+            [hand::ATTACKS, server::ATTACKS, link::ATTACKS, files::ATTACKS, ends::ATTACKS, numbers::ATTACKS];
         let mut names: Vec<_> = all.into_iter().flatten().map(|attack| attack.name).collect();
         let count = names.len();
         names.sort_unstable();

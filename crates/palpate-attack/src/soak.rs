@@ -36,6 +36,7 @@ pub fn run(palpate: &Path, minutes: f64) -> Result<(), String> {
     let mut pages = [Page::open(&page_address, "")?, Page::open(&page_address, "")?];
     let processes = [("run", &run), ("device", &device), ("serve", &serve)];
     let mut memory: Vec<[f64; 3]> = Vec::new();
+    let mut open_files = [0; 3];
     let start = Instant::now();
     for part in 0..PARTS {
         let hog = (part % 3 == 1).then(|| hog(palpate)).transpose()?;
@@ -47,6 +48,9 @@ pub fn run(palpate: &Path, minutes: f64) -> Result<(), String> {
         }
         drop(hog);
         memory.push(processes.map(|(_, process)| process.memory_mib()));
+        let open = processes.map(|(_, process)| process.open_files());
+        require(part == 0 || open == open_files, || format!("open files: {open_files:?}, then {open:?}"))?;
+        open_files = open;
         let now = memory.last().map(|mib| format!("{:.1} / {:.1} / {:.1}", mib[0], mib[1], mib[2]));
         println!("{:>3} of {PARTS}: run / device / serve {} MiB", part + 1, now.unwrap_or_default());
     }

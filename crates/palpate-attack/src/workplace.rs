@@ -76,6 +76,14 @@ impl Workplace {
         command
     }
 
+    /// `palpate` as the arguments of a script of a shell.
+    pub fn palpate_in(&self, script: &str, arguments: &str) -> Command {
+        let mut command = Command::new("sh");
+        command.args(["-c", script, "sh"]).arg(&self.palpate).args(arguments.split_whitespace());
+        self.settle(&mut command);
+        command
+    }
+
     fn settle(&self, command: &mut Command) {
         let folder = self.folder.path();
         command.current_dir(folder).env("HOME", folder).env("XDG_CACHE_HOME", folder.join("cache"));
