@@ -4,12 +4,16 @@ use crate::attack::require;
 use crate::child::Running;
 use crate::page::Page;
 use crate::workplace::{Workplace, json};
+use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Growth of memory from the second tenth of the time on that is still flat [MiB].
 const FLAT_MIB: f64 = 8.0;
+
+/// Energy that no term of the ledger explains, as a share of all terms: round-off of millions of steps.
+const DEFECT: f64 = 1e-9;
 
 /// Parts of the time; in the second of three the hog runs.
 const PARTS: u32 = 30;
@@ -26,7 +30,8 @@ pub fn run(palpate: &Path, minutes: f64) -> Result<(), String> {
     ))?;
     run.wait_for("waiting at")?;
     let device = workplace.start(&format!(
-        "device left --path left.csv --simulated touch --connect {address} --duration {seconds:.0} --json"
+        "device left --path left.csv --simulated touch --connect {address} --duration {:.0} --json",
+        seconds + 3.0
     ))?;
     device.wait_for("linked to")?;
     let serve = workplace.start(&format!(
@@ -77,8 +82,12 @@ pub fn run(palpate: &Path, minutes: f64) -> Result<(), String> {
         let replayed = replayed.end_within(Duration::from_secs_f64(60.0 + seconds))?;
         require(replayed.code == Some(0), || format!("{log}: {}", replayed.printed))?;
         let replayed = json(&replayed.printed)?;
-        println!("{log}: {}", replayed["replayed"]);
+        println!("{log}: {}, energies [J] {}", replayed["replayed"], replayed["energy_j"]);
         require(replayed["replayed"]["identical"] == true, || format!("{log} does not repeat"))?;
+        let energies = replayed["energy_j"].as_object().ok_or("no energies")?;
+        let size = energies.values().filter_map(Value::as_f64).fold(0.0, |sum, energy| sum + energy.abs());
+        let defect = replayed["energy_j"]["defect"].as_f64().unwrap_or(f64::NAN);
+        require(defect.abs() < DEFECT * size, || format!("{log}: {defect} J of {size} J come from nowhere"))?;
     }
     let steps = run["steps"].as_u64();
     require(run["log"]["steps"].as_u64() == steps, || "the log lacks steps".into())?;
