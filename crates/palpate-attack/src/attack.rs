@@ -4,14 +4,14 @@ use crate::workplace::Workplace;
 use std::path::Path;
 use std::time::Instant;
 
-/// What came out of an attack that was withstood, or what broke.
+/// Result of an attack that was withstood, or the weakness that it found.
 pub type Verdict = Result<String, String>;
 
 /// One attack on a fresh workplace.
 pub struct Attack {
     /// Surface that it is on.
     pub group: &'static str,
-    /// What the attacker does.
+    /// Name: the deed of the attacker.
     pub name: &'static str,
     pub run: fn(&Workplace) -> Verdict,
 }

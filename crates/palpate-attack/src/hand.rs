@@ -1,10 +1,14 @@
 //! Attacks on a process that holds a hand: each way out of it must leave the device without force. The device is a stand-in for Haply's
 //! service, which holds the last force of a client that has gone.
 
+#[path = "../../palpate-haptics/tests/standins/inverse_service.rs"]
+#[allow(dead_code)]
+mod inverse_service;
+
 use crate::attack::{Attack, Verdict, require};
 use crate::child::{PATIENCE, Running, send_signal, wait_until};
-use crate::inverse_service::Service;
 use crate::workplace::Workplace;
+use inverse_service::Service;
 use std::process::Command;
 use std::time::{Duration, Instant};
 

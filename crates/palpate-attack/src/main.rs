@@ -13,9 +13,6 @@ mod ends;
 mod files;
 mod hand;
 mod http;
-#[path = "../../palpate-haptics/tests/standins/inverse_service.rs"]
-#[allow(dead_code)]
-mod inverse_service;
 mod link;
 mod numbers;
 mod page;

@@ -1,8 +1,7 @@
 //! Zarr arrays of a store: the table, and the arrays beside it.
 
-use crate::attributes::{Compression, Number, TableAttributes, TableContent};
+use crate::attributes::{CHECKSUM, Compression, Number, TableAttributes, TableContent};
 use crate::object_storage::ObjectStorage;
-use crate::shards::CHECKSUM;
 use glam::DVec3;
 use palpate::Surface;
 use serde_json::{Map, json};

@@ -28,6 +28,9 @@ pub enum Compression {
 /// Version of the layout of stores.
 pub const STORE_VERSION: u32 = 1;
 
+/// Size of a checksum, CRC-32C [bytes].
+pub(crate) const CHECKSUM: u64 = 4;
+
 /// Attributes of the group: how the table was recorded.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TableAttributes {

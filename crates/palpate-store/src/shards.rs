@@ -1,6 +1,6 @@
 //! Reading of shards: their indices, and one column after another, each checked before anything is allocated for it.
 
-use crate::attributes::{Compression, Number};
+use crate::attributes::{CHECKSUM, Compression, Number};
 use crate::error::StoreError;
 use crate::table_store::TableStore;
 use std::ops::Range;
@@ -10,9 +10,6 @@ use zarrs::storage::byte_range::ByteRange;
 
 /// Size of a column's place in the index of a shard [bytes].
 const INDEX_ENTRY: u64 = 16;
-
-/// Size of a checksum, CRC-32C [bytes].
-pub(crate) const CHECKSUM: u64 = 4;
 
 /// Upper limit of the ratio by which a column is compressed; zeros reach some ten thousand.
 const MAX_COMPRESSION: u64 = 100_000;
