@@ -1,4 +1,4 @@
-//! What tells a log from other files.
+//! Kinds of files, by their names and first bytes.
 
 use palpate_export::PART;
 use palpate_fem::open_regular_file;

@@ -1,8 +1,7 @@
 //! Logs of runs that were killed, or had no room on the disk.
 
 use crate::viewer::Serving;
-use crate::workplace::{CUBE, Workplace};
-use palpate_haptics::log::LogReader;
+use crate::workplace::{CUBE, Workplace, with_room};
 use palpate_testkit::wait_until;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
@@ -12,12 +11,6 @@ const ENOUGH_STEPS: u64 = 1200;
 
 /// Room for steps on a full disk [bytes]: some seconds of them.
 const ROOM: u64 = 400_000;
-
-/// Number of steps of a log that can be read now.
-pub fn logged_steps(workplace: &Workplace, log: &str) -> u64 {
-    let bytes = std::fs::read(workplace.path(log)).unwrap_or_default();
-    LogReader::new(bytes).map_or(0, |log| log.step_count())
-}
 
 /// Run in real time without an end.
 fn endless_run(workplace: &Workplace) -> Child {
@@ -35,7 +28,7 @@ fn interrupt(child: &Child) {
     assert!(sent.is_ok_and(|status| status.success()));
 }
 
-/// What a command prints on standard error.
+/// Standard error of a command that succeeds.
 fn said(workplace: &Workplace, arguments: &[&str]) -> String {
     let output = workplace.palpate(arguments);
     let text = String::from_utf8(output.stderr).expect("text");
@@ -48,14 +41,14 @@ fn a_killed_run_leaves_a_log_that_is_read_and_recovered() {
     let workplace = Workplace::with_scene();
     workplace.write("run.mcap", "an older log");
     let mut child = endless_run(&workplace);
-    wait_until("some chunks", || logged_steps(&workplace, "run.mcap.part") > ENOUGH_STEPS);
+    wait_until("some chunks", || workplace.logged_steps("run.mcap.part") > ENOUGH_STEPS);
     child.kill().expect("a child");
     child.wait().expect("a child");
     assert_eq!(workplace.text("run.mcap"), "an older log");
     std::fs::remove_file(workplace.path("run.mcap")).expect("removed");
     assert!(!workplace.files().iter().any(|name| name.starts_with('.')), "{:?}", workplace.files());
 
-    let steps = logged_steps(&workplace, "run.mcap.part");
+    let steps = workplace.logged_steps("run.mcap.part");
     let warning = format!(
         "warning: run.mcap.part: the log ends without its summary after {steps} steps ({:.3} s): was the run killed? `palpate recover \
          run.mcap.part -o WHOLE.mcap` makes a whole file\n",
@@ -86,14 +79,14 @@ fn a_killed_run_leaves_a_log_that_is_read_and_recovered() {
     let expected = "cannot write run.mcap: run.mcap.part is there, left by a run that was killed or had no room; keep what is in it \
                     (`palpate recover` makes a whole log), or remove it";
     assert_eq!(error, expected);
-    assert_eq!(logged_steps(&workplace, "run.mcap.part"), steps);
+    assert_eq!(workplace.logged_steps("run.mcap.part"), steps);
 
     // One that is killed at once leaves nothing that is worth refusing for.
     let bytes = workplace.read("run.mcap.part");
     workplace.write("other.mcap.part", &bytes[..2000]);
     workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "other.mcap"]);
     assert_eq!(
-        (logged_steps(&workplace, "other.mcap"), workplace.path("other.mcap.part").exists()),
+        (workplace.logged_steps("other.mcap"), workplace.path("other.mcap.part").exists()),
         (50, false)
     );
     workplace.write("notes.part", "no log");
@@ -115,10 +108,10 @@ fn a_killed_run_leaves_a_log_that_is_read_and_recovered() {
 fn a_killed_server_leaves_a_log_that_is_read() {
     let workplace = Workplace::with_scene();
     let mut serving = Serving::new(&workplace, &["scene.toml", "--log", "run.mcap"]);
-    wait_until("some chunks", || logged_steps(&workplace, "run.mcap.part") > ENOUGH_STEPS);
+    wait_until("some chunks", || workplace.logged_steps("run.mcap.part") > ENOUGH_STEPS);
     serving.child.kill().expect("a child");
     serving.child.wait().expect("a child");
-    let steps = logged_steps(&workplace, "run.mcap.part");
+    let steps = workplace.logged_steps("run.mcap.part");
     assert_eq!(workplace.json(&["replay", "run.mcap.part", "--json"])["replayed"]["steps"], steps);
     let started = workplace.palpate(&["serve", "scene.toml", "--no-browser", "--log", "run.mcap"]);
     let error = String::from_utf8_lossy(&started.stderr).into_owned();
@@ -132,10 +125,8 @@ fn a_full_disk_is_told_at_once_and_the_run_goes_on_with_its_report() {
     let workplace = Workplace::with_scene();
     workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "short.mcap"]);
     let begin = std::fs::metadata(workplace.path("short.mcap")).expect("a log").len();
-    // A limit on the size of files acts as a full disk does; its unit is 512 bytes.
-    let limit = format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", (begin + ROOM) / 512);
-    let mut child = Command::new("sh")
-        .args(["-c", &limit, "sh", env!("CARGO_BIN_EXE_palpate"), "run", "scene.toml", "--realtime"])
+    let mut child = with_room((begin + ROOM) / 512)
+        .args(["run", "scene.toml", "--realtime"])
         .args(["--duration", "600", "--json", "--log", "run.mcap"])
         .current_dir(workplace.path("."))
         .stdout(Stdio::piped())
@@ -164,10 +155,68 @@ fn a_full_disk_is_told_at_once_and_the_run_goes_on_with_its_report() {
     );
     assert_eq!(rest, [expected]);
     // A chunk may be whole whose index did not fit.
-    let readable = logged_steps(&workplace, "run.mcap.part");
+    let readable = workplace.logged_steps("run.mcap.part");
     assert!((kept..=all).contains(&readable), "{kept} to {readable} of {all}");
     workplace.succeed(&["recover", "run.mcap.part", "-o", "whole.mcap"]);
     assert_eq!(workplace.json(&["replay", "whole.mcap", "--json"])["replayed"]["steps"], readable);
+}
+
+#[test]
+fn a_server_on_a_full_disk_keeps_the_steps_so_far_and_goes_on() {
+    let workplace = Workplace::with_scene();
+    workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "short.mcap"]);
+    let begin = std::fs::metadata(workplace.path("short.mcap")).expect("a log").len();
+    let serving = Serving::with_room((begin + ROOM) / 512, &workplace, &["scene.toml", "--log", "run.mcap"]);
+    let mut kept = 0;
+    wait_until("the disk is full", || {
+        let before = std::mem::replace(
+            &mut kept,
+            std::fs::metadata(workplace.path("run.mcap.part")).map_or(0, |m| m.len()),
+        );
+        kept == before && kept > begin + ROOM - 512
+    });
+    assert!(!serving.get("/").0.is_empty(), "it goes on");
+    let (code, said) = serving.interrupted();
+    assert_eq!(said[0], "warning: cannot write the log run.mcap: File too large (os error 27)");
+    assert!(said[1].starts_with("warning: the log run.mcap is incomplete: at least the first "), "{said:?}");
+    assert_eq!(said[2..], ["error: cannot write the log run.mcap: File too large (os error 27)"]);
+    assert_eq!(code, Some(1));
+    assert!(workplace.logged_steps("run.mcap.part") > 50);
+    workplace.succeed(&["recover", "run.mcap.part", "-o", "run.mcap"]);
+}
+
+#[test]
+fn an_interrupted_rendering_leaves_neither_its_folders_nor_its_browser() {
+    let workplace = Workplace::with_scene();
+    workplace.succeed(&["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "run.mcap"]);
+    std::fs::create_dir(workplace.path("tmp")).expect("a folder");
+    // A browser that draws nothing; it leaves its number.
+    workplace
+        .write("browser", "#!/bin/sh\n[ \"$1\" = --version ] && exit 0\necho $$ > number\nexec sleep 1000\n");
+    let made = Command::new("chmod").arg("+x").arg(workplace.path("browser")).status();
+    assert!(made.is_ok_and(|status| status.success()));
+    for signal in ["-TERM", "-HUP", "-INT"] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["render", "run.mcap", "-o", "frames", "--browser", "./browser"])
+            .env("TMPDIR", workplace.path("tmp"))
+            .current_dir(workplace.path("."))
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the command starts");
+        let mut number = String::new();
+        wait_until("the browser runs", || {
+            number = std::fs::read_to_string(workplace.path("number")).unwrap_or_default();
+            number.ends_with('\n')
+        });
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()));
+        assert_eq!(child.wait().expect("a child").code(), Some(1), "{signal}");
+        assert_eq!(std::fs::read_dir(workplace.path("tmp")).expect("a folder").count(), 0, "{signal}");
+        assert!(!workplace.path("frames").exists(), "{signal}");
+        let lives = Command::new("kill").args(["-0", number.trim()]).stderr(Stdio::null()).status();
+        assert!(!lives.is_ok_and(|status| status.success()), "{signal}");
+        std::fs::remove_file(workplace.path("number")).expect("removed");
+    }
 }
 
 #[test]
@@ -204,7 +253,7 @@ fn other_outputs_that_do_not_fit_are_told_and_leave_nothing() {
 fn two_runs_at_once_never_share_a_log() {
     let workplace = Workplace::with_scene();
     let mut first = endless_run(&workplace);
-    wait_until("a chunk", || logged_steps(&workplace, "run.mcap.part") > 0);
+    wait_until("a chunk", || workplace.logged_steps("run.mcap.part") > 0);
     let error =
         workplace.fail(&["run", "scene.toml", "--realtime", "--duration", "0.1", "--log", "run.mcap"]);
     assert_eq!(error, "cannot write run.mcap: another process is writing it");

@@ -1,6 +1,5 @@
 //! Runs in real time, their logs, and replays. No test here looks at how fast anything was.
 
-use crate::cut_logs::logged_steps;
 use crate::workplace::{Table, Workplace};
 use palpate_testkit::wait_until;
 use std::io::{BufRead, BufReader, Read};
@@ -240,7 +239,7 @@ fn signals_end_a_run_in_good_order() {
             .spawn()
             .expect("the command starts");
         let part = format!("{log}.part");
-        wait_until("the log has begun", || logged_steps(&workplace, &part) > 50);
+        wait_until("the log has begun", || workplace.logged_steps(&part) > 50);
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
         let mut report = String::new();

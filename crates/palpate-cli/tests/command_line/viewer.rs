@@ -1,7 +1,7 @@
 //! Scenes and logs in the browser, and pictures that a browser draws.
 
 use crate::realtime;
-use crate::workplace::{Table, Workplace};
+use crate::workplace::{Table, Workplace, with_room};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
@@ -21,7 +21,16 @@ pub struct Serving {
 
 impl Serving {
     pub fn new(workplace: &Workplace, arguments: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        Self::start(Command::new(env!("CARGO_BIN_EXE_palpate")), workplace, arguments)
+    }
+
+    /// With room for so many blocks of 512 bytes in every file.
+    pub fn with_room(blocks: u64, workplace: &Workplace, arguments: &[&str]) -> Self {
+        Self::start(with_room(blocks), workplace, arguments)
+    }
+
+    fn start(mut command: Command, workplace: &Workplace, arguments: &[&str]) -> Self {
+        let mut child = command
             .args(["serve", "--no-browser", "--listen", "127.0.0.1:0"])
             .args(arguments)
             .current_dir(workplace.path("."))
@@ -62,7 +71,7 @@ impl Serving {
     }
 
     /// Exit code after an interrupt, with the lines printed since it listens.
-    fn interrupted(mut self) -> (Option<i32>, Vec<String>) {
+    pub fn interrupted(mut self) -> (Option<i32>, Vec<String>) {
         let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
         let code = self.child.wait().expect("a child").code();

@@ -1,5 +1,6 @@
 //! A folder to work in, the command `palpate` in it, and small files to feed it.
 
+use palpate_haptics::log::LogReader;
 use palpate_testkit::made_once_per_run;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,15 @@ pub static SCENE: LazyLock<String> = LazyLock::new(|| {
     let two_hands = include_str!("../../src/commands/demo/two_hands.toml");
     format!("step = 0.001\ngravity = [0.0, 0.0, -9.81]\n\n{two_hands}")
 });
+
+/// The command `palpate` with room for so many blocks of 512 bytes in every file: a limit on the size of files acts as a full disk does.
+pub fn with_room(blocks: u64) -> Command {
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\""), "sh"])
+        .arg(env!("CARGO_BIN_EXE_palpate"));
+    command
+}
 
 /// The recording of [`CUBE`], made once per run.
 fn cube() -> PathBuf {
@@ -92,6 +102,12 @@ impl Workplace {
         String::from_utf8(self.read(name)).expect("text")
     }
 
+    /// Number of steps of a log that can be read now.
+    pub fn logged_steps(&self, log: &str) -> u64 {
+        let bytes = std::fs::read(self.path(log)).unwrap_or_default();
+        LogReader::new(bytes).map_or(0, |log| log.step_count())
+    }
+
     /// Names of all files here, sorted.
     pub fn files(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder.path()).expect("a folder");
@@ -116,11 +132,9 @@ impl Workplace {
         command
     }
 
-    /// Run `palpate` here with room for so many blocks of 512 bytes in every file: a limit on the size of files acts as a full disk does.
+    /// Run `palpate` here with room for so many blocks of 512 bytes in every file.
     pub fn palpate_with_room(&self, blocks: u64, arguments: &[&str]) -> Output {
-        Command::new("sh")
-            .args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\""), "sh"])
-            .arg(env!("CARGO_BIN_EXE_palpate"))
+        with_room(blocks)
             .args(arguments)
             .current_dir(self.folder.path())
             .env("XDG_CACHE_HOME", self.path("cache"))

@@ -107,7 +107,7 @@ fn a_recovered_log_is_whole_and_has_every_step_that_could_be_read() {
             assert_eq!(format!("{:?}", now.expect("a step")), format!("{:?}", then.expect("a step")));
         }
     }
-    let error = |bytes: &[u8]| recover(bytes, Cursor::new(Vec::new())).err().expect("a refusal").to_string();
+    let error = |bytes: &[u8]| recover(bytes, Cursor::new(Vec::new())).expect_err("a refusal").to_string();
     assert_eq!(error(&bytes), "the log is whole: there is nothing to recover");
     assert_eq!(error(&bytes[..1000]), "the log ends before its first whole step: nothing of it can be read");
     assert_eq!(error(b"t,x,y,z\n"), "the log can't be read: Bad magic number");
