@@ -6,10 +6,10 @@
 use crate::machine::runs;
 use crate::process::{root, run_in};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 
 /// Targets, as in `fuzz/Cargo.toml`.
-pub const TARGETS: &[&str] = &["recording", "mesh", "path", "log"];
+pub const TARGETS: &[&str] = &["recording", "mesh", "path", "log", "scene", "store", "message"];
 
 /// Times for a target [s].
 pub const SECONDS: &[&str] = &["10", "60", "180", "600"];
@@ -41,6 +41,16 @@ const TEXTS: &[(&str, &str)] = &[
     ("path", "\0t,x,y,z\n0,0,0,0\n1,0,0.1,0\n"),
     ("path", "\u{1}t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0.1,0,0,1,0,0\n"),
     ("path", "\u{2}t,fx,fy,fz\n0,0,0,0\n1,0,0.1,0\n"),
+    (
+        "scene",
+        "step = 0.001\ngravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"a\"\nrecording = \"a.palp\"\nposition = [0.0, 0.1, 0.0]\n\
+         [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n[[device]]\nname = \"b\"\nmode = \"touch\"\n\
+         tip_radius = 0.005\nfriction = 0.5\ncoupling = { stiffness = 200.0, damping = 0.5 }\npath = { file = \"a.csv\" }\n",
+    ),
+    ("store", "\0{\"zarr_format\":3,\"node_type\":\"group\",\"attributes\":{\"store_version\":1}}"),
+    ("message", "{\"type\":\"press\",\"pointer\":7,\"mode\":\"touch\",\"position\":[0,0,0]}"),
+    ("message", "{\"type\":\"set_physics\",\"gravity\":[0,-9.81,0],\"step\":0.001,\"friction\":0.5}"),
+    ("message", "{\"device\":\"left\"}"),
 ];
 
 /// Run targets for some time each, or say why not.
@@ -57,16 +67,38 @@ pub fn run_targets(target: Option<&str>, seconds: Option<&str>) -> Result<(), St
         }
     }
     let seconds = seconds.unwrap_or("60");
-    for name in TARGETS.iter().filter(|name| target.is_none_or(|target| target == **name)) {
-        let corpus = sow(name).map_err(|error| format!("the seeds of {name}: {error}"))?;
-        println!("fuzzing {name} for {seconds} s");
-        let mut cargo = Command::new("cargo");
-        cargo.args(["+nightly", "fuzz", "run", name]).arg(&corpus).arg("--");
-        cargo.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={SECONDS_PER_INPUT}"));
-        cargo.arg(format!("-rss_limit_mb={MEGABYTES}")).arg(format!("-max_len={LARGEST_INPUT}"));
-        run_in(&root().join("fuzz"), cargo.args(["-verbosity=0", "-print_final_stats=1"]))?;
+    let folder = root().join("fuzz");
+    let targets: Vec<_> =
+        TARGETS.iter().filter(|name| target.is_none_or(|target| target == **name)).collect();
+    eprintln!("building the targets (some minutes the first time)");
+    run_in(&folder, Command::new("cargo").args(["+nightly", "fuzz", "build"]).args(target))?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    for together in targets.chunks(cores) {
+        let started: Result<Vec<_>, String> =
+            together.iter().map(|name| start(&folder, name, seconds)).collect();
+        for (name, fuzzer) in together.iter().zip(started?) {
+            let output = fuzzer.wait_with_output().map_err(|error| format!("{name}: {error}"))?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            let runs = said.lines().find_map(|line| line.strip_prefix("stat::number_of_executed_units:"));
+            if !output.status.success() {
+                return Err(format!("fuzzing {name} has found something (fuzz/artifacts/{name}):\n{said}"));
+            }
+            println!("fuzzed {name} for {seconds} s: {} inputs", runs.unwrap_or("?").trim());
+        }
     }
     Ok(())
+}
+
+/// Start a target; its output is kept for a failure.
+fn start(folder: &Path, name: &str, seconds: &str) -> Result<Child, String> {
+    let corpus = sow(name).map_err(|error| format!("the seeds of {name}: {error}"))?;
+    let mut cargo = Command::new("cargo");
+    cargo.args(["+nightly", "fuzz", "run", name]).arg(&corpus).arg("--");
+    cargo.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={SECONDS_PER_INPUT}"));
+    cargo.arg(format!("-rss_limit_mb={MEGABYTES}")).arg(format!("-max_len={LARGEST_INPUT}"));
+    cargo.args(["-verbosity=0", "-print_final_stats=1"]).current_dir(folder);
+    let started = cargo.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+    started.map_err(|error| format!("cargo fuzz can't be started: {error}"))
 }
 
 /// Put the seeds of a target into its corpus. Gives the folder.

@@ -131,7 +131,7 @@ impl Safety {
             self.counts.trips += u64::from(self.armed && self.ramp > 0.0);
         }
         self.tripped &= self.fault_free_s < limits.recovery_s;
-        let pass = self.armed && !self.tripped;
+        let pass = well && self.armed && !self.tripped;
         let change = if pass { dt / limits.ramp_up_s.max(1e-9) } else { -dt / limits.ramp_down_s.max(1e-9) };
         self.ramp = (self.ramp + change).clamp(0.0, 1.0);
 
@@ -238,10 +238,14 @@ mod tests {
 
     #[test]
     fn before_the_first_reply_no_force_passes_and_nothing_is_counted() {
-        let mut safety = armed();
-        let none = Conditions { reply: None, ..WELL };
-        assert!((0..1000).all(|_| safety.limit(DVec3::X, &none) == DVec3::ZERO));
-        assert_eq!(safety.counts(), SafetyCounts::default());
+        // Also without limits, and without a time of recovery.
+        for limits in [SafetyLimits::default(), SafetyLimits::NONE] {
+            let mut safety = Safety::new(limits);
+            safety.arm(true);
+            let none = Conditions { reply: None, ..WELL };
+            assert!((0..1000).all(|_| safety.limit(DVec3::X, &none) == DVec3::ZERO));
+            assert_eq!(safety.counts(), SafetyCounts::default());
+        }
     }
 
     #[test]

@@ -216,7 +216,10 @@ fn a_path_that_is_no_regular_file_or_in_no_order_is_refused_with_its_line() {
     let device = "[[device]]\nname = \"a\"\nmode = \"touch\"\n";
     let of_folder = read(&format!("{OBJECT}{device}path = {{ file = \".\" }}")).err().expect("a refusal");
     let text = of_folder.to_string();
-    assert!(text.contains("line 7: cannot read the path ") && text.ends_with(": it is not a file"), "{text}");
+    assert!(
+        text.contains("line 7: cannot read the path ") && text.ends_with(": it is a folder, not a file"),
+        "{text}"
+    );
     for (rows, expected) in [
         ("0,0,0,nan\n", "line 1"),
         ("0,0,inf,0\n", "line 1"),

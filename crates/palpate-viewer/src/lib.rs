@@ -22,7 +22,7 @@ pub use log_frames::{LogFrameBuilder, LogFrames};
 pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
     MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,
-    SceneDescription, SceneSummary, ShapeDescription, View,
+    SceneDescription, SceneSummary, ShapeDescription, View, decodes,
 };
 pub use scene_provider::{
     DeviceOpener, JobControl, JobReport, LogFile, LogOpener, OpenLog, PageNotifier, SceneProvider,

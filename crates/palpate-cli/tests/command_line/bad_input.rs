@@ -32,7 +32,7 @@ fn unknown_keys_are_errors_with_their_line() {
             "mode = \"held\"\nforce = 1",
             11,
             "`name`, `mode`, `attach`, `path`, `linked`, `pointer`, `tip_radius`, `patch_radius`, `friction`, `coupling`, \
-             `simulated`, `driver`, `mount`",
+             `simulated`, `driver`, `mount`, `limits`",
         ),
         ("{ file = \"left.csv\" }", "{ files = \"left.csv\" }", 12, "expected `file` or `repeat`"),
     ] {

@@ -175,6 +175,12 @@ impl PhysicsSettings {
     }
 }
 
+/// Whether a text is a message of a page: entry of the fuzzer.
+#[doc(hidden)]
+pub fn decodes(text: &str) -> bool {
+    serde_json::from_str::<ClientMessage>(text).is_ok()
+}
+
 /// Message from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]

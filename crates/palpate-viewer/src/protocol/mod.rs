@@ -11,7 +11,7 @@ pub use description::{
     ObstacleDescription, SceneDescription, ShapeDescription, View,
 };
 pub use frame::{FrameEncoder, FrameFormat};
-pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary};
+pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, decodes};
 pub(crate) use messages::{
     ClientMessage, Hello, LogEntry, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status,
 };

@@ -19,7 +19,8 @@ fn two_hundred_slow_heads_beside_a_page_that_is_served() {
     let before = page.frame(&shapes, |_| true).step;
     let mut slow: Vec<_> = (0..200).map(|_| served.connect()).collect();
     for stream in &mut slow {
-        write!(stream, "GET / HTTP/1.1\r\nHost: {}\r\nX-Slow: ", served.address).expect("it reads");
+        // On a busy machine the first ones may be closed by now.
+        let _ = write!(stream, "GET / HTTP/1.1\r\nHost: {}\r\nX-Slow: ", served.address);
     }
     // A byte now and then does not keep the place.
     for _ in 0..20 {

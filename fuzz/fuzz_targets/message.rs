@@ -1,0 +1,11 @@
+//! Messages of pages, and datagrams and greetings of links.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    palpate_haptics::link::decodes(bytes);
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        palpate_viewer::decodes(text);
+    }
+});
