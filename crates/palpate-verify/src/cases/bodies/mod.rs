@@ -20,11 +20,12 @@ const LEAST_PENETRATION: f64 = 2e-4;
 /// Largest penetration in a blow, over that which is allowed at rest: a cube that lands on a corner.
 const IN_A_BLOW: f64 = 1.5;
 
-/// Tolerances at rest: force as a share of the weight, lateral force as a share of the weight, and the force of a punch in time (0.3 to 0.4 % of a sheet, on
-/// which nodes come and go, and 0.01 % else).
+/// Tolerances at rest: force as a share of the weight, lateral force as a share of the weight, and the force of a punch in time: 0.03 % at most. On
+/// a sheet with contact samples nodes come and go: 0.2 to 0.4 % in eleven of twelve runs that differ by round-off, 0.7 % in the twelfth.
 const FORCE: f64 = 1e-3;
 const LATERAL: f64 = 1e-3;
-const FLICKER: f64 = 6e-3;
+const FLICKER: f64 = 1e-3;
+const FLICKER_OF_SHEET_BY_SAMPLES: f64 = 1e-2;
 
 /// Energy that is lost within half a second at rest, as a share of weight times diagonal: nodes come and go.
 const LOST: f64 = 2e-4;
@@ -54,12 +55,13 @@ pub fn bodies() -> Result<Vec<Check>, VerifyError> {
         for &motion in BY_NODES {
             let outcome = motion.run(&body, &block, ALL_NODES)?;
             punch = if motion == Motion::Punch { outcome.punch } else { punch };
-            checks.extend(outcome.checks(&format!("{name}, {motion:?}, all nodes"), &body, motion));
+            checks.extend(outcome.checks(&format!("{name}, {motion:?}, all nodes"), &body, motion, FLICKER));
         }
         for &motion in ON_COARSE {
             let outcome = motion.run(&body, &block, SAMPLES)?;
             let of = format!("{name}, {motion:?}, {SAMPLES} samples");
-            checks.extend(outcome.checks(&of, &body, motion));
+            let flicker = if shape == BodyShape::Sheet { FLICKER_OF_SHEET_BY_SAMPLES } else { FLICKER };
+            checks.extend(outcome.checks(&of, &body, motion, flicker));
             if motion == Motion::Punch {
                 let tolerance = if shape == BodyShape::Sheet { BY_SAMPLES_ON_SHEET } else { BY_SAMPLES };
                 checks.push(Check::new(
@@ -75,7 +77,7 @@ pub fn bodies() -> Result<Vec<Check>, VerifyError> {
             for &motion in ON_FINE {
                 let outcome = motion.run(&body, &block, SAMPLES)?;
                 let of = format!("{name}, fine, {motion:?}, {SAMPLES} samples");
-                checks.extend(outcome.checks(&of, &body, motion));
+                checks.extend(outcome.checks(&of, &body, motion, FLICKER));
             }
         }
     }
@@ -83,8 +85,8 @@ pub fn bodies() -> Result<Vec<Check>, VerifyError> {
 }
 
 impl Outcome {
-    /// Checks of a run of that name.
-    fn checks(&self, of: &str, body: &Arc<Recording>, motion: Motion) -> Vec<Check> {
+    /// Checks of a run of that name; `flicker` is the tolerance of the force of a punch in time.
+    fn checks(&self, of: &str, body: &Arc<Recording>, motion: Motion, flicker: f64) -> Vec<Check> {
         let (weight, size) = (body.mass() * GRAVITY_M_S2, body.surface.diagonal());
         let allowed = (PENETRATION * size).max(LEAST_PENETRATION);
         let share = |what: &str, value: f64, tolerance: f64| {
@@ -104,7 +106,7 @@ impl Outcome {
             checks.push(share("energy that is lost at rest", self.lost_at_rest / (weight * size), LOST));
         }
         if is_held {
-            checks.push(share("deviation of the force that punches", self.flicker / self.punch, FLICKER));
+            checks.push(share("deviation of the force that punches", self.flicker / self.punch, flicker));
         }
         checks.extend(self.invariants.checks(of));
         checks
