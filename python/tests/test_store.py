@@ -181,6 +181,34 @@ def s3fs_is_new_enough():
         return False
 
 
+def run_with_table(folder, place, env):
+    """Drop the cube onto a floor by a table at an address, and by one in a folder: equal forces."""
+    heights = []
+    for table in (place, str(folder / "local.zarr")):
+        scene = folder / "scene.toml"
+        scene.write_text(
+            f"""step = 0.001
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "cube"
+recording = "cube.palp"
+table = "{table}"
+response = "fir"
+position = [0.0, 0.0505, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+"""
+        )
+        csv = folder / "steps.csv"
+        run(palpate(), "run", scene, "--duration", "0.02", "--csv", csv, env=env)
+        heights.append(np.genfromtxt(csv, delimiter=",", names=True)["cubepy"])
+    assert np.array_equal(*heights)
+    # It fell, and the floor stopped it.
+    assert 0.049 < heights[0][-1] < 0.0505
+
+
 @pytest.mark.parametrize("prefix", ["", "tables/cube.zarr/"], ids=["whole bucket", "prefix"])
 def test_a_store_on_s3_goes_on_after_a_stop_and_is_that_of_a_folder(tmp_path, prefix):
     options = ("--method", "transient", "--duration", "0.02", "--columns-per-shard", "48")
@@ -202,6 +230,8 @@ def test_a_store_on_s3_goes_on_after_a_stop_and_is_that_of_a_folder(tmp_path, pr
             options_of_s3fs = dict(key="test", secret="test", endpoint_url=env["AWS_ENDPOINT_URL"])
             group = zarr.open_group(place, mode="r", storage_options=options_of_s3fs)
             assert np.isfinite(group["impulse_response"][:]).all()
+        record(tmp_path / "local.zarr", *options, "--output", tmp_path / "cube.palp")
+        run_with_table(tmp_path, place, env)
         fetched = tmp_path / "fetched.zarr"
         for item in client.list_objects_v2(Bucket="bucket")["Contents"]:
             to = fetched / item["Key"].removeprefix(prefix)

@@ -37,7 +37,7 @@ macro_rules! from_display {
 
 from_display!(
     palpate::Error,
-    palpate_fem::mesh::MeshError,
+    palpate_mesh::MeshError,
     palpate_fem::RecordError,
     palpate_fem::table::TableError,
     palpate_haptics::Error,

@@ -2,9 +2,9 @@
 
 use crate::failure::Failure;
 use palpate_export::{ExportError, PartFile};
-use palpate_fem::read_regular_file;
 use palpate_haptics::LogError;
 use palpate_haptics::log::{LogReader, LogSummary};
+use palpate_mesh::read_regular_file;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

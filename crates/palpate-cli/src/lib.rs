@@ -33,6 +33,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Demo(commands::demo::Arguments),
+    Mesh(commands::mesh::Arguments),
+    Materials(commands::materials::Arguments),
     Record(Box<commands::record::Arguments>),
     Inspect(commands::inspect::Arguments),
     Run(commands::run::Arguments),
@@ -62,6 +64,8 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
     let done = match arguments.command {
         Command::Demo(arguments) => commands::demo::demo(&arguments),
+        Command::Mesh(arguments) => commands::mesh::mesh(&arguments),
+        Command::Materials(arguments) => commands::materials::materials(&arguments),
         Command::Record(arguments) => commands::record::record(&arguments),
         Command::Inspect(arguments) => commands::inspect::inspect(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),

@@ -1,7 +1,7 @@
 //! Kinds of files, by their names and first bytes.
 
 use palpate_export::PART;
-use palpate_fem::open_regular_file;
+use palpate_mesh::open_regular_file;
 use std::io::Read;
 use std::path::Path;
 

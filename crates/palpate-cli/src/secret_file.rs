@@ -9,7 +9,8 @@ pub fn read_secret_file(what: &str, path: &Path) -> Result<String, Failure> {
     if others_read(path) {
         notify(&format!("warning: others can read {0}, and {what} in it: chmod 600 {0}", path.display()));
     }
-    palpate_fem::read_regular_text(path).map_err(|error| Failure::file(&format!("read {what}"), path, &error))
+    palpate_mesh::read_regular_text(path)
+        .map_err(|error| Failure::file(&format!("read {what}"), path, &error))
 }
 
 /// Whether the permissions of a file let its group or everybody read it.

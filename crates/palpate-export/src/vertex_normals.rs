@@ -80,7 +80,7 @@ fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_fem::mesh::{SurfaceMesh, ball_mesh, box_mesh};
+    use palpate_mesh::{SurfaceMesh, ball_mesh, box_mesh};
 
     #[test]
     fn a_box_breaks_at_its_edges_and_is_flat_between_them() {

@@ -3,8 +3,8 @@
 //! `cargo run --release -p palpate-fem --example record_in_code [OUT.palp]`; the file can be used in a scene.
 
 use palpate::{Damping, Material};
-use palpate_fem::mesh::box_mesh;
-use palpate_fem::{ElementOrder, Progress, RecordExtent, RecordParameters, ResidualChoice, record};
+use palpate_fem::{ElementOrder, Precision, Progress, RecordParameters, record};
+use palpate_mesh::box_mesh;
 use std::time::{Duration, Instant};
 
 /// Sides of the block [m], and its cells.
@@ -35,16 +35,12 @@ impl Progress for Listener {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mesh = box_mesh(SIZE, CELLS)?;
-    let rubber = Material { region: String::new(), young_pa: 1e5, poisson: 0.45, density_kg_m3: 1100.0 };
+    let rubber = Material::isotropic(1e5, 0.45, 1100.0);
+    let damping = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
     let parameters = RecordParameters {
-        materials: vec![rubber],
-        order: ElementOrder::Quadratic,
-        modes: 40,
-        damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
-        residual: ResidualChoice::Automatic,
-        fixed_nodes: Vec::new(),
+        precision: Precision::Compact,
         source: "rubber block".into(),
-        extent: RecordExtent::Full,
+        ..RecordParameters::new(vec![rubber], ElementOrder::Quadratic, 40, damping)
     };
     let mut listener = Listener { start: Instant::now(), limit: Duration::from_secs(300) };
     let recording = record(mesh, &parameters, &mut listener)?;

@@ -7,7 +7,6 @@
 
 use crate::discretisation::Discretisation;
 use crate::element::{Elasticity, ElementMatrices};
-use crate::material::lame_constants;
 use faer::{Mat, MatRef};
 use glam::DMat3;
 use palpate::Material;
@@ -67,19 +66,15 @@ impl Assembly {
         let columns = rows.concat();
 
         // Values.
-        let elasticities: Vec<Elasticity> = materials
-            .iter()
-            .map(|material| {
-                let (lambda, mu) = lame_constants(material);
-                Elasticity { lambda, mu, density: material.density_kg_m3 }
-            })
-            .collect();
+        let elasticities: Vec<Elasticity> = materials.iter().map(Elasticity::new).collect();
         let mut stiffness = vec![DMat3::ZERO; columns.len()];
         let mut mass = vec![0.0; columns.len()];
+        let mut positions = Vec::with_capacity(per);
         for (nodes, &region) in discretisation.element_nodes().zip(&discretisation.regions) {
-            let corners = [0, 1, 2, 3].map(|at| discretisation.nodes[nodes[at] as usize]);
+            positions.clear();
+            positions.extend(nodes.iter().map(|&node| discretisation.nodes[node as usize]));
             let ElementMatrices { stiffness: k, mass: m } =
-                discretisation.order.matrices(corners, elasticities[region as usize]);
+                discretisation.order.matrices(&positions, &elasticities[region as usize]);
             for (i, &node) in nodes.iter().enumerate() {
                 let row = offsets[node as usize]..offsets[node as usize + 1];
                 for (j, other) in nodes.iter().enumerate() {
@@ -91,6 +86,14 @@ impl Assembly {
             }
         }
         Self { offsets, columns, stiffness, mass }
+    }
+
+    /// Adds a stiffness [N/m] between two nodes that share an element.
+    pub fn add_stiffness(&mut self, node: u32, other: u32, block: DMat3) {
+        let row = self.offsets[node as usize]..self.offsets[node as usize + 1];
+        if let Ok(at) = self.columns[row.clone()].binary_search(&other) {
+            self.stiffness[row.start + at] += block;
+        }
     }
 
     /// Number of nodes.

@@ -48,7 +48,8 @@ impl RecordedBody {
         self.system.discretisation.nearest_node(position)
     }
 
-    /// Whether each node is in a set of nodes of the mesh; a mid-edge node is if both ends of its edge are.
+    /// Whether each node is in a set of nodes of the mesh; a mid-edge node that the mesh lacks is if both ends of its
+    /// edge are.
     pub fn nodes_in_set(&self, mesh_nodes: &[u32]) -> Vec<bool> {
         self.system.discretisation.in_set(mesh_nodes)
     }

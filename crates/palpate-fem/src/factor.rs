@@ -314,14 +314,14 @@ mod tests {
     use super::*;
     use crate::discretisation::Discretisation;
     use crate::element::ElementOrder;
-    use crate::mesh::box_mesh;
     use palpate::Material;
+    use palpate_mesh::box_mesh;
 
     #[test]
     fn row_solutions_are_those_of_the_columns() {
         let mesh = box_mesh([0.3, 0.2, 0.1], [5, 4, 3]).expect("a good box");
         let discretisation = Discretisation::new(&mesh, ElementOrder::Linear);
-        let material = Material { region: String::new(), young_pa: 1e4, poisson: 0.3, density_kg_m3: 1000.0 };
+        let material = Material::isotropic(1e4, 0.3, 1000.0);
         let assembly = Assembly::new(&discretisation, &[material]);
         let pattern = Pattern::new(&assembly).expect("a pattern");
         let mut constrained = vec![false; discretisation.dofs()];

@@ -3,7 +3,7 @@
 use crate::solve_error::SolveError;
 
 /// Free memory [bytes], if the system states it.
-fn available_memory() -> Option<f64> {
+pub fn available_memory() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
     let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;

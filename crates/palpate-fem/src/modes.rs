@@ -29,6 +29,21 @@ impl ElasticModes {
         Self { squares: Vec::new(), shapes: Mat::zeros(system.discretisation.dofs(), 0) }
     }
 
+    /// Rounds the shapes at the surface to 16 bits.
+    pub(crate) fn round_at(&mut self, surface_nodes: &[u32]) {
+        for mut mode in self.shapes.col_iter_mut() {
+            let mut own: Vec<f64> = surface_nodes
+                .iter()
+                .flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis))
+                .map(|row| mode[row])
+                .collect();
+            palpate::round_mode_shape(&mut own);
+            for (&node, values) in surface_nodes.iter().zip(own.chunks_exact(3)) {
+                (0..3).for_each(|axis| mode[3 * node as usize + axis] = values[axis]);
+            }
+        }
+    }
+
     /// Number of modes.
     pub fn count(&self) -> usize {
         self.squares.len()

@@ -1,33 +1,32 @@
 //! The elastic cube of the paper (section 3.1): side 0.1 m, E = 2000 Pa, ν = 0.49, ρ = 110 kg/m³.
 
 use crate::element::ElementOrder;
-use crate::mesh::{Mesh, MeshError, box_mesh};
-use crate::record::{RecordExtent, RecordParameters};
-use crate::residual::ResidualChoice;
+use crate::material;
+use crate::record::RecordParameters;
 use palpate::{Damping, Material};
+use palpate_mesh::{Mesh, MeshError, box_mesh};
 
 /// Side [m].
 pub const SIDE_M: f64 = 0.1;
 
 /// Young's modulus E [Pa].
-pub const YOUNG_PA: f64 = 2000.0;
+pub const YOUNG_PA: f64 = material::PAPER_YOUNG_PA;
 
 /// Poisson's ratio ν [1].
-pub const POISSON: f64 = 0.49;
+pub const POISSON: f64 = material::PAPER_POISSON;
 
 /// Density ρ [kg/m³].
-pub const DENSITY_KG_M3: f64 = 110.0;
+pub const DENSITY_KG_M3: f64 = material::PAPER_DENSITY_KG_M3;
 
 /// Cells along each side of the paper's mesh.
 pub const CELLS: u32 = 12;
 
 /// Damping of the reference series in `data/reference`: α = 2 1/s, β = 2·10⁻⁴ s.
-pub const DAMPING: Damping = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
+pub const DAMPING: Damping = material::PAPER_DAMPING;
 
 /// Material of the whole cube.
 pub fn material() -> Material {
-    let region = String::new();
-    Material { region, young_pa: YOUNG_PA, poisson: POISSON, density_kg_m3: DENSITY_KG_M3 }
+    Material::isotropic(YOUNG_PA, POISSON, DENSITY_KG_M3)
 }
 
 /// The cube with a number of cells along each side, as `palpate record` names it.
@@ -46,13 +45,7 @@ pub fn mesh(cells: u32) -> Result<Mesh, MeshError> {
 /// Parameters of a certified recording of a free cube with linear elements.
 pub fn parameters(cells: u32, modes: usize) -> RecordParameters {
     RecordParameters {
-        materials: vec![material()],
-        order: ElementOrder::Linear,
-        modes,
-        damping: DAMPING,
-        residual: ResidualChoice::Automatic,
-        fixed_nodes: Vec::new(),
         source: source(cells),
-        extent: RecordExtent::Full,
+        ..RecordParameters::new(vec![material()], ElementOrder::Linear, modes, DAMPING)
     }
 }

@@ -7,18 +7,19 @@ use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
 use crate::material;
 use crate::memory::check_memory;
-use crate::mesh::Mesh;
 use crate::modes::{ElasticModes, lowest_modes};
 use crate::progress::Progress;
 use crate::record_error::RecordError;
-use crate::residual::{ResidualChoice, gravity_response, residual_compliance};
+use crate::residual::{Precision, ResidualChoice, gravity_response, residual_compliance};
 use crate::solve_error::SolveError;
+use crate::supports::{self, Supports};
 use crate::system::System;
 use glam::DVec3;
 use palpate::{
-    Certificate, CertificateLevel, Damping, FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts,
-    Metadata, ModalBasis, Provenance, Recording, Support, Surface,
+    COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, FORMAT_VERSION, MIN_CONTACT_SAMPLES,
+    Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording, Support, Surface,
 };
+use palpate_mesh::Mesh;
 
 /// Parameters of a recording.
 #[derive(Debug, Clone)]
@@ -33,12 +34,35 @@ pub struct RecordParameters {
     pub damping: Damping,
     /// Part of the residual compliance to keep.
     pub residual: ResidualChoice,
-    /// Fixed nodes of the mesh; none for a free body.
+    /// Precision of the numbers to keep.
+    pub precision: Precision,
+    /// Fixed nodes of the mesh; none for a free body. Mid-edge nodes that the mesh lacks are fixed where both ends of their edge are:
+    /// [`Mesh::add_mid_edge_nodes`] gives it all, to be fixed by their own place.
     pub fixed_nodes: Vec<u32>,
+    /// Other supports: nodes that are held along some axes, and springs.
+    pub supports: Supports,
     /// Name of the mesh, for the file.
     pub source: String,
     /// Extent of the computation.
     pub extent: RecordExtent,
+}
+
+impl RecordParameters {
+    /// Parameters of a free body: whole residual compliance, full precision, certificate, source "mesh".
+    pub fn new(materials: Vec<Material>, order: ElementOrder, modes: usize, damping: Damping) -> Self {
+        Self {
+            materials,
+            order,
+            modes,
+            damping,
+            residual: ResidualChoice::Automatic,
+            precision: Precision::Full,
+            fixed_nodes: Vec::new(),
+            supports: Supports::default(),
+            source: "mesh".into(),
+            extent: RecordExtent::Full,
+        }
+    }
 }
 
 /// Extent of a recording.
@@ -93,20 +117,26 @@ fn record_body(
     let mesh = mesh.checked()?;
     mesh.warnings.iter().for_each(|warning| progress.warn(warning));
     warn_about_locking(parameters, progress);
+    match parameters.order {
+        ElementOrder::Quadratic => mesh.check_curved()?,
+        ElementOrder::Linear => warn_about_straight_edges(&mesh, progress),
+    }
     progress.advance(1);
     let discretisation = Discretisation::new(&mesh, parameters.order);
     check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))?;
-    let fixed_nodes = fixed_nodes(&discretisation, &parameters.fixed_nodes)?;
-    let share = fixed_nodes.len() as f64 / discretisation.nodes.len() as f64;
+    let mut assembly = Assembly::new(&discretisation, &parameters.materials);
+    let supported =
+        supports::apply(&parameters.fixed_nodes, &parameters.supports, &discretisation, &mut assembly)?;
+    let fixed = supported.fixed.chunks_exact(3).filter(|axes| axes.iter().all(|fixed| *fixed)).count();
+    let share = fixed as f64 / discretisation.nodes.len() as f64;
     if share > MANY_FIXED {
         progress.warn(&format!(
             "{:.0} % of the nodes are fixed; conditions are in metres of the mesh",
             100.0 * share
         ));
     }
-    let assembly = Assembly::new(&discretisation, &parameters.materials);
     progress.advance(1);
-    let system = System::new(discretisation, assembly, fixed_nodes)?;
+    let system = System::new(discretisation, assembly, supported)?;
     progress.advance(2);
 
     let no_modes = parameters.extent == RecordExtent::NoModes;
@@ -117,7 +147,8 @@ fn record_body(
             parameters.modes
         ));
     }
-    let modes = if no_modes { ElasticModes::none(&system) } else { lowest_modes(&system, count, progress)? };
+    let mut modes =
+        if no_modes { ElasticModes::none(&system) } else { lowest_modes(&system, count, progress)? };
     let surface_nodes = system.discretisation.surface_nodes();
     let surface = surface(&system, &surface_nodes);
     let residual = residual_compliance(
@@ -126,8 +157,13 @@ fn record_body(
         &surface_nodes,
         surface.mean_edge(),
         if no_modes { ResidualChoice::None } else { parameters.residual },
+        parameters.precision,
         progress,
     )?;
+    if parameters.precision == Precision::Compact {
+        // After the residual compliance: as the difference of rounded numbers it would be indefinite where it is small.
+        modes.round_at(&surface_nodes);
+    }
     let (mut sample_levels, mut stated) = (Vec::new(), None);
     if parameters.extent == RecordExtent::Full {
         progress.begin("contact samples", 2);
@@ -142,9 +178,12 @@ fn record_body(
         stated = Some(Certificate { sample_levels: level_errors, ..certificate });
     }
 
-    let free = system.fixed_nodes.is_empty();
+    let free = system.supported_nodes == 0;
     let metadata = Metadata {
-        format_version: FORMAT_VERSION,
+        format_version: match parameters.precision {
+            Precision::Full => FORMAT_VERSION,
+            Precision::Compact => COMPACT_FORMAT_VERSION,
+        },
         hold: Metadata::hold(),
         units: Metadata::units(),
         support: if free { Support::Free } else { Support::Fixed },
@@ -154,7 +193,7 @@ fn record_body(
             nodes: system.discretisation.nodes.len() as u64,
             elements: mesh.tets.len() as u64,
             order: if parameters.order == ElementOrder::Linear { 1 } else { 2 },
-            fixed_nodes: system.fixed_nodes.len() as u64,
+            fixed_nodes: system.supported_nodes as u64,
         },
         mass: system.mass.clone(),
         certificate: stated,
@@ -175,7 +214,7 @@ fn record_body(
     Ok(RecordedBody { recording, system, modes })
 }
 
-fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), RecordError> {
+pub(crate) fn check_parameters(mesh: &Mesh, parameters: &RecordParameters) -> Result<(), RecordError> {
     parameters.materials.iter().try_for_each(material::check)?;
     let (materials, regions) = (parameters.materials.len(), mesh.regions.len());
     if materials != regions {
@@ -230,6 +269,19 @@ fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress
     }
 }
 
+fn warn_about_straight_edges(mesh: &Mesh, progress: &mut dyn Progress) {
+    if !mesh.is_curved() {
+        return;
+    }
+    let mut straight = mesh.clone();
+    straight.straighten();
+    let volume = |mesh: &Mesh| mesh.tets.iter().map(|tet| mesh.quadratic_volume(tet)).sum::<f64>();
+    let change = 100.0 * (volume(&straight) / volume(mesh) - 1.0);
+    progress.warn(&format!(
+        "linear elements have straight edges: the volume is off by {change:.1} % of that with the mesh's mid-edge nodes, which --order 2 uses"
+    ));
+}
+
 fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
     let error = certificate.force_error_max;
     let worst_at = DVec3::from_array(certificate.worst_at_m);
@@ -246,18 +298,6 @@ fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress
             100.0 * error
         ));
     }
-}
-
-/// Fixed nodes of the discretisation, from nodes of the mesh.
-fn fixed_nodes(discretisation: &Discretisation, mesh_nodes: &[u32]) -> Result<Vec<u32>, RecordError> {
-    let fixed = discretisation.in_set(mesh_nodes);
-    if !mesh_nodes.is_empty() && !fixed.contains(&true) {
-        return Err(RecordError::FixedNodesUnused);
-    }
-    if !fixed.contains(&false) {
-        return Err(RecordError::AllNodesFixed);
-    }
-    Ok((0..fixed.len()).filter(|&node| fixed[node]).map(|node| node as u32).collect())
 }
 
 /// Surface in the body frame, whose origin is the centre of mass.
@@ -285,10 +325,12 @@ fn modal_basis(modes: &ElasticModes, surface_nodes: &[u32], damping: Damping) ->
     }
 }
 
-/// BLAKE3 hash of nodes, tetrahedra and regions, in hexadecimal.
+/// BLAKE3 hash of nodes, but those in the middle of straight edges, of tetrahedra and regions, in hexadecimal.
 fn mesh_hash(mesh: &Mesh) -> String {
     let mut hasher = blake3::Hasher::new();
-    mesh.nodes.iter().flat_map(|p| p.to_array()).for_each(|v| {
+    let is_straight = mesh.straight_mid_edge_nodes();
+    let nodes = mesh.nodes.iter().zip(is_straight).filter(|(_, is_straight)| !is_straight);
+    nodes.flat_map(|(p, _)| p.to_array()).for_each(|v| {
         hasher.update(&v.to_le_bytes());
     });
     mesh.tets.iter().flatten().chain(&mesh.tet_regions).for_each(|v| {

@@ -1,10 +1,10 @@
 //! Errors of a recording.
 
 use crate::material::MaterialError;
-use crate::mesh::MeshError;
 #[cfg(doc)]
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
+use palpate_mesh::MeshError;
 
 /// A recording that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +59,38 @@ pub enum RecordError {
     /// All nodes are fixed.
     #[error("all nodes are fixed: nothing can move")]
     AllNodesFixed,
+    /// The stiffness of springs is not a positive number.
+    #[error("spring stiffness is {stiffness} N/m³, expected a positive number")]
+    SpringStiffness {
+        /// The given stiffness [N/m³].
+        stiffness: f64,
+    },
+    /// The nodes on springs hold no whole boundary face.
+    #[error(
+        "the nodes on springs hold no whole face of the surface, and springs act on areas: select more nodes"
+    )]
+    SpringsWithoutFace,
+    /// A target is not a positive number.
+    #[error("the target of the {what} is {given}, expected a positive number")]
+    Target {
+        /// Number that is aimed at.
+        what: &'static str,
+        /// The given number.
+        given: f64,
+    },
+    /// No number of modes keeps the target.
+    #[error(
+        "with {modes} modes the peak force error is {:.2} %, the bandwidth {bandwidth_hz:.1} Hz: more modes don't help; refine the \
+         mesh, or ask for less", 100.0 * force_error
+    )]
+    TargetMissed {
+        /// Number of modes of the last attempt.
+        modes: u64,
+        /// Its peak force error [1].
+        force_error: f64,
+        /// Its bandwidth [Hz].
+        bandwidth_hz: f64,
+    },
     /// The listener interrupted the work, see [`Progress::is_interrupted`].
     #[error("interrupted")]
     Interrupted,

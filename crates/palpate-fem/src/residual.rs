@@ -8,11 +8,12 @@
 
 use crate::modes::ElasticModes;
 use crate::progress::Progress;
+use crate::quantise::quantised;
 use crate::solve_error::SolveError;
 use crate::system::System;
 use faer::Mat;
 use glam::DVec3;
-use palpate::{GravityResponse, NearField, ResidualCompliance};
+use palpate::{GravityResponse, MAX_QUANTISED_NODES, NearField, ResidualCompliance};
 use rayon::prelude::*;
 
 /// Part of the residual compliance that a recording keeps.
@@ -27,6 +28,16 @@ pub enum ResidualChoice {
     NearField(f64),
     /// Nothing: the modes alone.
     None,
+}
+
+/// Precision of the numbers that a recording keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Mode shapes of 64 bits, residual compliance of 32 bits.
+    #[default]
+    Full,
+    /// Mode shapes and whole residual compliance of 16 bits; files are four to five times smaller.
+    Compact,
 }
 
 /// Touchable degrees of freedom up to which S is kept whole: 288 MB.
@@ -52,17 +63,23 @@ pub fn residual_compliance(
     surface_nodes: &[u32],
     mean_edge: f64,
     choice: ResidualChoice,
+    precision: Precision,
     progress: &mut dyn Progress,
 ) -> Result<ResidualCompliance, SolveError> {
-    let touchable = 3 * surface_nodes.len();
     match choice {
         ResidualChoice::None => Ok(ResidualCompliance::None),
-        ResidualChoice::Automatic if touchable > WHOLE_UP_TO => {
-            near_field(system, modes, surface_nodes, NEAR_EDGES * mean_edge, progress)
-        }
+        ResidualChoice::Automatic => match automatic_radius(surface_nodes.len(), || mean_edge) {
+            Some(radius) => near_field(system, modes, surface_nodes, radius, progress),
+            None => whole(system, modes, surface_nodes, precision, progress),
+        },
         ResidualChoice::NearField(radius) => near_field(system, modes, surface_nodes, radius, progress),
-        ResidualChoice::Automatic | ResidualChoice::Whole => whole(system, modes, surface_nodes, progress),
+        ResidualChoice::Whole => whole(system, modes, surface_nodes, precision, progress),
     }
+}
+
+/// Radius [m] of the automatic near field for so many surface nodes and a mean edge [m]; none where S is kept whole.
+pub(crate) fn automatic_radius(surface_nodes: usize, mean_edge: impl FnOnce() -> f64) -> Option<f64> {
+    (3 * surface_nodes > WHOLE_UP_TO).then(|| NEAR_EDGES * mean_edge())
 }
 
 /// Degree of freedom of the system for a touchable degree of freedom of the surface.
@@ -132,12 +149,30 @@ fn for_each_column(
     Ok(())
 }
 
+/// Whole S; quantised where it is compact and not too large.
 fn whole(
     system: &System,
     modes: &ElasticModes,
     surface_nodes: &[u32],
+    precision: Precision,
     progress: &mut dyn Progress,
 ) -> Result<ResidualCompliance, SolveError> {
+    let blocks = lower_blocks(system, modes, surface_nodes, progress)?;
+    Ok(match precision {
+        Precision::Compact if surface_nodes.len() <= MAX_QUANTISED_NODES => {
+            ResidualCompliance::Quantised(quantised(&blocks, surface_nodes.len()))
+        }
+        _ => ResidualCompliance::Whole(blocks),
+    })
+}
+
+/// Node blocks of the lower triangle, nine numbers each [m/N].
+fn lower_blocks(
+    system: &System,
+    modes: &ElasticModes,
+    surface_nodes: &[u32],
+    progress: &mut dyn Progress,
+) -> Result<Vec<f32>, SolveError> {
     let nodes = surface_nodes.len();
     let mut blocks = vec![0.0_f32; 9 * nodes * (nodes + 1) / 2];
     // Both triangles of the blocks on the diagonal.
@@ -153,7 +188,7 @@ fn whole(
         let raised = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
         set(j, j, raised);
     })?;
-    Ok(ResidualCompliance::Whole(blocks))
+    Ok(blocks)
 }
 
 fn near_field(

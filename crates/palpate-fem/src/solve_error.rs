@@ -27,6 +27,12 @@ pub enum SolveError {
     /// The fixed nodes leave a rigid motion.
     #[error("the fixed nodes leave the body free to turn: fix at least three nodes that are not on one line")]
     RigidMotion,
+    /// The nodes that are held along axes, and the springs, leave a rigid motion.
+    #[error(
+        "the supports leave the body free to move or to turn as a whole: hold every axis somewhere, at three nodes that are not on one line \
+         in all"
+    )]
+    LooseSupports,
     /// More modes are requested than can be found.
     #[error(
         "{requested} modes are requested, the model has {available} elastic modes: use a finer mesh or --modes {available}"

@@ -20,6 +20,7 @@ use crate::factor::{Factor, Pattern};
 use crate::kernels::use_sequential_kernels;
 use crate::memory::check_memory;
 use crate::solve_error::SolveError;
+use crate::supports::SupportedDofs;
 use faer::{Mat, MatRef};
 use glam::{DMat3, DVec3};
 use palpate::MassProperties;
@@ -32,8 +33,8 @@ pub struct System {
     pub assembly: Assembly,
     /// Mass, centre of mass, inertia.
     pub mass: MassProperties,
-    /// Fixed nodes, ascending; empty for a free body.
-    pub fixed_nodes: Vec<u32>,
+    /// Number of nodes that are fixed, held along an axis, or on springs; 0 for a free body.
+    pub supported_nodes: usize,
     pattern: Pattern,
     fixed: Vec<bool>,
     factor: Factor,
@@ -47,41 +48,43 @@ struct Rigid {
 }
 
 impl System {
-    /// Factors a body; `fixed_nodes` are nodes of the discretisation, ascending.
+    /// Factors a body with supports, whose springs the stiffness has.
     ///
     /// # Errors
-    /// [`SolveError`] when the fixed nodes leave a rigid motion, memory is short, or the stiffness is not positive definite.
+    /// [`SolveError`] when the supports leave a rigid motion, memory is short, or the stiffness is not positive definite.
     pub fn new(
         discretisation: Discretisation,
         assembly: Assembly,
-        fixed_nodes: Vec<u32>,
+        supported: SupportedDofs,
     ) -> Result<Self, SolveError> {
         use_sequential_kernels();
         let mass = mass_properties(&discretisation, &assembly);
         let shapes = rigid_shapes(&discretisation, &mass);
-        let mut fixed = vec![false; discretisation.dofs()];
-        for &node in &fixed_nodes {
-            fixed[3 * node as usize..][..3].fill(true);
-        }
+        let SupportedDofs { fixed, sprung } = supported;
+        let is_supported: Vec<bool> =
+            fixed.iter().zip(&sprung).map(|(fixed, sprung)| *fixed || *sprung).collect();
+        let supported_nodes = is_supported.chunks_exact(3).filter(|axes| axes.contains(&true)).count();
         let pattern = Pattern::new(&assembly)?;
         // Its own factor and the two shifted ones of the certificate.
         check_memory(3.0 * pattern.factor_bytes() as f64)?;
         let (mut constrained, mut rigid) = (fixed.clone(), None);
-        if fixed_nodes.is_empty() {
+        if supported_nodes == 0 {
             for (row, _) in independent_rows(&shapes, 0..shapes.nrows()) {
                 constrained[row] = true;
             }
             let weighted = assembly.multiply(SystemMatrix::Mass, shapes.as_ref());
             rigid = Some(Rigid { shapes, weighted });
         } else {
-            let rows = fixed_nodes.iter().flat_map(|&n| (0..3).map(move |axis| 3 * n as usize + axis));
+            let rows = (0..is_supported.len()).filter(|&row| is_supported[row]);
             let pivots = independent_rows(&shapes, rows);
             if pivots.len() < 6 || pivots[5].1 < 1e-9 * pivots[0].1 {
-                return Err(SolveError::RigidMotion);
+                let all_along = fixed.chunks_exact(3).all(|axes| axes.iter().all(|axis| *axis == axes[0]));
+                let is_simple = all_along && !sprung.contains(&true);
+                return Err(if is_simple { SolveError::RigidMotion } else { SolveError::LooseSupports });
             }
         }
         let factor = pattern.factor(&assembly, &constrained, 0.0)?;
-        Ok(Self { discretisation, assembly, mass, fixed_nodes, pattern, fixed, factor, rigid })
+        Ok(Self { discretisation, assembly, mass, supported_nodes, pattern, fixed, factor, rigid })
     }
 
     /// Cholesky factor of K + `shift`·M with the fixed degrees of freedom removed; `shift` > 0 for a free body.
@@ -104,6 +107,11 @@ impl System {
         self.fixed[dof]
     }
 
+    /// Whether a node is fixed, or held along an axis.
+    pub fn holds_node(&self, node: u32) -> bool {
+        self.fixed[3 * node as usize..][..3].contains(&true)
+    }
+
     /// Number of rigid motions: 6 or 0.
     pub fn rigid_motions(&self) -> usize {
         if self.rigid.is_some() { 6 } else { 0 }
@@ -116,7 +124,7 @@ impl System {
 
     /// Number of elastic modes of the body.
     pub fn elastic_modes(&self) -> usize {
-        self.discretisation.dofs() - 3 * self.fixed_nodes.len() - self.rigid_motions()
+        self.fixed.iter().filter(|fixed| !**fixed).count() - self.rigid_motions()
     }
 
     /// Elastic displacements G·B [m] for a block of loads B [N], one per column.
@@ -135,16 +143,14 @@ impl System {
         }
     }
 
-    /// Subtracts from displacements their rigid part: (I − Φr·Φrᵀ·M)·U; zeroes fixed nodes.
+    /// Subtracts from displacements their rigid part: (I − Φr·Φrᵀ·M)·U; zeroes fixed degrees of freedom.
     pub fn remove_rigid(&self, displacements: &mut Mat<f64>) {
         if let Some(Rigid { shapes, weighted }) = &self.rigid {
             let amplitudes = weighted.transpose() * &*displacements;
             *displacements -= shapes * amplitudes;
         }
-        for &node in &self.fixed_nodes {
-            for axis in 0..3 {
-                displacements.row_mut(3 * node as usize + axis).fill(0.0);
-            }
+        for (row, _) in self.fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {
+            displacements.row_mut(row).fill(0.0);
         }
     }
 

@@ -210,7 +210,7 @@ impl<'a> TableRecorder<'a> {
     /// step, (axis·T + sample)·observed + dof; none for a free body.
     pub fn gravity(&self) -> Option<Vec<f64>> {
         let system = &self.body.system;
-        (!system.fixed_nodes.is_empty()).then(|| self.responses_to(system.uniform_weight()).concat())
+        (system.supported_nodes > 0).then(|| self.responses_to(system.uniform_weight()).concat())
     }
 
     /// Responses [m] to loads [N] on all degrees of freedom that are constant over the first step: T × observed

@@ -1,9 +1,9 @@
 //! The table R[s], two ways: closed form against time integration, identities, selections.
 
 use palpate::{Damping, Sampling};
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::table::{TableMethod, TableParameters, TableRecorder};
 use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, RecordedBody, ResidualChoice};
+use palpate_mesh::box_mesh;
 use palpate_testkit::{nodes_where, recorded, undamped};
 use std::sync::OnceLock;
 

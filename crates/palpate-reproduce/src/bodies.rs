@@ -1,6 +1,7 @@
 //! The paper's cube as it is measured.
 
 use crate::error::ReproduceError;
+use glam::DVec3;
 use palpate::{ColumnsInMemory, Damping, ImpulseResponse, Sampling};
 use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use palpate_fem::{Progress, RecordExtent, RecordParameters, RecordedBody, paper_cube};
@@ -20,6 +21,15 @@ pub fn damped_cube(
     let extent = RecordExtent::NoCertificate;
     let parameters = RecordParameters { damping, extent, ..paper_cube::parameters(cells, modes) };
     Ok(RecordedBody::new(paper_cube::mesh(cells)?, &parameters, progress)?)
+}
+
+/// Positions of the surface nodes [m], and triangles of their numbers among them.
+pub fn surface_mesh(body: &RecordedBody) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let surface = body.surface_nodes();
+    let mut number = vec![0_u32; body.nodes().len()];
+    surface.iter().enumerate().for_each(|(at, &node)| number[node as usize] = at as u32);
+    let triangles = body.surface_triangles().iter().map(|t| t.map(|node| number[node as usize]));
+    (surface.iter().map(|&node| body.nodes()[node as usize]).collect(), triangles.collect())
 }
 
 /// A table in closed form of a free body, end of step, in memory; `change` maps every number of it.
@@ -49,6 +59,6 @@ pub fn table_in_memory(
         touchable_dofs,
         observed_dofs: recorder.observed_dofs(),
         gravity: None,
-        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length())),
+        columns: Box::new(ColumnsInMemory::new(&values, recorder.column_length(), parameters.samples)),
     })
 }

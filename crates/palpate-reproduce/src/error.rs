@@ -2,8 +2,8 @@
 
 use palpate_export::ExportError;
 use palpate_fem::RecordError;
-use palpate_fem::mesh::MeshError;
 use palpate_fem::table::TableError;
+use palpate_mesh::MeshError;
 use palpate_render::RenderError;
 use palpate_scene::{ReplayError, SceneError};
 use std::io;

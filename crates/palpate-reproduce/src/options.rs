@@ -12,9 +12,11 @@ pub enum Part {
     Impulses,
     /// Passivity of the samples.
     Passivity,
-    /// Agreement of both forms of the response, and of both ways of recording.
+    /// Agreement of both forms of the response and of both ways of recording; contact between nodes.
     Agreement,
-    /// Cost of direct convolution (section 2.5).
+    /// Motion: what equation (3) drops, and equations (11) to (14).
+    Motion,
+    /// Cost of direct convolution (section 2.5), and of finite elements.
     Cost,
     /// Figure 5(a): a fall.
     Fall,
@@ -24,11 +26,12 @@ pub enum Part {
 
 impl Part {
     /// All parts, in the order of the paper.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Recording,
         Self::Impulses,
         Self::Passivity,
         Self::Agreement,
+        Self::Motion,
         Self::Cost,
         Self::Fall,
         Self::Shake,
@@ -41,6 +44,7 @@ impl Part {
             Self::Impulses => "impulses",
             Self::Passivity => "passivity",
             Self::Agreement => "agreement",
+            Self::Motion => "motion",
             Self::Cost => "cost",
             Self::Fall => "fall",
             Self::Shake => "shake",
@@ -50,13 +54,14 @@ impl Part {
     /// Content, as part of a sentence.
     pub fn content(self) -> &'static str {
         match self {
-            Self::Recording => "Table 1",
+            Self::Recording => "Figure 1, Table 1",
             Self::Impulses => "Figures 2 and 3, and the arrival of the wave",
             Self::Passivity => "Passivity of the samples",
             Self::Agreement => "Both forms of the response, both ways of recording",
-            Self::Cost => "Section 2.5",
+            Self::Motion => "Equations (3) and (11) to (14)",
+            Self::Cost => "Section 2.5, finite elements beside it",
             Self::Fall => "Figure 5(a)",
-            Self::Shake => "Figure 5(b)",
+            Self::Shake => "Figures 4 and 5(b)",
         }
     }
 }
@@ -90,6 +95,8 @@ pub struct Options {
     pub browser: Option<PathBuf>,
     /// Thoroughness of the measurements.
     pub effort: Effort,
+    /// Commit of the program's sources, if it is known.
+    pub commit: Option<&'static str>,
     /// Parts to make; they come in the order of the paper.
     pub parts: Vec<Part>,
 }

@@ -1,9 +1,10 @@
 //! A report as one web page: text, tables and drawings, no script and nothing from elsewhere.
 //!
-//! Callers number the figures and tables. Texts are escaped here, except where a parameter says that it is html.
+//! Figures and tables are numbered through. Texts are escaped here, except where a parameter says that it is html.
 
 use crate::html::escape;
 use crate::surface_picture::PICTURE_STYLE;
+use crate::system_drawing::SYSTEM_STYLE;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
@@ -63,13 +64,17 @@ tbody{border-bottom:2px solid var(--ink)}
 code,pre{font:.88rem/1.5 ui-monospace,'Cascadia Mono',Menlo,Consolas,'DejaVu Sans Mono',monospace}
 pre{background:var(--shade);padding:.8rem 1rem;border-radius:6px;overflow-x:auto;max-width:44rem}
 .listing th,.listing td,.listing thead tr>*{text-align:left;padding:.45rem 1.1rem .45rem .2rem}
-.listing table{font-size:.9rem}.listing td code{font-size:.78rem;white-space:nowrap}
+.listing table{font-size:.9rem}.listing td code{font-size:.72rem}
+.listing td:last-child{max-width:8.5rem}.listing tr>:nth-child(2){min-width:10rem}
+.verdict b{white-space:nowrap}
 .image{margin:0;color:var(--soft);font-size:.82rem;line-height:1.35}
 .image img{display:block;width:100%;height:auto;border-radius:4px;margin-bottom:.35rem}
 .gallery{display:grid;gap:.6rem 1rem;max-width:calc(15rem*var(--columns) + 1rem*(var(--columns) - 1));
 grid-template-columns:repeat(auto-fill,minmax(max(9.5rem,100%/var(--columns) - 1rem),1fr))}
 @media print{html{font-size:10pt}body{max-width:none;padding:0}nav{display:none}a{color:inherit}
-h2{break-after:avoid}figure,.table,tr,pre{break-inside:avoid}figure,.table,pre{overflow:visible}
+h2,p:has(+figure){break-after:avoid}figure,.table,tr,pre{break-inside:avoid}figure,.table,pre{overflow:visible}
+.listing{break-inside:auto}.listing td code{font-size:.6rem}.table table{font-size:.85rem}.table th,.table td{padding-left:.7rem}.table tr>:first-child{padding-left:.2rem}figure .chart{max-width:27rem}figure .system{max-width:30rem}
+figure,.table{margin:1.1rem 0}
 pre{white-space:pre-wrap}svg{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 ";
 
@@ -107,14 +112,28 @@ impl Page {
                 format!("<section id=\"{id}\">\n<h2>{heading}</h2>\n{body}</section>\n")
             })
             .collect();
-        let (intro, chart, picture) = (&self.intro, CHART_STYLE, PICTURE_STYLE);
+        let (chart, picture) = (CHART_STYLE, PICTURE_STYLE);
+        let body = numbered(
+            &numbered(&format!("{}{contents}{sections}", self.intro), "<figcaption>", "Figure"),
+            "<caption>",
+            "Table",
+        );
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title}</title>\n<style>\n{PAGE_STYLE}{chart}{picture}</style>\n</head>\n\
-             <body>\n<main>\n<h1>{title}</h1>\n{intro}{contents}{sections}</main>\n</body>\n</html>\n"
+             <title>{title}</title>\n<style>\n{PAGE_STYLE}{chart}{picture}{SYSTEM_STYLE}</style>\n</head>\n\
+             <body>\n<main>\n<h1>{title}</h1>\n{body}</main>\n</body>\n</html>\n"
         )
     }
+}
+
+/// Html with a name and a number, from 1, behind each of its opening tags of a kind.
+fn numbered(html: &str, tag: &str, name: &str) -> String {
+    let mut pieces = html.split(tag);
+    let first = pieces.next().unwrap_or_default().to_owned();
+    pieces
+        .enumerate()
+        .fold(first, |page, (at, piece)| format!("{page}{tag}<b>{name} {}.</b> {piece}", at + 1))
 }
 
 /// A table of plain texts; the first column is on the left and names its row.
@@ -125,7 +144,7 @@ pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
         body.push_str("<tr>");
         for (column, cell) in row.iter().enumerate() {
             // Short cells, numbers with their powers above all, stay on one line.
-            let is_short = cell.chars().count() <= 16;
+            let is_short = cell.chars().count() <= 26;
             let cell = if is_short { escape(cell).replace(' ', "\u{a0}") } else { escape(cell) };
             body.push_str(&match column {
                 0 => format!("<th scope=\"row\">{cell}</th>"),
@@ -141,15 +160,16 @@ pub fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     )
 }
 
-/// A table of texts: the first column links to an anchor for each row, the last is a command.
-pub fn listing(caption: &str, head: [&str; 4], rows: &[[String; 4]], anchors: &[&str]) -> String {
+/// A table of texts: the first column links to an anchor for each row, the third is a verdict with its reason behind a colon, the last is a command.
+pub fn listing(caption: &str, head: [&str; 5], rows: &[[String; 5]], anchors: &[&str]) -> String {
     let head = head.map(|cell| format!("<th scope=\"col\">{}</th>", escape(cell))).concat();
     let mut body = String::new();
     for (cells, anchor) in rows.iter().zip(anchors) {
-        let [what, paper, ours, command] = cells.each_ref().map(|cell| escape(cell));
+        let [place, says, verdict, found, command] = cells.each_ref().map(|cell| escape(cell));
+        let section = escape(anchor);
+        let (verdict, why) = verdict.split_once(':').unwrap_or((&verdict, ""));
         body += &format!(
-            "<tr><th scope=\"row\"><a href=\"#{}\">{what}</a></th><td>{paper}</td><td>{ours}</td><td><code>{command}</code></td></tr>\n",
-            escape(anchor)
+            "<tr><th scope=\"row\"><a href=\"#{section}\">{place}</a></th><td>{says}</td><td class=\"verdict\"><b>{verdict}</b>:{why}</td><td>{found}</td><td><code>{command}</code></td></tr>\n"
         );
     }
     let caption = escape(caption);
@@ -206,8 +226,8 @@ mod tests {
             gallery(&["<svg></svg>\n".into(), image(b"\x89PNG", "0 s: \"let\" go")], "", "Figure 1."),
             listing(
                 "a < b",
-                ["", "a", "b", "c"],
-                &[["what", "1", "<2", "palpate"].map(String::from)],
+                ["", "a", "verdict", "b", "c"],
+                &[["what", "1", "holds: 1 < 3", "<2", "palpate"].map(String::from)],
                 &["one"],
             ),
             code("palpate reproduce -o <dir>"),

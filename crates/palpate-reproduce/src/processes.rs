@@ -30,3 +30,12 @@ pub fn number(report: &Value, pointer: &str) -> Result<f64, ReproduceError> {
     let found = report.pointer(pointer).and_then(Value::as_f64);
     found.ok_or_else(|| ReproduceError::Process(format!("the report of a run has no {pointer}")))
 }
+
+/// Waits for a process that reports nothing that is needed.
+pub fn finish(child: Child) -> Result<(), ReproduceError> {
+    let output = child.wait_with_output().map_err(|e| failed(&e))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let ended =
+        || ReproduceError::Process(format!("a process ended with {}: {}", output.status, said.trim()));
+    output.status.success().then_some(()).ok_or_else(ended)
+}

@@ -54,6 +54,8 @@ pub const PICTURE_STYLE: &str = "\
 .colours{max-width:22rem;margin-top:.6rem}
 .picture text,.colours text{font-size:13px;fill:var(--soft)}
 .picture path{fill:currentColor;stroke:currentColor;stroke-width:.9;stroke-linejoin:round}
+.mesh .picture{max-width:22rem}
+.mesh path{stroke:#1b1f24;stroke-width:.35}
 .colours path{fill:none;stroke:var(--soft)}
 ";
 

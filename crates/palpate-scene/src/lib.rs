@@ -32,7 +32,7 @@ pub use file::{Relocated, RunMode, read_path, read_relocated_scene, read_scene};
 pub use library::{
     BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube_recipe,
 };
-pub use mesh_source::{read_mesh, read_surface, source_name};
+pub use mesh_source::{read_body, read_surface, source_name};
 pub use palpate_fem::{Progress, SilentProgress};
 pub use progress::{ProgressFn, WithoutRemarks};
 pub use recipe::{RecordingRecipe, cache_folder};

@@ -1,24 +1,71 @@
 //! Mesh sources: primitives as text (`box:…`, `sphere:…`) and mesh files.
 
 use crate::error::{SceneError, SceneErrorKind};
-use palpate_fem::mesh::{
-    Mesh, MeshError, SurfaceMesh, ball_mesh, box_mesh, read_gmsh, read_obj, read_stl, read_vtk,
+use palpate_fem::Progress;
+use palpate_mesh::{
+    CellSplit, Files, Mesh, MeshError, MeshFile, MeshingParameters, SurfaceMesh, ball_mesh, split_box_mesh,
 };
+use std::ops::ControlFlow;
 use std::path::Path;
 
-/// Makes a primitive, or reads a mesh file of tetrahedra.
+/// Makes a primitive, or reads a mesh file: its solid elements, or the inside of its surface; in metres.
 ///
 /// # Errors
-/// When the text is no primitive, or the file cannot be read.
-pub fn read_mesh(source: &str) -> Result<Mesh, SceneError> {
+/// When the text is no primitive, the file cannot be read, or its surface has no inside.
+pub fn read_body(
+    source: &str,
+    scale: f64,
+    meshing: &MeshingParameters,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, SceneError> {
+    if let Some(mut mesh) = primitive(source)? {
+        if meshing.cell_size.is_some() {
+            return Err(mesh_error(format!("{source}: {}", MeshError::CellSizeOfSolids)));
+        }
+        mesh.scale(scale).map_err(refused)?;
+        return Ok(mesh);
+    }
+    let path = Path::new(source);
+    let file = MeshFile::read(Files::Disk, path).map_err(refused)?;
+    let mut told = 0;
+    if matches!(file, MeshFile::Surface(_)) {
+        progress.begin("tetrahedra", PERCENT);
+    }
+    let mut watch = |share: f64| {
+        let now = (share * PERCENT as f64) as u64;
+        progress.advance(now.saturating_sub(told));
+        told = told.max(now);
+        if progress.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    file.into_body(scale, meshing, &mut watch).map_err(|error| match error {
+        MeshError::Scale { .. } => refused(error),
+        error => mesh_error(format!("{}: {error}", path.display())),
+    })
+}
+
+/// Units of work of the mesher.
+const PERCENT: u64 = 100;
+
+/// A primitive, if the text is one.
+fn primitive(source: &str) -> Result<Option<Mesh>, SceneError> {
     if let Some(text) = source.strip_prefix("box:") {
-        let parsed = text.split_once('/').and_then(|(size, cells)| Some((triple(size)?, triple(cells)?)));
-        let Some((size, cells)) = parsed else {
+        let mut parts = text.split('/');
+        let mut parsed = || {
+            let (size, cells) = (triple(parts.next()?)?, triple(parts.next()?)?);
+            let split = match parts.next() {
+                None | Some("5") => CellSplit::Five,
+                Some("6") => CellSplit::Six,
+                Some(_) => return None,
+            };
+            parts.next().is_none().then_some((size, cells, split))
+        };
+        let Some((size, cells, split)) = parsed() else {
             return Err(mesh_error(format!(
-                "{source:?} is no box; write box:LXxLYxLZ/NXxNYxNZ, as in box:0.1x0.1x0.1/12x12x12"
+                "{source:?} is no box; write box:LXxLYxLZ/NXxNYxNZ, as in box:0.1x0.1x0.1/12x12x12, and /6 after it for six tetrahedra \
+                 per cell"
             )));
         };
-        return box_mesh(size, cells).map_err(refused);
+        return split_box_mesh(size, cells, split).map(Some).map_err(refused);
     }
     if let Some(text) = source.strip_prefix("sphere:") {
         let parsed = text.split_once('/').and_then(|(r, n)| Some((r.parse().ok()?, n.parse().ok()?)));
@@ -27,47 +74,29 @@ pub fn read_mesh(source: &str) -> Result<Mesh, SceneError> {
                 "{source:?} is no sphere; write sphere:RADIUS/N, as in sphere:0.05/8"
             )));
         };
-        return ball_mesh(radius, layers).map_err(refused);
+        return ball_mesh(radius, layers).map(Some).map_err(refused);
     }
-    let path = Path::new(source);
-    match extension(path).as_str() {
-        "msh" => read_gmsh(path).map_err(refused),
-        "vtk" => read_vtk(path).map_err(refused),
-        _ => Err(mesh_error(format!(
-            "{source:?} is no mesh that palpate reads: give a Gmsh file (.msh), a VTK legacy file (.vtk), \
-             box:LXxLYxLZ/NXxNYxNZ or sphere:RADIUS/N"
-        ))),
-    }
+    Ok(None)
 }
 
-/// Reads the surface of a rigid body: triangles, or the boundary of tetrahedra.
+/// Reads the surface of a rigid body: triangles, or the boundary of solid elements.
 ///
 /// # Errors
 /// When the file cannot be read, or has neither.
 pub fn read_surface(path: &Path) -> Result<SurfaceMesh, SceneError> {
-    let around = |mesh: Mesh| {
-        if mesh.tets.is_empty() {
-            return Err(mesh_error(format!(
-                "{}: the mesh has no tetrahedra; give a surface as .obj or .stl",
-                path.display()
-            )));
-        }
-        SurfaceMesh::from_boundary(mesh).map_err(|error| mesh_error(format!("{}: {error}", path.display())))
-    };
-    let mut surface = match extension(path).as_str() {
-        "obj" => read_obj(path).map_err(refused)?,
-        "stl" => read_stl(path).map_err(refused)?,
-        "msh" => return around(read_gmsh(path).map_err(refused)?),
-        "vtk" => return around(read_vtk(path).map_err(refused)?),
-        _ => {
-            return Err(mesh_error(format!(
-                "{} is no mesh that palpate reads: give a closed surface (.obj, .stl) or a body of tetrahedra (.msh, .vtk)",
-                path.display()
-            )));
-        }
-    };
-    surface.weld();
-    Ok(surface)
+    palpate_mesh::read_surface(path).map_err(|error| match error {
+        MeshError::NoTetrahedra => mesh_error(format!(
+            "{}: the mesh has no solid elements; give a surface as .obj, .stl, .ply or .off",
+            path.display()
+        )),
+        // Errors of files have their path.
+        MeshError::Read { .. }
+        | MeshError::Companion { .. }
+        | MeshError::Foreign { .. }
+        | MeshError::Unrecognised { .. }
+        | MeshError::Format { .. } => refused(error),
+        other => mesh_error(format!("{}: {other}", path.display())),
+    })
 }
 
 fn refused(error: MeshError) -> SceneError {
@@ -76,10 +105,6 @@ fn refused(error: MeshError) -> SceneError {
 
 fn mesh_error(message: impl std::fmt::Display) -> SceneError {
     SceneError::new(SceneErrorKind::Mesh, message)
-}
-
-fn extension(path: &Path) -> String {
-    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
 /// Name of a source in a recording: without folders.
@@ -100,6 +125,11 @@ fn triple<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_fem::SilentProgress;
+
+    fn read_mesh(source: &str) -> Result<Mesh, SceneError> {
+        read_body(source, 1.0, &MeshingParameters::default(), &mut SilentProgress)
+    }
 
     fn text<T>(result: Result<T, SceneError>) -> String {
         result.err().map(|error| error.message).unwrap_or_default()
@@ -108,13 +138,14 @@ mod tests {
     #[test]
     fn primitives_are_read_and_misspelt_ones_are_explained() {
         assert_eq!(read_mesh("box:1x2x3/1x2x3").map(|m| m.tets.len()).ok(), Some(30));
+        assert_eq!(read_mesh("box:1x2x3/1x2x3/6").map(|m| m.tets.len()).ok(), Some(36));
+        assert!(text(read_mesh("box:1x2x3/1x2x3/7")).contains("/6 after it"));
         assert_eq!(read_mesh("sphere:0.05/2").map(|m| m.tets.len()).ok(), Some(160));
         assert!(
             text(read_mesh("box:1x2/1x2x3"))
                 .starts_with("\"box:1x2/1x2x3\" is no box; write box:LXxLYxLZ/NXxNYxNZ")
         );
         assert!(text(read_mesh("sphere:x/2")).contains("write sphere:RADIUS/N"));
-        assert!(text(read_mesh("cow.stl")).contains("no mesh that palpate reads"));
         assert!(text(read_mesh("no-such-file.msh")).starts_with("cannot read mesh no-such-file.msh"));
     }
 }

@@ -1,12 +1,13 @@
 //! Recipes: recordings that are made when they are needed, and cached.
 
 use crate::error::{SceneError, SceneErrorKind};
-use crate::mesh_source::{read_mesh, source_name};
+use crate::mesh_source::{read_body, source_name};
 use crate::progress::WithoutRemarks;
 use crate::recording_file::read_recording;
 use palpate::{Damping, Material, Recording, Support};
 use palpate_export::write_atomically;
-use palpate_fem::{ElementOrder, Progress, RecordExtent, RecordParameters, ResidualChoice, record};
+use palpate_fem::{ElementOrder, Progress, RecordParameters, record};
+use palpate_mesh::{Mesh, MeshingParameters, Repair};
 use std::path::{Path, PathBuf};
 
 /// Mesh, material and parameters from which an object of one material is recorded.
@@ -16,7 +17,9 @@ pub struct RecordingRecipe {
     pub source: String,
     /// Scale from the units of the mesh to metres.
     pub scale: f64,
-    /// Material of all regions; its own region is ignored.
+    /// Side of the cells that a surface is filled with [m]; none for the default.
+    pub cell_size: Option<f64>,
+    /// Material of all regions, isotropic; its own region is ignored.
     pub material: Material,
     /// Order of the elements.
     pub order: ElementOrder,
@@ -33,9 +36,10 @@ impl RecordingRecipe {
         let source = &metadata.provenance.source;
         let primitive = source.starts_with("box:") || source.starts_with("sphere:");
         let [material] = metadata.materials.as_slice() else { return None };
-        (primitive && metadata.support == Support::Free).then(|| Self {
+        (primitive && metadata.support == Support::Free && material.stiffness_pa.is_none()).then(|| Self {
             source: source.clone(),
             scale: 1.0,
+            cell_size: None,
             material: Material { region: String::new(), ..material.clone() },
             order: if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
             modes: recording.modes.len(),
@@ -45,30 +49,43 @@ impl RecordingRecipe {
 
     /// File name in a cache, unique for the recipe and the version.
     fn file_name(&self) -> String {
-        let Material { young_pa: young, poisson, density_kg_m3: density, .. } = self.material;
+        let Material { young_pa: young, poisson, density_kg_m3: density, .. } = &self.material;
         let order = if self.order == ElementOrder::Linear { 1 } else { 2 };
         let damping = match self.damping {
             Damping::Rayleigh { alpha, beta } => format!("a{alpha}-b{beta}"),
             Damping::Ratio(ratio) => format!("z{ratio}"),
         };
         let source = source_name(&self.source).replace(['/', ':'], "_");
+        let cells = self.cell_size.map_or(String::new(), |size| format!("-c{size}"));
         let (scale, modes, version) = (self.scale, self.modes, env!("CARGO_PKG_VERSION"));
-        format!("{source}-{scale}-E{young}-n{poisson}-r{density}-o{order}-m{modes}-{damping}-{version}.palp")
+        format!(
+            "{source}-{scale}{cells}-E{young}-n{poisson}-r{density}-o{order}-m{modes}-{damping}-{version}.palp"
+        )
     }
 
     /// Parameters of [`record`], for a mesh with `regions` regions.
     pub fn parameters(&self, regions: usize) -> RecordParameters {
         let material = Material { region: String::new(), ..self.material.clone() };
         RecordParameters {
-            materials: vec![material; regions],
-            order: self.order,
-            modes: self.modes,
-            damping: self.damping,
-            residual: ResidualChoice::Automatic,
-            fixed_nodes: Vec::new(),
             source: source_name(&self.source),
-            extent: RecordExtent::Full,
+            ..RecordParameters::new(vec![material; regions], self.order, self.modes, self.damping)
         }
+    }
+
+    /// Mesh of the object in metres, repaired.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn mesh(&self, progress: &mut dyn Progress) -> Result<Mesh, SceneError> {
+        let meshing = MeshingParameters { cell_size: self.cell_size };
+        let mut mesh = read_body(&self.source, self.scale, &meshing, progress)?;
+        mesh.repair(&Repair::default()).map_err(|error| self.refused(error))?;
+        Ok(mesh)
+    }
+
+    pub(crate) fn refused(&self, error: impl std::fmt::Display) -> SceneError {
+        let message = format!("{}: {error}", source_name(&self.source));
+        SceneError::new(SceneErrorKind::Record, message)
     }
 
     /// Records the object.
@@ -76,12 +93,18 @@ impl RecordingRecipe {
     /// # Errors
     /// When the mesh cannot be read, or cannot be recorded.
     pub fn record(&self, progress: &mut dyn Progress) -> Result<Recording, SceneError> {
-        let refused = |error: &dyn std::fmt::Display| SceneError::new(SceneErrorKind::Record, error);
-        let mut mesh = read_mesh(&self.source)?;
-        mesh.scale(self.scale).map_err(|error| refused(&error))?;
+        let mesh = self.mesh(progress)?;
+        self.record_mesh(mesh, progress)
+    }
+
+    /// Records a mesh that [`mesh`](Self::mesh) gave.
+    ///
+    /// # Errors
+    /// When it cannot be recorded.
+    pub fn record_mesh(&self, mesh: Mesh, progress: &mut dyn Progress) -> Result<Recording, SceneError> {
         let parameters = self.parameters(mesh.regions.len());
         let recorded = record(mesh, &parameters, &mut WithoutRemarks(progress));
-        recorded.map_err(|error| refused(&format!("{}: {error}", source_name(&self.source))))
+        recorded.map_err(|error| self.refused(error))
     }
 
     /// Recording from a cache folder, if it is there.

@@ -2,7 +2,7 @@
 
 use crate::error::{SceneError, SceneErrorKind};
 use palpate::{Certificate, PeakForceError, Recording};
-use palpate_fem::read_regular_file;
+use palpate_mesh::read_regular_file;
 use std::fmt::Write;
 use std::path::Path;
 

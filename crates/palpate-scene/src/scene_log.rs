@@ -3,8 +3,8 @@
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::Scene;
 use palpate::{Input, Model, State};
-use palpate_fem::read_regular_file;
 use palpate_haptics::log::{LogSender, LogWriter, SceneNames};
+use palpate_mesh::read_regular_file;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};

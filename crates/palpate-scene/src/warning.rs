@@ -21,8 +21,12 @@ pub struct Warning {
 pub enum WarningKind {
     /// The stated force error of a recording is large.
     ForceError,
-    /// An object with a recorded table has no contacts.
-    NoContactsOnTable,
+    /// A table knows the response at some surface nodes only.
+    PartlyTouchable,
+    /// A table ends before the body has come to rest.
+    ShortTable,
+    /// A table stands alone: contacts are searched for on its undeformed surface.
+    UndeformedSurface,
     /// The triangles of an obstacle's mesh face inwards.
     TurnedMesh,
     /// A device starts far from the point that it holds.

@@ -1,6 +1,7 @@
 //! Library of scenes: pointers are added, settings change the text, and the last scene stays when a change is refused.
 
-use palpate_scene::{Progress, SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
+use palpate::Material;
+use palpate_scene::{MeshUpload, Progress, SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
 use palpate_testkit::FREE_BLOCK_FILE;
 use tempfile::TempDir;
 
@@ -67,4 +68,58 @@ fn a_recording_that_is_not_wanted_any_more_ends_and_leaves_nothing() {
     let error = library.open_built_in("slab", &mut Cancelled).err().expect("an interruption");
     assert_eq!(error.to_string(), "box:0.24x0.02x0.12/24x2x12: interrupted");
     assert_eq!(std::fs::read_dir(&cache).expect("a folder").count(), 0);
+}
+
+#[test]
+fn an_uploaded_mesh_is_read_by_its_content_and_its_repairs_are_told() {
+    let library = SceneLibrary::new(None).expect("a library");
+    let upload = |name: &str, text: &str| MeshUpload {
+        name: name.into(),
+        bytes: text.into(),
+        scale: 0.1,
+        cell_size: None,
+        material: Material::isotropic(1e4, 0.3, 1000.0),
+        modes: 6,
+    };
+    // A hexahedron in MEDIT's format, and a node of no use.
+    let cube = "MeshVersionFormatted 2\nDimension 3\nVertices 9\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n0 0 1 0\n1 0 1 0\n1 1 1 0\n\
+                0 1 1 0\n9 9 9 0\nHexahedra 1\n1 2 3 4 5 6 7 8 0\nEnd\n";
+    let opened = library.record_upload(upload("cube.vtk", cube), &mut SilentProgress).expect("a scene");
+    assert_eq!(opened.title, "cube.vtk");
+    assert_eq!(
+        opened.about,
+        "Your own mesh. Press and drag it. Note: hexahedra (1) were split into 6 tetrahedra Note: 1 nodes belong to no tetrahedron \
+         and are left out"
+    );
+    assert!(
+        (opened.scene.model.recordings().map(|recording| recording.mass()).sum::<f64>() - 1.0).abs() < 1e-9
+    );
+    let refused = |name: &str, text: &str| {
+        let opened = library.record_upload(upload(name, text), &mut SilentProgress);
+        opened.err().map(|error| error.message).expect("an error")
+    };
+    assert_eq!(
+        refused("tip.msh", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        "tip.msh: the surface is open: 3 edges belong to one triangle only, about holes of 100 % of its area, and at most 5 % can be \
+         closed: close it, or give a sheet a thickness, in the program that made it"
+    );
+    // A cube of 10 cm, one face of two triangles turned.
+    let surface = "OFF\n8 7 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n\
+                   4 1 2 6 5\n4 2 3 7 6\n3 3 0 4\n3 3 7 4\n";
+    let upload = MeshUpload { cell_size: Some(0.03), ..upload("cube.stl", surface) };
+    let opened = library.record_upload(upload, &mut SilentProgress).expect("a scene");
+    let told = "Your own mesh. Press and drag it. Note: 1 triangles faced the other way than their neighbours and were turned Note: the \
+                surface was filled with ";
+    assert!(opened.about.starts_with(told), "{}", opened.about);
+    let mass: f64 = opened.scene.model.recordings().map(|recording| recording.mass()).sum();
+    assert!((mass - 1.0).abs() < 0.01, "{mass}");
+    // Another material is recorded of the same cells.
+    let soft = Material::isotropic(5e3, 0.3, 500.0);
+    let softer = library.change_material(0, soft, &mut SilentProgress).expect("a scene");
+    let halved: f64 = softer.scene.model.recordings().map(|recording| recording.mass()).sum();
+    assert!((halved / mass - 0.5).abs() < 1e-12, "{halved}");
+    assert_eq!(
+        refused("a.veg", "*VERTICES\n*INCLUDE /etc/passwd\n"),
+        "a.veg: line 2: the file includes '/etc/passwd', expected a file beside it or below"
+    );
 }

@@ -1,39 +1,59 @@
-//! Columns of a finished store in a folder, read into memory before a step uses them.
+//! Columns of a finished store, read into memory before a step uses them.
 //!
-//! A column is read whole, checked against its checksum and decompressed on first use: in [`ImpulseColumns::prepare`], outside of a step.
+//! A column is read whole, put in the order that a convolution reads it in, checked against its checksum and decompressed on first use: in [`ImpulseColumns::prepare`], outside of a step.
 //! Mapping the file instead would end the process with a bus error, in the middle of a step, when someone cuts the file.
 
 use crate::attributes::Number;
 use crate::error::StoreError;
 use crate::table_store::TableStore;
-use palpate::{Column, ImpulseColumns};
+use palpate::{Column, ImpulseColumns, arrange_column};
 use std::fmt;
 use std::sync::OnceLock;
 use zarrs::array::ArrayShardedReadableExtCache;
 
 /// Columns of a store.
 pub(crate) struct StoredColumns {
-    number: Number,
     length: usize,
-    /// Numbers of each column, from first use on; zeros if the column is damaged.
-    columns: Vec<OnceLock<Box<[u8]>>>,
+    numbers: Numbers,
     store: TableStore,
     cache: ArrayShardedReadableExtCache,
+}
+
+/// Numbers of each column, from first use on; zeros if the column is damaged.
+enum Numbers {
+    F32(Vec<OnceLock<Box<[f32]>>>),
+    F64(Vec<OnceLock<Box<[f64]>>>),
 }
 
 impl StoredColumns {
     /// Columns of a finished store; only the indices of its shards are read.
     pub(crate) fn new(store: TableStore) -> Result<Self, StoreError> {
-        if store.location().folder().is_none() {
-            return Err(StoreError::Remote { location: store.location().to_string() });
-        }
         let cache = ArrayShardedReadableExtCache::new(store.array());
         for shard in 0..store.shards() {
             store.check_index(shard, &cache)?;
         }
-        let columns = store.content().touchable_dofs.iter().map(|_| OnceLock::new()).collect();
-        let (number, length) = (store.content().number, store.content().column_length());
-        Ok(Self { number, length, columns, store, cache })
+        let (content, columns) = (store.content(), store.content().touchable_dofs.len());
+        let numbers = match content.number {
+            Number::F32 => Numbers::F32((0..columns).map(|_| OnceLock::new()).collect()),
+            Number::F64 => Numbers::F64((0..columns).map(|_| OnceLock::new()).collect()),
+        };
+        Ok(Self { length: content.column_length(), numbers, store, cache })
+    }
+
+    /// Column, read from the store when it is not known yet.
+    fn load<'c, const N: usize, X: Copy>(
+        &self,
+        (touchable, known): (usize, &'c OnceLock<Box<[X]>>),
+        number: impl Fn([u8; N]) -> X,
+    ) -> Result<&'c [X], StoreError> {
+        if let Some(known) = known.get() {
+            return Ok(known);
+        }
+        let bytes = self.store.read_column(touchable, &self.cache)?;
+        let numbers: Vec<X> = bytes.as_chunks().0.iter().map(|bytes| number(*bytes)).collect();
+        let column = arrange_column(&numbers, self.store.content().samples);
+        // Another thread may have read it meanwhile.
+        Ok(known.get_or_init(|| column))
     }
 }
 
@@ -43,29 +63,40 @@ impl ImpulseColumns for StoredColumns {
     }
 
     fn prepare(&self, touchable: usize) -> Result<(), String> {
-        let column = &self.columns[touchable];
-        if column.get().is_none() {
-            let bytes = self.store.read_column(touchable, &self.cache).map_err(|e| e.to_string())?;
-            // Another thread may have read it meanwhile.
-            let _ = column.set(bytes);
-        }
-        Ok(())
+        let prepared = match &self.numbers {
+            Numbers::F32(columns) => {
+                self.load((touchable, &columns[touchable]), f32::from_le_bytes).map(drop)
+            }
+            Numbers::F64(columns) => {
+                self.load((touchable, &columns[touchable]), f64::from_le_bytes).map(drop)
+            }
+        };
+        prepared.map_err(|error| error.to_string())
     }
 
     fn column(&self, touchable: usize) -> Column<'_> {
-        let bytes = self.columns[touchable].get_or_init(|| {
-            let zeros = || vec![0; self.length * self.number.bytes()].into_boxed_slice();
-            self.store.read_column(touchable, &self.cache).unwrap_or_else(|_| zeros())
-        });
-        match self.number {
-            Number::F32 => Column::F32(bytes),
-            Number::F64 => Column::F64(bytes),
+        match &self.numbers {
+            Numbers::F32(columns) => {
+                let column = &columns[touchable];
+                let known = self.load((touchable, column), f32::from_le_bytes);
+                Column::F32(known.unwrap_or_else(|_| column.get_or_init(|| vec![0.0; self.length].into())))
+            }
+            Numbers::F64(columns) => {
+                let column = &columns[touchable];
+                let known = self.load((touchable, column), f64::from_le_bytes);
+                Column::F64(known.unwrap_or_else(|_| column.get_or_init(|| vec![0.0; self.length].into())))
+            }
         }
     }
 }
 
 impl fmt::Debug for StoredColumns {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "StoredColumns({} columns of {} numbers)", self.columns.len(), self.length)
+        write!(
+            f,
+            "StoredColumns({} columns of {} numbers)",
+            self.store.content().touchable_dofs.len(),
+            self.length
+        )
     }
 }

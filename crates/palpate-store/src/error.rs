@@ -71,12 +71,6 @@ pub enum StoreError {
         /// Number of all shards.
         shards: usize,
     },
-    /// The store is in object storage, and only a folder is read while a scene runs.
-    #[error("the store {location} lies in object storage; copy it into a folder of this machine to run it")]
-    Remote {
-        /// Location of the store.
-        location: String,
-    },
     /// The store cannot be accessed.
     #[error("cannot {operation} the store {location}: {reason}")]
     Access {

@@ -10,7 +10,7 @@ impl TableStore {
     /// Loads the body and its table for a scene: columns are read into memory on first use.
     ///
     /// # Errors
-    /// [`StoreError`] when shards are missing, the store is in object storage, or its content is invalid.
+    /// [`StoreError`] when shards are missing, or its content is invalid.
     pub fn load(self) -> Result<(Recording, ImpulseResponse), StoreError> {
         let missing = self.missing(Part::ALL)?.len();
         if missing > 0 {

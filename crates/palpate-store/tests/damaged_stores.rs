@@ -220,7 +220,8 @@ fn a_store_that_is_cut_while_it_is_used_gives_an_error_that_names_the_shard() {
             .map(|&node| 3 * recording.surface.source_nodes[node as usize])
             .map(|dof| table.touchable_dofs.iter().position(|&own| own == dof).expect("touchable"))
             .collect();
-        let before: Vec<f64> = kept.iter().map(|&column| table.columns.column(column).at(1)).collect();
+        let before: Vec<f64> =
+            kept.iter().map(|&column| table.columns.column(column).series(0, table.samples).at(1)).collect();
         for file in files(&store.join("impulse_response/c")) {
             std::fs::File::options()
                 .write(true)
@@ -230,7 +231,8 @@ fn a_store_that_is_cut_while_it_is_used_gives_an_error_that_names_the_shard() {
                 .expect("a writable file");
         }
         // What was prepared stays; the rest is refused with the shard's name, and read as zeros in a step that can't wait.
-        let after: Vec<f64> = kept.iter().map(|&column| table.columns.column(column).at(1)).collect();
+        let after: Vec<f64> =
+            kept.iter().map(|&column| table.columns.column(column).series(0, table.samples).at(1)).collect();
         assert_eq!(before, after, "{kind}");
         let fresh =
             columns.rev().find(|column| table.columns.prepare(*column).is_err()).expect("a cut column");
@@ -241,6 +243,6 @@ fn a_store_that_is_cut_while_it_is_used_gives_an_error_that_names_the_shard() {
             refusal.starts_with(&key) && refusal.contains("is cut short: it has 1 bytes"),
             "{kind}: {refusal}"
         );
-        assert_eq!(table.columns.column(fresh).at(1), 0.0, "{kind}");
+        assert_eq!(table.columns.column(fresh).series(0, table.samples).at(1), 0.0, "{kind}");
     }
 }

@@ -3,8 +3,8 @@
 use crate::material::ElasticMaterial;
 use glam::{DMat3, DVec3};
 use palpate::Recording;
-use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
 use palpate_fem::{ElementOrder, RecordError};
+use palpate_mesh::{Mesh, ball_mesh, box_mesh};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -49,11 +49,20 @@ impl BodyShape {
         [Self::Cube, Self::Ball, Self::Torus, Self::Blob, Self::Sheet, Self::Rod, Self::Horseshoe];
 
     /// Mesh about its centre, with the axis of symmetry along y.
-    fn mesh(self, fineness: Fineness) -> Result<Mesh, RecordError> {
+    ///
+    /// # Errors
+    /// As [`palpate_fem::mesh`].
+    pub fn mesh(self, fineness: Fineness) -> Result<Mesh, RecordError> {
         let n = |coarse: u32, fine: u32| if fineness == Fineness::Coarse { coarse } else { fine };
         let mesh = match self {
             Self::Cube => box_mesh([0.1; 3], [n(4, 6); 3])?,
-            Self::Ball => ball_mesh(0.05, n(4, 6))?,
+            Self::Ball => {
+                // Facets are the harder case for contact. A fine ball with curved edges, punched on 48 contact samples, loses 3.5e-4 of its
+                // weight times size where it rests, of 2e-4 allowed (docs/measured.md).
+                let mut ball = ball_mesh(0.05, n(4, 6))?;
+                ball.straighten();
+                ball
+            }
             Self::Blob => mapped(ball_mesh(0.05, n(4, 6))?, blob),
             Self::Sheet => box_mesh([0.12, 0.008, 0.12], [n(8, 12), 1, n(8, 12)])?,
             Self::Rod => mapped(box_mesh([0.16, 0.024, 0.024], [n(12, 20), n(2, 4), n(2, 4)])?, round(0.012)),

@@ -4,6 +4,7 @@
 //! [`object_at`] build models from them. [`made_once_per_run`] keeps what takes long for all processes of a test run. With the feature `record`, [`ElasticMaterial`] records bodies from meshes, each once per process.
 
 mod allocations;
+mod closed_form_table;
 mod editable_recording;
 mod once_per_run;
 mod random;
@@ -21,6 +22,7 @@ mod material;
 mod recording_cache;
 
 pub use allocations::{CountingAllocator, allocations, largest_allocation};
+pub use closed_form_table::{closed_form_table, in_single_precision};
 pub use editable_recording::{EditableRecording, EditableTensor};
 pub use once_per_run::made_once_per_run;
 pub use random::Random;
@@ -36,7 +38,7 @@ pub use subdivision::{subdivided, subdivided_near_field};
 pub use waiting::wait_until;
 
 #[cfg(feature = "record")]
-pub use body_set::{BodyShape, Fineness};
+pub use body_set::{BodyShape, Fineness, SOFT};
 #[cfg(feature = "record")]
 pub use material::{ElasticMaterial, PAPER_MATERIAL, isotropic, nodes_where, undamped};
 #[cfg(feature = "record")]

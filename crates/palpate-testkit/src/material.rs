@@ -3,9 +3,9 @@
 use crate::recording_cache::recorded_once;
 use glam::DVec3;
 use palpate::{Damping, Material, Recording};
-use palpate_fem::mesh::Mesh;
 use palpate_fem::paper_cube::{DENSITY_KG_M3, POISSON, YOUNG_PA};
-use palpate_fem::{ElementOrder, RecordError, RecordExtent, RecordParameters, ResidualChoice};
+use palpate_fem::{ElementOrder, RecordError, RecordExtent, RecordParameters};
+use palpate_mesh::Mesh;
 use std::sync::Arc;
 
 /// An isotropic linear-elastic material with stiffness-proportional damping C = βK.
@@ -75,7 +75,7 @@ pub fn nodes_where(mesh: &Mesh, holds: impl Fn(DVec3) -> bool) -> Vec<u32> {
 
 /// A material of all regions: E [Pa], ν, ρ [kg/m³].
 pub const fn isotropic(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
-    Material { region: String::new(), young_pa, poisson, density_kg_m3 }
+    Material::isotropic(young_pa, poisson, density_kg_m3)
 }
 
 /// Parameters of an undamped body of one material: E [Pa], ν, ρ [kg/m³].
@@ -86,14 +86,9 @@ pub fn undamped(
     order: ElementOrder,
     modes: usize,
 ) -> RecordParameters {
+    let materials = vec![isotropic(young_pa, poisson, density_kg_m3)];
     RecordParameters {
-        materials: vec![isotropic(young_pa, poisson, density_kg_m3)],
-        order,
-        modes,
-        damping: Damping::Ratio(0.0),
-        residual: ResidualChoice::Automatic,
-        fixed_nodes: Vec::new(),
         source: "verification".into(),
-        extent: RecordExtent::Full,
+        ..RecordParameters::new(materials, order, modes, Damping::Ratio(0.0))
     }
 }

@@ -1,8 +1,8 @@
 //! Recordings that are made once per process.
 
 use palpate::Recording;
-use palpate_fem::mesh::Mesh;
 use palpate_fem::{RecordError, RecordParameters, RecordedBody, SilentProgress};
+use palpate_mesh::Mesh;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -59,7 +59,7 @@ fn fingerprint(mesh: &Mesh, parameters: &RecordParameters) -> u64 {
 mod tests {
     use crate::PAPER_MATERIAL;
     use palpate_fem::ElementOrder;
-    use palpate_fem::mesh::box_mesh;
+    use palpate_mesh::box_mesh;
     use std::sync::Arc;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Reasons why a case could not be computed.
 
 use palpate_fem::RecordError;
-use palpate_fem::mesh::MeshError;
+use palpate_mesh::MeshError;
 
 /// A case that could not be computed; one that was computed and failed is no error.
 #[derive(Debug, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! Modes of a mesh without a recording.
 
 use crate::error::VerifyError;
-use palpate_fem::mesh::Mesh;
 use palpate_fem::{RecordExtent, RecordParameters, RecordedBody, ResidualChoice, SilentProgress};
+use palpate_mesh::Mesh;
 
 /// The assembled body and its lowest elastic modes.
 pub fn lowest(mesh: Mesh, parameters: &RecordParameters) -> Result<RecordedBody, VerifyError> {

@@ -37,7 +37,7 @@ pub enum RecordingError {
     },
     /// Format version that this version of palpate does not read.
     #[error(
-        "format version {found}, this palpate reads version {supported}: record it again or use a newer palpate"
+        "format version {found}, this palpate reads versions up to {supported}: record it again or use a newer palpate"
     )]
     UnsupportedVersion {
         /// Version of the file.

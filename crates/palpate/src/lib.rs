@@ -54,6 +54,7 @@ mod collision;
 mod contact;
 mod device;
 mod disjoint_sets;
+mod dot_products;
 mod energy;
 mod error;
 mod io;
@@ -83,9 +84,11 @@ pub use motion::RigidIntegrator;
 pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
-    Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory, Damping, FORMAT_VERSION,
-    GravityResponse, ImpulseColumns, ImpulseResponse, MassProperties, Material, MeshCounts, Metadata,
-    ModalBasis, NearField, PeakForceError, Provenance, Recording, ResidualCompliance, Sampling, Support,
+    COMPACT_FORMAT_VERSION, Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory,
+    Damping, FORMAT_VERSION, GravityResponse, ImpulseColumns, ImpulseResponse, MAX_QUANTISED_NODES,
+    MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField, PeakForceError, Provenance,
+    QuantisedCompliance, Recording, ResidualCompliance, ResponseSeries, Sampling, Support, arrange_column,
+    round_mode_shape,
 };
 pub use response::{OscillatorState, ResponseForm, SampledOscillator, SampledResidual};
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};

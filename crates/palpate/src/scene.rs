@@ -308,9 +308,6 @@ impl ModelParameters {
     /// cells of its clamps, and the surface nodes where surfaces meet, within `max_contact_points`.
     pub(crate) fn point_capacity(&self, object: &Object, objects: usize) -> usize {
         let devices = self.devices.len();
-        if !object.is_touchable() {
-            return devices;
-        }
         let surface = if self.touches_surfaces(objects) {
             object.body.recording.surface.positions.len().min(self.max_contact_points)
         } else {

@@ -2,81 +2,16 @@
 
 use glam::DVec3;
 use palpate::{
-    AppliedForce, ColumnsInMemory, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model,
-    ModelObject, ModelParameters, ObjectStart, OscillatorState, Recording, ResponseForm, SampledOscillator,
-    Sampling, State, SurfacePoint, Twist, step,
+    AppliedForce, DeviceInput, DeviceParameters, Grasp, ImpulseResponse, Input, Model, ModelObject,
+    ModelParameters, ObjectStart, Recording, ResponseForm, State, SurfacePoint, Twist, step,
 };
 use palpate_testkit::{
-    GRAVITY_M_S2, fixed_block, free_block, holding, model_and_state, start_at, with_stiffness_damping,
+    GRAVITY_M_S2, Random, closed_form_table, fixed_block, free_block, holding, model_and_state, start_at,
+    with_stiffness_damping,
 };
 use std::sync::Arc;
 
 const H: f64 = 1e-3;
-
-/// R[s] = Φ·g(s)·Φᵀ + ((1 − e)·eˢ + c·(δ₀ − δ₁))·S of a recording's own modes, e = exp(−h/τ), c = ½·(1 + e)/(1 − e) − τ/h.
-fn table(recording: &Recording, samples: usize, step_s: f64) -> ImpulseResponse {
-    let (dofs, m) = (3 * recording.surface.positions.len(), recording.modes.len());
-    let pairs = recording.modes.angular_frequencies.iter().zip(&recording.modes.damping_ratios);
-    // Responses of all modes at each sample.
-    let mut oscillators: Vec<(SampledOscillator, OscillatorState)> = pairs
-        .map(|(&omega, &zeta)| (SampledOscillator::new(omega, zeta, step_s), OscillatorState::default()))
-        .collect();
-    let responses: Vec<Vec<f64>> = (0..samples)
-        .map(|s| {
-            let advance = |(oscillator, state): &mut (SampledOscillator, OscillatorState)| {
-                *state = oscillator.advance(*state, if s == 0 { 1.0 } else { 0.0 });
-                state.q
-            };
-            oscillators.iter_mut().map(advance).collect()
-        })
-        .collect();
-    let row = |dof: usize| recording.modes.row(dof / 3, dof % 3);
-    // Column under modal forces, with an additional displacement times a share per sample.
-    let respond = |forces: &[f64], beyond: &dyn Fn(usize) -> f64, share: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let mut column = Vec::with_capacity(samples * dofs);
-        for (s, responses) in responses.iter().enumerate() {
-            for i in 0..dofs {
-                let modal: f64 = (0..m).map(|k| row(i)[k] * responses[k] * forces[k]).sum();
-                column.push(modal + beyond(i) * share(s));
-            }
-        }
-        column
-    };
-    let relaxation = recording.residual_relaxation_s() / step_s;
-    let decay = (-1.0 / relaxation).exp();
-    let lead = 0.5 * (1.0 + decay) / (1.0 - decay) - relaxation;
-    let share = |s: usize| {
-        let last = match s {
-            0 => lead,
-            1 => -lead,
-            _ => 0.0,
-        };
-        (1.0 - decay) * decay.powi(s as i32) + last
-    };
-    let residual = |i: usize, j: usize| recording.residual.block(i / 3, j / 3).col(j % 3)[i % 3];
-    let columns = (0..dofs).flat_map(|j| respond(row(j), &|i| residual(i, j), &share));
-    let values: Vec<f64> = columns.collect();
-    let gravity = recording.gravity.as_ref().map(|gravity| {
-        let along = |axis: usize| {
-            let unit = DVec3::from_array(std::array::from_fn(|a| f64::from(u8::from(a == axis))));
-            let forces = &gravity.modal_forces[axis * m..(axis + 1) * m];
-            let sag = |i: usize| gravity.residual_displacement(i / 3, unit)[i % 3];
-            respond(forces, &sag, &|s| f64::from(u8::from(s == 0)))
-        };
-        (0..3).flat_map(along).collect()
-    });
-    let dof_numbers: Vec<u32> =
-        recording.surface.source_nodes.iter().flat_map(|&n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-    ImpulseResponse {
-        step_s,
-        samples,
-        sampling: Sampling::End,
-        touchable_dofs: dof_numbers.clone(),
-        observed_dofs: dof_numbers,
-        gravity,
-        columns: Box::new(ColumnsInMemory::new(&values, samples * dofs)),
-    }
-}
 
 fn scene(recording: &Arc<Recording>, form: ResponseForm, parameters: ModelParameters) -> (Model, State) {
     let twist = match recording.metadata.support {
@@ -111,7 +46,7 @@ fn differences(
         gravity,
         ..ModelParameters::for_reference()
     };
-    let fir = ResponseForm::Fir(Arc::new(table(recording, samples, H)));
+    let fir = ResponseForm::Fir(Arc::new(closed_form_table(recording, samples, H)));
     let mut scenes = [ResponseForm::Modal, fir].map(|form| scene(recording, form, parameters.clone()));
     let nodes = recording.surface.positions.len();
     let (mut worst, mut largest) = ([0.0_f64; 2], [0.0_f64; 2]);
@@ -169,17 +104,68 @@ fn forces_and_displacements_equal_those_of_the_modal_form() {
     }
 }
 
+/// Held points are solved for with blocked convolution; `State::point_displacement` sums each output by itself.
+#[test]
+fn blocks_give_the_sums_of_single_outputs_whatever_comes_and_goes_and_is_forgotten() {
+    let recording = fixed_block();
+    let held = points(&recording);
+    // Windows below, at and above a block, and some blocks.
+    for samples in [7, 16, 40, 130] {
+        let parameters = ModelParameters {
+            devices: vec![DeviceParameters::default(); 3],
+            ..ModelParameters::for_reference()
+        };
+        let form = ResponseForm::Fir(Arc::new(closed_form_table(&recording, samples, H)));
+        let (model, mut state) = scene(&recording, form, parameters);
+        let mut random = Random::new(5);
+        let mut grasps = [None; 3];
+        let (mut largest, mut strongest) = (0.0_f64, 0.0_f64);
+        for number in 0..600 {
+            let t = f64::from(number) * H;
+            for (hand, grasp) in grasps.iter_mut().enumerate() {
+                // A hand keeps its point for 20 steps in the mean, and holds none for as long; no two hold the same.
+                if random.chance(0.05) {
+                    let at = (random.unit() * (held.len() / 3) as f64) as usize;
+                    *grasp = random.chance(0.5).then_some(held[3 * at + hand]);
+                }
+            }
+            let pose = state.output().objects[0].pose;
+            let devices = grasps.iter().map(|grasp| {
+                let rest = grasp.map_or(DVec3::ZERO, |point| recording.surface.rest_position(&point));
+                let sway = 3e-4 * DVec3::new((40.0 * t).sin(), (70.0 * t).cos(), (25.0 * t).sin());
+                let mode = grasp.map(|point| Grasp { object: 0, point }).into();
+                DeviceInput { position: pose.world_from_body(rest) + sway, mode }
+            });
+            let input = Input { devices: devices.collect(), ..Input::default() };
+            let output = step(&model, &mut state, &input);
+            assert_eq!(output.status.unsolved_islands, 0, "step {number}");
+            let pose = output.objects[0].pose;
+            let forces = output.devices.iter().map(|device| device.force_on_hand.length());
+            strongest = forces.fold(strongest, f64::max);
+            for (at, grasp) in grasps.iter().enumerate() {
+                let Some(point) = grasp else { continue };
+                let u = state.point_displacement(&model, 0, point);
+                let place = pose.world_from_body(recording.surface.rest_position(point) + u);
+                let apart = (place - input.devices[at].position).length();
+                assert!(apart < HELD_M_N * (1.0 + strongest), "{apart:e} m in step {number}, T = {samples}");
+                largest = largest.max(u.length());
+            }
+        }
+        assert!(largest > LEAST_DISPLACEMENT_M, "{largest}");
+    }
+}
+
+/// Round-off of the place of a held point per force [m/N]: the solver's tolerance of 10⁻¹⁰ by compliances of 10⁻³ m/N at most.
+const HELD_M_N: f64 = 1e-13;
+
 #[test]
 fn prescribed_forces_displace_as_in_modal_form() {
     for recording in [free_block(), with_stiffness_damping(&free_block(), 10.0 * H)] {
-        let (held, fir) = (points(&recording), ResponseForm::Fir(Arc::new(table(&recording, 300, H))));
-        let devices = vec![DeviceParameters { patch_radius: 0.04, ..DeviceParameters::default() }; 2];
-        let of_points = vec![DeviceParameters::default(); 2];
-        let scene_of = |form, devices| {
-            scene(&recording, form, ModelParameters { devices, ..ModelParameters::for_reference() })
-        };
-        // A table knows points only: there a patch is its point.
-        let mut scenes = [scene_of(ResponseForm::Modal, of_points), scene_of(fir, devices)];
+        let (held, fir) =
+            (points(&recording), ResponseForm::Fir(Arc::new(closed_form_table(&recording, 300, H))));
+        let devices = vec![DeviceParameters::default(); 2];
+        let parameters = ModelParameters { devices, ..ModelParameters::for_reference() };
+        let mut scenes = [ResponseForm::Modal, fir].map(|form| scene(&recording, form, parameters.clone()));
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for number in 0..300 {
             let t = f64::from(number) * H;
@@ -235,7 +221,7 @@ fn forces_older_than_the_window_have_no_effect() {
     let recording = free_block();
     let held = points(&recording);
     let samples = 20;
-    let form = ResponseForm::Fir(Arc::new(table(&recording, samples, H)));
+    let form = ResponseForm::Fir(Arc::new(closed_form_table(&recording, samples, H)));
     let (model, mut state) = scene(
         &recording,
         form,
@@ -260,7 +246,7 @@ const LEDGER_ROUND_OFF: f64 = 1e-13;
 fn work_of_hands_is_stored_in_motion_and_deformation() {
     let recording = free_block();
     let held = points(&recording);
-    let form = ResponseForm::Fir(Arc::new(table(&recording, 200, H)));
+    let form = ResponseForm::Fir(Arc::new(closed_form_table(&recording, 200, H)));
     let (model, mut state) = scene(
         &recording,
         form,
@@ -287,7 +273,7 @@ fn work_of_hands_is_stored_in_motion_and_deformation() {
 fn tables_that_do_not_fit_are_refused() {
     let recording = free_block();
     let refusal = |change: &dyn Fn(&mut ImpulseResponse)| {
-        let mut table = table(&recording, 5, H);
+        let mut table = closed_form_table(&recording, 5, H);
         change(&mut table);
         let object = ModelObject {
             response: ResponseForm::Fir(Arc::new(table)),
@@ -320,7 +306,7 @@ fn tables_that_do_not_fit_are_refused() {
 #[test]
 fn untouchable_point_cannot_be_held() {
     let recording = free_block();
-    let mut table = table(&recording, 5, H);
+    let mut table = closed_form_table(&recording, 5, H);
     // The first node's first column belongs to another degree of freedom.
     table.touchable_dofs[0] = u32::MAX;
     let node = recording.surface.triangles.iter().position(|t| t.contains(&0)).expect("a triangle") as u32;
@@ -345,7 +331,7 @@ fn untouchable_point_cannot_be_held() {
 fn a_table_of_a_fixed_body_knows_constant_gravity_alone_and_starts_undeformed() {
     let recording = fixed_block();
     let object = ModelObject {
-        response: ResponseForm::Fir(Arc::new(table(&recording, 5, H))),
+        response: ResponseForm::Fir(Arc::new(closed_form_table(&recording, 5, H))),
         ..ModelObject::new(recording, start_at(DVec3::ZERO))
     };
     let model = Model::new(ModelParameters::for_reference(), vec![object.clone()]).expect("a good model");
@@ -377,7 +363,7 @@ fn a_point_whose_free_corner_has_no_weight_to_speak_of_is_refused_as_fixed() {
     let mut weights = [0.5; 3];
     weights[free] = 1e-16;
     let point = SurfacePoint { triangle, weights };
-    let table = Arc::new(table(&block, 4, H));
+    let table = Arc::new(closed_form_table(&block, 4, H));
     let refusal = table.prepare(&block.surface, &point).map_err(|error| error.to_string());
     let expected = "the point lies on fixed nodes: no hand can move it; hold one that is farther from them";
     assert_eq!(refusal, Err(expected.into()));

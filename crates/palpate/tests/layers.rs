@@ -37,6 +37,9 @@ const RUNTIME_ALLOWED: &[&str] = &[
     "zmij",
     "allocator-api2",
     "equivalent",
+    // Compression of quantised compliances in recording files.
+    "adler2",
+    "miniz_oxide",
     // Error types with kinds.
     "thiserror",
     "thiserror-impl",
@@ -45,20 +48,28 @@ const RUNTIME_ALLOWED: &[&str] = &[
 /// Import directions between our own crates: (crate, allowed dependencies).
 const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate", &[]),
-    ("palpate-fem", &["palpate"]),
+    ("palpate-mesh", &[]),
+    ("palpate-fem", &["palpate", "palpate-mesh"]),
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
     ("palpate-viewer", &["palpate", "palpate-haptics"]),
-    ("palpate-testkit", &["palpate", "palpate-fem"]),
-    ("palpate-verify", &["palpate", "palpate-fem", "palpate-haptics", "palpate-scene", "palpate-testkit"]),
-    ("palpate-export", &["palpate", "palpate-fem"]),
-    ("palpate-scene", &["palpate", "palpate-fem", "palpate-store", "palpate-haptics", "palpate-export"]),
+    ("palpate-testkit", &["palpate", "palpate-fem", "palpate-mesh"]),
+    (
+        "palpate-verify",
+        &["palpate", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene", "palpate-testkit"],
+    ),
+    ("palpate-export", &["palpate", "palpate-mesh"]),
+    (
+        "palpate-scene",
+        &["palpate", "palpate-fem", "palpate-mesh", "palpate-store", "palpate-haptics", "palpate-export"],
+    ),
     ("palpate-render", &["palpate", "palpate-haptics", "palpate-viewer", "palpate-export", "palpate-scene"]),
     (
         "palpate-reproduce",
         &[
             "palpate",
             "palpate-fem",
+            "palpate-mesh",
             "palpate-haptics",
             "palpate-viewer",
             "palpate-export",
@@ -72,6 +83,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
         &[
             "palpate",
             "palpate-fem",
+            "palpate-mesh",
             "palpate-store",
             "palpate-haptics",
             "palpate-viewer",

@@ -31,7 +31,7 @@ fn table(recording: &Recording) -> ImpulseResponse {
         touchable_dofs: numbers.clone(),
         observed_dofs: numbers,
         gravity: None,
-        columns: Box::new(ColumnsInMemory::new(&values, samples * dofs)),
+        columns: Box::new(ColumnsInMemory::new(&values, samples * dofs, samples)),
     }
 }
 

@@ -6,7 +6,7 @@ import { MaterialFields, PRESETS } from "./material_panel";
 import type { JobList } from "./job_list";
 import type { Notifications } from "./notifications";
 
-const EXTENSIONS = [".msh", ".vtk", ".obj", ".stl"];
+const EXTENSIONS = [".msh", ".vtk", ".vtu", ".mesh", ".veg", ".inp", ".obj", ".stl", ".ply", ".off"];
 const SCALES: readonly [string, number][] = [
   ["millimetres", 0.001],
   ["centimetres", 0.01],
@@ -17,7 +17,7 @@ const SCALES: readonly [string, number][] = [
 export class MeshUpload {
   readonly section: HTMLElement;
   readonly dialog = element("dialog", { class: "upload-dialog", attributes: { "aria-labelledby": "upload-title" } });
-  private readonly dropTarget = element("div", { class: "drop-target", text: "Drop a tetrahedral mesh here to record it (.msh, .vtk)" });
+  private readonly dropTarget = element("div", { class: "drop-target", text: "Drop a mesh here to record it: solid elements (.msh, .vtk, .vtu, .mesh, .veg, .inp) or a closed surface (.stl, .obj, .ply, .off)" });
   private readonly scale = element("select");
   private readonly modes = element("input", { type: "number", attributes: { min: "1", max: "2000", value: "200" } });
   private readonly fields = new MaterialFields();
@@ -40,7 +40,7 @@ export class MeshUpload {
     this.section = section(
       "Import a mesh",
       false,
-      element("p", { class: "secondary", text: "Drop a tetrahedral mesh onto the page, or choose a file (.msh of Gmsh, .vtk). Surface meshes (.obj, .stl) need a volume mesh first: Gmsh or fTetWild make one." }),
+      element("p", { class: "secondary", text: "Drop a mesh onto the page, or choose a file: solid elements (Gmsh, VTK, VTU, MEDIT, Vega, Abaqus), or a closed surface (STL, OBJ, PLY, OFF, glTF), which is filled with about 2,000 nodes." }),
       button,
       input,
     );

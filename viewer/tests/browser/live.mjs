@@ -87,15 +87,15 @@ export const liveCases = [
       await page.waitForSelector('[aria-label="Resume (Space)"]');
       const paused = await waitForStop(page);
       await page.keyboard.press(".");
-      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step > step, paused.step);
+      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame?.step > step, paused.step);
       const once = await waitForStop(page);
       await page.keyboard.press(".");
-      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step > step, once.step);
+      await page.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame?.step > step, once.step);
       const { step } = await waitForStop(page);
       assert(step === once.step + 1, `one step went ${step - once.step}`);
       await page.keyboard.press("Space");
       await page.keyboard.press("[");
-      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before + 5, step);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame?.step > before + 5, step);
       assert((await page.inputValue(".toolbar select")) === "2", "not slower");
 
       const { generation } = await latestFrame(page);
@@ -126,7 +126,7 @@ export const liveCases = [
       await page.waitForSelector(".banner", { state: "hidden" });
       await waitForScene(page);
       const { step } = await latestFrame(page);
-      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before, step);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame?.step > before, step);
       assert(again.url !== undefined, "no server");
     },
   },
@@ -141,7 +141,7 @@ export const liveCases = [
       await two.waitForSelector("text=2 viewers");
       const a = await latestFrame(one);
       // The same scene, a little later.
-      await two.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame.step >= step, a.step);
+      await two.waitForFunction((step) => window.palpate.sceneView.graphs[0].frame?.step >= step, a.step);
       assert((await latestFrame(two)).generation === a.generation, "another generation");
       assertNoConsoleErrors(one);
       assertNoConsoleErrors(two);
@@ -161,7 +161,7 @@ export const liveCases = [
       await setHidden(true);
       const { step } = await waitForStop(page);
       await setHidden(false);
-      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before, step);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame?.step > before, step);
       assertNoConsoleErrors(page);
     },
   },
@@ -203,7 +203,7 @@ export const liveCases = [
       await page.waitForTimeout(2500);
       assert((await page.locator(".notification.error").count()) === 1, "reported more than once");
       const { step } = await latestFrame(page);
-      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before + 50, step);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame?.step > before + 50, step);
       await screenshot(page, "garbage");
       assertNoConsoleErrors(page);
     },

@@ -21,7 +21,7 @@ export const reconstructionCases = [
       await modal.mouse.move(x, y);
       await modal.mouse.down();
       await modal.mouse.move(x - 25, y - 35, { steps: 3 });
-      await modal.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.some((d) => Math.hypot(...d.force) > 0.01));
+      await modal.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.some((d) => Math.hypot(...d.force) > 0.01));
       await modal.waitForTimeout(500);
       await modal.keyboard.press("Space");
       await modal.waitForSelector('[aria-label="Resume (Space)"]');

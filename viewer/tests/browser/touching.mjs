@@ -7,10 +7,10 @@ import { join } from "node:path";
 import { assert, waitForRest, waitForScene, latestFrame, assertNoConsoleErrors, screenshot, pixelOf } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
-const touching = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.some((d) => d.mode !== "inactive"));
+const touching = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.some((d) => d.mode !== "inactive"));
 const pressed = (page, least = 0.02) =>
-  page.waitForFunction((f) => window.palpate.sceneView.graphs[0].frame.devices.some((d) => Math.hypot(...d.force) > f), least);
-const released = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.every((d) => d.mode === "inactive"));
+  page.waitForFunction((f) => window.palpate.sceneView.graphs[0].frame?.devices.some((d) => Math.hypot(...d.force) > f), least);
+const released = (page) => page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.every((d) => d.mode === "inactive"));
 
 function currentShape(page) {
   return page.evaluate(() => {
@@ -75,7 +75,7 @@ export const touchCases = [
       await page.mouse.down();
       await touching(page);
       await page.mouse.move(x + 40, y - 260, { steps: 12 });
-      await page.waitForFunction((height) => window.palpate.sceneView.graphs[0].frame.objects[0].pose[1] > height + 0.008, pose[1]);
+      await page.waitForFunction((height) => window.palpate.sceneView.graphs[0].frame?.objects[0].pose[1] > height + 0.008, pose[1]);
       const held = await latestFrame(page);
       assert(held.devices.some((d) => d.mode === "held" && d.force > 0.05), `nothing is held: ${JSON.stringify(held.devices)}`);
       await page.waitForTimeout(500);
@@ -89,8 +89,11 @@ export const touchCases = [
       await page.mouse.down();
       await page.mouse.move(160, 150, { steps: 4 });
       await page.mouse.up();
-      const to = await camera();
-      assert(Math.hypot(...from.map((v, k) => v - to[k])) > 0.02, "the view does not rotate");
+      // The view rotates, in one of the next pictures.
+      await page.waitForFunction((from) => {
+        const to = window.palpate.sceneView.orbit.camera.position.toArray();
+        return Math.hypot(...from.map((v, k) => v - to[k])) > 0.02;
+      }, from);
       assert((await latestFrame(page)).devices.every((d) => d.mode === "inactive"), "rotating the view touched something");
       assertNoConsoleErrors(page);
     },
@@ -145,7 +148,7 @@ export const touchCases = [
       const [a, b] = [await pixelOf(page, -0.35, 0), await pixelOf(page, 0.35, 0)];
       await touch("touchStart", [a]);
       await touch("touchStart", [a, b]);
-      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.filter((d) => d.mode !== "inactive").length === 2);
+      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.filter((d) => d.mode !== "inactive").length === 2);
       for (let i = 1; i <= 8; i++) {
         await touch("touchMove", [
           { x: a.x + 3 * i, y: a.y },
@@ -153,7 +156,7 @@ export const touchCases = [
         ]);
         await page.waitForTimeout(60);
       }
-      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame.devices.filter((d) => Math.hypot(...d.force) > 0.02).length === 2);
+      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.filter((d) => Math.hypot(...d.force) > 0.02).length === 2);
       assert((await page.locator(".force-readout .number").count()) === 2, "not two force readouts");
       await screenshot(page, "pinch");
       await touch("touchEnd", []);

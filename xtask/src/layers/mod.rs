@@ -21,6 +21,7 @@ pub const FLOORS: &[&str] = &[
     "error",
     "bounded_vec",
     "spatial",
+    "dot_products",
     "energy",
     "disjoint_sets",
     "sleep",

@@ -7,6 +7,8 @@ pub mod devices;
 pub mod export;
 pub mod guard;
 pub mod inspect;
+pub mod materials;
+pub mod mesh;
 pub mod record;
 pub mod recover;
 pub mod render;

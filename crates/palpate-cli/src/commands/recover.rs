@@ -4,8 +4,8 @@ use crate::failure::Failure;
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
 use palpate_export::AtomicFile;
-use palpate_fem::read_regular_file;
 use palpate_haptics::log::Recovered;
+use palpate_mesh::read_regular_file;
 use serde_json::json;
 use std::path::PathBuf;
 

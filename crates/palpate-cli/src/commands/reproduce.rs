@@ -1,4 +1,4 @@
-//! `palpate reproduce`: the paper's table and figures, made again.
+//! `palpate reproduce`: the paper's table and figures, made again, and its statements answered.
 
 use crate::failure::Failure;
 use crate::progress::Bars;
@@ -8,13 +8,13 @@ use clap::{Args, value_parser};
 use palpate_reproduce::{Effort, Options, Part};
 use std::path::PathBuf;
 
-/// Make the paper's table and figures again, and measure what it claims
+/// Make the paper's table and figures again, and answer each of its statements
 ///
-/// Records the paper's cube, and writes a page (report.html, which needs nothing else) that begins with what the paper reports beside
-/// what was measured: Table 1, figures 2 and 3, the arrival of the wave over its threshold, the passivity of the samples, the agreement
-/// of both forms of the response, the cost of direct convolution, figure 5(a), a fall in real time, and figure 5(b), two devices in
-/// processes of their own that shake the cube over links for 10 s; both as pictures from their logs, which a browser draws. Beside it
-/// the numbers as CSV, the logs, the pictures and the scenes. Takes a few minutes.
+/// Records the paper's cube, and writes a page (report.html, which needs nothing else) that begins with a row for each statement and figure of
+/// the paper: what it says, what came out, the command. Its sections: figure 1 and Table 1; figures 2 and 3 with the arrival of the wave;
+/// the passivity of the samples; the agreement of both forms of the response; motion; cost, with finite elements beside it; figure 5(a),
+/// a fall in real time; figures 4 and 5(b), two devices in processes of their own that shake the cube over links, on R[s] and in modal form; the images of figure 5
+/// are drawn from their logs by a browser. Beside the page lie the numbers as CSV, the logs, the images and the scenes. Takes a few minutes.
 #[derive(Args)]
 #[command(after_help = "For example:
   palpate reproduce -o report                      # everything
@@ -47,6 +47,7 @@ pub fn reproduce(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|e| Failure(format!("palpate can't be run in a process of its own: {e}")))?;
     let parts = if arguments.only.is_empty() { &Part::ALL[..] } else { &arguments.only };
     let options = Options {
+        commit: option_env!("PALPATE_COMMIT"),
         output: arguments.output.clone(),
         program,
         browser: arguments.browser.clone(),

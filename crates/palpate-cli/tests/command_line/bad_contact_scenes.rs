@@ -264,6 +264,7 @@ fn bad_meshes_of_obstacles_are_named() {
     workplace.write("bad.obj", format!("{corners}f 1 2\n"));
     workplace.write("short.stl", [b'x'; 100]);
     workplace.write("empty.stl", "solid\nendsolid\n");
+    workplace.write("bad.off", "OFF\n1 1 0\n");
     workplace.write(
         "surface.msh",
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n$Elements\n1\n\
@@ -271,11 +272,8 @@ fn bad_meshes_of_obstacles_are_named() {
     );
     for (file, error) in [
         ("no.obj", "cannot read mesh no.obj: No such file or directory (os error 2)"),
-        (
-            "cow.ply",
-            "cow.ply is no mesh that palpate reads: give a closed surface (.obj, .stl) or a body of tetrahedra (.msh, \
-             .vtk)",
-        ),
+        ("cow.ply", "cannot read mesh cow.ply: No such file or directory (os error 2)"),
+        ("bad.off", "bad.off: line 2: expected a vertex, found the end of the file"),
         (
             "open.obj",
             "open.obj: an obstacle's mesh is open at the edge between nodes 0 and 1: it needs an inside and an outside",
@@ -288,7 +286,10 @@ fn bad_meshes_of_obstacles_are_named() {
              triangles has 101058054084 bytes, not 100",
         ),
         ("empty.stl", "empty.stl: line 2: the file has no triangles"),
-        ("surface.msh", "surface.msh: the mesh has no tetrahedra; give a surface as .obj or .stl"),
+        (
+            "surface.msh",
+            "surface.msh: the mesh has no solid elements; give a surface as .obj, .stl, .ply or .off",
+        ),
     ] {
         let error_found =
             run(&workplace, "sphere = { radius = 0.02 }", &format!("mesh = {{ file = \"{file}\" }}"));
@@ -322,7 +323,7 @@ fn outputs_of_one_run_are_two_files_and_none_of_its_inputs() {
 }
 
 #[test]
-fn a_patch_that_shows_the_mesh_and_a_table_that_nothing_touches_get_a_warning() {
+fn a_patch_that_shows_the_mesh_and_a_table_that_leaves_something_out_get_a_warning() {
     let workplace = workplace();
     let warnings = |scene: String| {
         workplace.write("scene.toml", scene);
@@ -338,8 +339,8 @@ fn a_patch_that_shows_the_mesh_and_a_table_that_nothing_touches_get_a_warning() 
         assert_eq!(
             warnings(SCENE.replacen("patch_radius = 0.23", patch, 1)),
             format!(
-                "warning: device \"finger\" touches with a patch of {shown} m, less than 6 mean edges of \"cube\": its finite \
-                 elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
+                "warning: device \"finger\" touches with a patch of {shown} m, less than 6 edges of the mesh on 100 % of \
+                 \"cube\": its finite elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
                  {smooth} it does not\n"
             )
         );
@@ -347,14 +348,22 @@ fn a_patch_that_shows_the_mesh_and_a_table_that_nothing_touches_get_a_warning() 
     assert_eq!(warnings(SCENE.replacen("patch_radius = 0.23", "patch_radius = 0", 1)), "");
 
     let mut arguments = [&["record", "box:0.1x0.1x0.1/2x2x2"], &CUBE[2..12]].concat();
-    arguments.extend(["--duration", "0.05", "--dense", "cube.zarr"]);
+    arguments.extend(["--duration", "0.05", "--dense", "cube.zarr", "--output", "same.palp"]);
     workplace.succeed(&arguments);
-    let table = SCENE.replacen("cube.palp", "cube.zarr", 1);
-    let warning =
-        "warning: the object \"cube\" uses a recorded table: it can be held, but nothing else touches it\n";
+    let points = SCENE.replacen("patch_radius = 0.23", "patch_radius = 0", 1);
+    let table = points.replacen("cube.palp", "cube.zarr", 1);
+    let warning = "warning: the table of \"cube\" stands alone: contacts are searched for on its undeformed surface, and forces may be off \
+                   by some per cent where it deforms much; name its recording too: recording = \"….palp\", table = \"….zarr\"\n";
     assert_eq!(warnings(table.clone()), warning);
     let (alone, _) = table.split_once("[[plane]]").expect("a plane");
     assert_eq!(warnings(alone.to_string()), "");
+    let both =
+        points.replacen("\"cube.palp\"", "\"same.palp\"\nresponse = \"fir\"\ntable = \"cube.zarr\"", 1);
+    assert_eq!(
+        warnings(both),
+        "warning: the table of \"cube\" ends after 0.05 s, when the slowest mode still has 89 % of its amplitude: what a force does \
+         later is lost, and energy with it; record it with --duration 1.6, or damp the body more\n"
+    );
 }
 
 /// Kinds and parts of the warnings of a run, as JSON has them.

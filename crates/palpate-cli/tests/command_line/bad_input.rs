@@ -246,7 +246,10 @@ fn damaged_recordings_are_refused_wherever_the_damage_is() {
 fn a_failed_recording_says_why_and_leaves_what_was_there() {
     let workplace = Workplace::new();
     workplace.write("out.palp", "an older recording");
-    workplace.write("surface.stl", "solid\nendsolid\n");
+    let facet =
+        "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    workplace.write("surface.stl", format!("solid\n{facet}endsolid\n"));
+    workplace.write("notes.txt", "Dear diary\n");
     workplace.write("broken.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0\n$EndNodes\n");
     let before = workplace.files();
     let record = |source: &str, more: &[&str]| {
@@ -296,8 +299,22 @@ fn a_failed_recording_says_why_and_leaves_what_was_there() {
     );
     assert_eq!(
         record("surface.stl", &material),
-        "\"surface.stl\" is no mesh that palpate reads: give a Gmsh file (.msh), a VTK legacy file (.vtk), \
-         box:LXxLYxLZ/NXxNYxNZ or sphere:RADIUS/N"
+        "surface.stl: the surface is open: 3 edges belong to one triangle only, about holes of 100 % of its area, and at most 5 % can be \
+         closed: close it, or give a sheet a thickness, in the program that made it"
+    );
+    assert_eq!(
+        with(&["--cell-size", "0.01"]),
+        "box:0.1x0.1x0.1/2x2x2: a cell size is for surfaces, and this has its tetrahedra already: leave --cell-size out"
+    );
+    assert_eq!(
+        record("notes.txt", &material),
+        "notes.txt: the file begins with 'Dear diary', and is of no mesh format that palpate knows: expected Gmsh (.msh), VTK (.vtk, \
+         .vtu), TetGen (.node with .ele), MEDIT (.mesh, .meshb), Vega (.veg) or Abaqus (.inp), or a surface as STL, OBJ, PLY, OFF or \
+         glTF"
+    );
+    assert_eq!(
+        record(cube, &[]),
+        "region '0' has no material in the mesh file: give --young, --poisson and --density, --material, or --materials"
     );
     assert_eq!(
         record("no.msh", &material),

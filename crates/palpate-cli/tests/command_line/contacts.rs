@@ -221,7 +221,7 @@ fn a_held_point_may_have_a_coupling_too() {
 fn a_cube_meets_obstacles_of_every_shape() {
     let workplace = workplace();
     // A box of 8 cm, its faces in every format, centred at the origin.
-    let mesh = palpate_fem::mesh::box_mesh([0.08; 3], [1; 3]).expect("a good box");
+    let mesh = palpate_mesh::box_mesh([0.08; 3], [1; 3]).expect("a good box");
     let triangles = mesh.boundary();
     let mut obj: String = mesh.nodes.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
     let mut stl = String::from("solid box\n");

@@ -111,7 +111,7 @@ fn a_recorded_sphere_has_the_counts_and_mass_of_its_mesh() {
     {
         assert_eq!(recording[key], count, "{key}");
     }
-    let mesh = palpate_fem::mesh::ball_mesh(0.05, 3).expect("a good ball");
+    let mesh = palpate_mesh::ball_mesh(0.05, 3).expect("a good ball");
     let volume = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|node| mesh.nodes[node as usize]);
         (b - a).cross(c - a).dot(d - a) / 6.0

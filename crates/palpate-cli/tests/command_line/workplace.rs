@@ -214,7 +214,7 @@ impl Table {
 /// A bar of 0.2 × 0.1 × 0.1 m as a Gmsh 2.2 file: its halves are the volumes `soft` (1) and `stiff` (2), its left end
 /// the surface `foot`.
 pub fn gmsh_bar() -> String {
-    let mesh = palpate_fem::mesh::box_mesh([0.2, 0.1, 0.1], [4, 2, 2]).expect("a good box");
+    let mesh = palpate_mesh::box_mesh([0.2, 0.1, 0.1], [4, 2, 2]).expect("a good box");
     let x = |node: &u32| mesh.nodes[*node as usize].x;
     let mut elements = Vec::new();
     for triangle in mesh.boundary() {

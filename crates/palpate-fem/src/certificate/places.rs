@@ -37,7 +37,7 @@ pub(super) struct Place {
 /// Points spread over the surface by farthest-point sampling, points near the last of them, and patches. A fixed node has no compliance
 /// to compare, so none is sampled.
 pub(super) fn places(system: &System, surface: &Surface, surface_nodes: &[u32]) -> Vec<Place> {
-    let movable = |node: usize| !system.is_fixed(3 * surface_nodes[node] as usize);
+    let movable = |node: usize| !system.holds_node(surface_nodes[node]);
     let positions = &surface.positions;
     let candidates: Vec<usize> = (0..positions.len()).filter(|&node| movable(node)).collect();
     let mut nearest: Vec<f64> = positions.iter().map(|p| p.length()).collect();

@@ -1,15 +1,16 @@
 //! The element matrices by polynomial order.
 
 use super::elasticity::{Elasticity, ElementMatrices};
-use super::{tet4, tet10};
+use super::{curved, tet4, tet10};
 use glam::DVec3;
+use palpate_mesh::QuadraticTet;
 
 /// Polynomial order of the tetrahedral elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ElementOrder {
     /// Four nodes and constant strain. Locks for Poisson's ratios near 0.5.
     Linear,
-    /// Ten nodes: corners and the middles of the edges. Edges are straight.
+    /// Ten nodes: corners, and one on each edge. Edges are straight where it is in the middle, or else curved (isoparametric).
     Quadratic,
 }
 
@@ -22,11 +23,19 @@ impl ElementOrder {
         }
     }
 
-    /// Element matrices for the given corners [m].
-    pub(crate) fn matrices(self, corners: [DVec3; 4], elasticity: Elasticity) -> ElementMatrices {
-        match self {
-            Self::Linear => tet4::matrices(corners, elasticity),
-            Self::Quadratic => tet10::matrices(corners, elasticity),
+    /// Element matrices for the given nodes [m]: four corners, and six nodes on the edges for quadratic elements.
+    pub(crate) fn matrices(self, nodes: &[DVec3], elasticity: &Elasticity) -> ElementMatrices {
+        let corners = [nodes[0], nodes[1], nodes[2], nodes[3]];
+        match (self, nodes.first_chunk()) {
+            (Self::Quadratic, Some(&nodes)) => {
+                let tet = QuadraticTet(nodes);
+                if tet.is_straight() {
+                    tet10::matrices(corners, elasticity)
+                } else {
+                    curved::matrices(&tet, elasticity)
+                }
+            }
+            _ => tet4::matrices(corners, elasticity),
         }
     }
 }
@@ -35,6 +44,7 @@ impl ElementOrder {
 mod tests {
     use super::*;
     use crate::element::EDGES;
+    use crate::element::elasticity::tests::{LAMBDA, MU, RUBBER};
     use glam::DMat3;
 
     const CORNERS: [DVec3; 4] = [
@@ -43,7 +53,6 @@ mod tests {
         DVec3::new(0.2, 0.9, 0.1),
         DVec3::new(0.0, 0.3, 1.4),
     ];
-    const RUBBER: Elasticity = Elasticity { lambda: 3.0, mu: 0.7, density: 2.0 };
 
     fn nodes(order: ElementOrder) -> Vec<DVec3> {
         let mut nodes = CORNERS.to_vec();
@@ -54,7 +63,8 @@ mod tests {
     }
 
     fn energy(order: ElementOrder, displacement: impl Fn(DVec3) -> DVec3) -> f64 {
-        let (k, nodes) = (order.matrices(CORNERS, RUBBER).stiffness, nodes(order));
+        let nodes = nodes(order);
+        let k = order.matrices(&nodes, &RUBBER).stiffness;
         let n = nodes.len();
         let u: Vec<_> = nodes.iter().map(|&x| displacement(x)).collect();
         (0..n * n).map(|at| 0.5 * u[at / n].dot(k[at] * u[at % n])).sum()
@@ -79,7 +89,7 @@ mod tests {
         let strain = DMat3::from_cols_array_2d(&[[0.1, 0.2, -0.1], [0.2, -0.3, 0.4], [-0.1, 0.4, 0.5]]);
         let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
         let squares: f64 = strain.to_cols_array().iter().map(|e| e * e).sum();
-        let exact = volume() * (0.5 * RUBBER.lambda * trace * trace + RUBBER.mu * squares);
+        let exact = volume() * (0.5 * LAMBDA * trace * trace + MU * squares);
         for order in [ElementOrder::Linear, ElementOrder::Quadratic] {
             let stored = energy(order, |x| strain * x);
             assert!((stored / exact - 1.0).abs() < 1e-13, "{order:?}: {stored} {exact}");
@@ -92,7 +102,7 @@ mod tests {
         // V/20·(Σx_i² + (Σx_i)²).
         let x: Vec<f64> = CORNERS.iter().map(|c| c.x).collect();
         let (sum, squares): (f64, f64) = (x.iter().sum(), x.iter().map(|x| x * x).sum());
-        let exact = 2.0 * (RUBBER.lambda + 2.0 * RUBBER.mu) * volume() / 20.0 * (squares + sum * sum);
+        let exact = 2.0 * (LAMBDA + 2.0 * MU) * volume() / 20.0 * (squares + sum * sum);
         let stored = energy(ElementOrder::Quadratic, |x| DVec3::X * x.x * x.x);
         assert!((stored / exact - 1.0).abs() < 1e-13, "{stored} {exact}");
     }
@@ -105,7 +115,8 @@ mod tests {
         let exact =
             RUBBER.density * volume() / 20.0 * (cross + x.iter().sum::<f64>() * y.iter().sum::<f64>());
         for order in [ElementOrder::Linear, ElementOrder::Quadratic] {
-            let (mass, nodes) = (order.matrices(CORNERS, RUBBER).mass, nodes(order));
+            let nodes = nodes(order);
+            let mass = order.matrices(&nodes, &RUBBER).mass;
             let n = nodes.len();
             let got: f64 = (0..n * n).map(|at| nodes[at / n].x * mass[at] * nodes[at % n].y).sum();
             assert!((got / exact - 1.0).abs() < 1e-13, "{order:?}: {got} {exact}");

@@ -4,7 +4,7 @@
 //! λ_aλ_b, since λ_a = λ_a·Σλ, so every N is a quadratic form Σ Q_ab λ_aλ_b, and
 //! ∇N = 2Σ Q_ab λ_a ∇λ_b is linear in λ.
 
-use super::elasticity::{Elasticity, ElementMatrices, stiffness_block};
+use super::elasticity::{Elasticity, ElementMatrices};
 use super::tet4::gradients;
 use glam::{DMat3, DVec3};
 
@@ -12,10 +12,10 @@ use glam::{DMat3, DVec3};
 pub(crate) const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
 /// Symmetric matrix Q of a quadratic form in the barycentric coordinates.
-type QuadraticForm = [[f64; 4]; 4];
+pub(super) type QuadraticForm = [[f64; 4]; 4];
 
 /// Symmetric matrix Q of each shape function.
-fn shape_functions() -> [QuadraticForm; 10] {
+pub(super) fn shape_functions() -> [QuadraticForm; 10] {
     let mut forms = [[[0.0; 4]; 4]; 10];
     for (a, form) in forms[..4].iter_mut().enumerate() {
         // 2λ_a² − λ_a·Σ_b λ_b.
@@ -61,10 +61,10 @@ fn mass_coefficients() -> [[f64; 10]; 10] {
 }
 
 /// Stiffness [N/m] and consistent mass [kg].
-pub(super) fn matrices(corners: [DVec3; 4], elasticity: Elasticity) -> ElementMatrices {
+pub(super) fn matrices(corners: [DVec3; 4], elasticity: &Elasticity) -> ElementMatrices {
     static COEFFICIENTS: std::sync::LazyLock<[[f64; 10]; 10]> = std::sync::LazyLock::new(mass_coefficients);
     let (gradients, volume) = gradients(corners);
-    let Elasticity { lambda, mu, density } = elasticity;
+    let density = elasticity.density;
 
     // ∇N_i = Σ_a λ_a·gradient_coefficients[i][a].
     let gradient_coefficients = shape_functions()
@@ -75,7 +75,7 @@ pub(super) fn matrices(corners: [DVec3; 4], elasticity: Elasticity) -> ElementMa
         for a in 0..4 {
             // The block is bilinear: integrate one side first.
             let weighted: DVec3 = (0..4).map(|b| gradient_coefficients[j][b] * pair_integral(a, b)).sum();
-            stiffness += stiffness_block(gradient_coefficients[i][a], weighted, lambda, mu);
+            stiffness += elasticity.block(gradient_coefficients[i][a], weighted);
         }
         matrices.stiffness.push(stiffness * volume);
         matrices.mass.push(density * volume * COEFFICIENTS[i][j]);

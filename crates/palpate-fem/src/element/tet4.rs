@@ -1,6 +1,6 @@
 //! The linear tetrahedron: constant strain, M_ij = ρV(1 + δ_ij)/20.
 
-use super::elasticity::{Elasticity, ElementMatrices, stiffness_block};
+use super::elasticity::{Elasticity, ElementMatrices};
 use glam::{DMat3, DVec3};
 
 /// Gradients of the barycentric coordinates [1/m] and the signed volume [m³].
@@ -15,12 +15,12 @@ pub(super) fn gradients([a, b, c, d]: [DVec3; 4]) -> ([DVec3; 4], f64) {
 }
 
 /// Stiffness [N/m] and consistent mass [kg].
-pub(super) fn matrices(corners: [DVec3; 4], elasticity: Elasticity) -> ElementMatrices {
+pub(super) fn matrices(corners: [DVec3; 4], elasticity: &Elasticity) -> ElementMatrices {
     let (gradients, volume) = gradients(corners);
-    let Elasticity { lambda, mu, density } = elasticity;
+    let density = elasticity.density;
     let mut matrices = ElementMatrices::default();
     for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
-        matrices.stiffness.push(stiffness_block(gradients[i], gradients[j], lambda, mu) * volume);
+        matrices.stiffness.push(elasticity.block(gradients[i], gradients[j]) * volume);
         matrices.mass.push(density * volume / 20.0 * if i == j { 2.0 } else { 1.0 });
     }
     matrices

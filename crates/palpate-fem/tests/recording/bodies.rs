@@ -2,8 +2,8 @@
 
 use faer::{Mat, Side};
 use palpate::{Damping, ResidualCompliance};
-use palpate_fem::mesh::{Mesh, Region, box_mesh};
 use palpate_fem::{ElementOrder, Progress, RecordParameters, RecordedBody};
+use palpate_mesh::{Mesh, Region, box_mesh};
 use palpate_testkit::undamped;
 pub use palpate_testkit::{isotropic, nodes_where};
 use std::sync::OnceLock;
@@ -52,7 +52,7 @@ impl Progress for Listener {
 /// the modes come by block Krylov.
 pub fn two_material_bar(modes: usize) -> (Mesh, RecordParameters) {
     let mut mesh = block([0.2, 0.05, 0.05], [8, 2, 2]);
-    mesh.regions.push(Region { tag: 1, name: None });
+    mesh.regions.push(Region { tag: 1, ..Region::default() });
     for (tet, region) in mesh.tets.iter().zip(&mut mesh.tet_regions) {
         *region = u32::from(tet.iter().map(|&n| mesh.nodes[n as usize].x).sum::<f64>() > 0.0);
     }

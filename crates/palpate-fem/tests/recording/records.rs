@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 use palpate::{Damping, MIN_CONTACT_SAMPLES};
-use palpate_fem::mesh::ball_mesh;
 use palpate_fem::{
-    ElementOrder, Progress, RecordError, RecordParameters, RecordedBody, ResidualChoice, record,
+    ElementOrder, Precision, Progress, RecordError, RecordParameters, RecordedBody, ResidualChoice, record,
 };
+use palpate_mesh::ball_mesh;
 use std::cell::Cell;
 
 use crate::bodies::*;
@@ -252,11 +252,44 @@ fn locking_and_warnings_of_the_mesh_are_reported() {
 #[test]
 fn a_recording_reads_back_as_it_was_written() {
     for residual in [ResidualChoice::Automatic, ResidualChoice::NearField(0.05), ResidualChoice::None] {
-        let (mesh, parameters) = fixed_bar(ElementOrder::Linear, 8);
-        let recording = recorded(mesh, &RecordParameters { residual, ..parameters }).recording;
-        let bytes = recording.to_bytes().expect("a good recording");
-        assert!(palpate::Recording::from_bytes(&bytes).expect("a good recording") == recording);
+        for precision in [Precision::Full, Precision::Compact] {
+            let (mesh, parameters) = fixed_bar(ElementOrder::Linear, 8);
+            let recording = recorded(mesh, &RecordParameters { residual, precision, ..parameters }).recording;
+            let bytes = recording.to_bytes().expect("a good recording");
+            assert!(palpate::Recording::from_bytes(&bytes).expect("a good recording") == recording);
+        }
     }
+}
+
+#[test]
+fn a_compact_recording_has_the_compliances_of_a_full_one() {
+    // Half of 4 steps of 1/16384, and mode shapes, which near the fixed end are small beside their largest.
+    const ROUNDED: f64 = 5e-4;
+    let with = |precision| {
+        let (mesh, parameters) = fixed_bar(ElementOrder::Linear, 8);
+        recorded(mesh, &RecordParameters { precision, ..parameters }).recording
+    };
+    let (full, compact) = (with(Precision::Full), with(Precision::Compact));
+    let (size, compact_size) =
+        (full.to_bytes().expect("good").len(), compact.to_bytes().expect("good").len());
+    assert!(compact_size * 2 < size, "{compact_size} of {size}");
+    let squares = full.modes.angular_frequencies.iter().map(|omega| omega * omega).collect::<Vec<_>>();
+    let compliance = |recording: &palpate::Recording, a: (usize, usize), b: (usize, usize)| {
+        let (row, column) = (recording.modes.row(a.0, a.1), recording.modes.row(b.0, b.1));
+        let modal: f64 = row.iter().zip(column).zip(&squares).map(|((x, y), square)| x * y / square).sum();
+        modal + recording.residual.block(a.0, b.0).col(b.1)[a.1]
+    };
+    let nodes = full.surface.positions.len();
+    let mut largest: f64 = 0.0;
+    for (i, j) in (0..nodes).step_by(3).flat_map(|i| (0..nodes).step_by(5).map(move |j| (i, j))) {
+        for (a, b) in (0..9).map(|at| ((i, at / 3), (j, at % 3))) {
+            let root = (compliance(&full, a, a) * compliance(&full, b, b)).sqrt();
+            if root > 0.0 {
+                largest = largest.max((compliance(&compact, a, b) - compliance(&full, a, b)).abs() / root);
+            }
+        }
+    }
+    assert!((1e-6..ROUNDED).contains(&largest), "{largest}");
 }
 
 #[test]

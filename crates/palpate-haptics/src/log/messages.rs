@@ -249,7 +249,7 @@ pub(super) struct StatusMessage {
 }
 
 /// Timing of the cycle: tick of the clock, lateness [µs], compute time [µs].
-#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TimingMessage {
     pub tick: u64,
     pub late_us: f64,
@@ -273,6 +273,9 @@ pub(super) struct StepMessage {
     pub gravity: Option<Xyz>,
     pub objects: HashMap<String, ObjectMessage>,
     pub energy: EnergyMessage,
+    /// Zero in a log without times.
+    #[serde(default)]
+    pub timing: TimingMessage,
 }
 
 /// Message `/step`, for writing.

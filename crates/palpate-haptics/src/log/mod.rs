@@ -16,9 +16,12 @@
 mod buffer_pool;
 mod messages;
 mod reader;
+mod record_layout;
+mod record_reader;
 mod records;
 mod recovery;
 mod scan;
+mod summary;
 mod writer;
 
 pub use messages::SceneNames;

@@ -1,13 +1,15 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
 use super::messages::{EnergyMessage, SceneNames, StartMessage, StepMessage};
-use super::scan::{RecordReader, Scan, step_channel, step_count, unreadable};
+use super::record_layout;
+use super::record_reader::RecordReader;
+use super::scan::{Scan, unreadable};
+use super::summary::{step_channel, step_count, summary_of};
 use super::writer::START;
 use crate::error::{Error, LogError};
 use glam::DVec3;
-use mcap::Summary;
-use mcap::read::parse_record;
-use mcap::records::{Record, op::MESSAGE};
+use mcap::records::{AttachmentIndex, MetadataIndex, Record, op::MESSAGE};
+use mcap::{McapError, Summary};
 use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -36,7 +38,7 @@ impl<'a> LogReader<'a> {
     /// If they are no MCAP file, or have neither a summary nor a whole step.
     pub fn new(bytes: impl Into<Cow<'a, [u8]>>) -> Result<Self, Error> {
         let bytes = bytes.into();
-        if let Ok(Some(summary)) = Summary::read(&bytes) {
+        if let Some(summary) = summary_of(&bytes) {
             return Ok(Self { end: bytes.len(), bytes, summary, is_cut: false });
         }
         let Scan { summary, whole, .. } = Scan::new(&bytes)?;
@@ -79,8 +81,12 @@ impl<'a> LogReader<'a> {
 
     fn metadata_record(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, Error> {
         let index = self.summary.metadata_indexes.iter().find(|index| index.name == name);
-        let read = |index| mcap::read::metadata(self.bytes(), index).map_err(unreadable);
-        index.map(|index| read(index).map(|metadata| metadata.metadata)).transpose()
+        let read = |index: &MetadataIndex| match record_layout::record_at(self.bytes(), index.offset) {
+            Ok(Record::Metadata(record)) => Ok(record.metadata),
+            Ok(_) => Err(unreadable(McapError::BadIndex)),
+            Err(error) => Err(unreadable(error)),
+        };
+        index.map(read).transpose()
     }
 
     /// Names and contents of the files that the scene was read from.
@@ -88,9 +94,12 @@ impl<'a> LogReader<'a> {
     /// # Errors
     /// If one can't be read.
     pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let read = |index| mcap::read::attachment(self.bytes(), index).map_err(unreadable);
-        let indexes = self.summary.attachment_indexes.iter();
-        indexes.map(|index| read(index).map(|a| (a.name, a.data.into_owned()))).collect()
+        let read = |index: &AttachmentIndex| match record_layout::record_at(self.bytes(), index.offset) {
+            Ok(Record::Attachment { header, data, .. }) => Ok((header.name, data.into_owned())),
+            Ok(_) => Err(unreadable(McapError::BadIndex)),
+            Err(error) => Err(unreadable(error)),
+        };
+        self.summary.attachment_indexes.iter().map(read).collect()
     }
 
     /// Number of steps.
@@ -119,7 +128,7 @@ impl Iterator for Steps<'_> {
             if opcode != MESSAGE {
                 return Ok(None);
             }
-            match parse_record(MESSAGE, data).map_err(unreadable)? {
+            match record_layout::parse(MESSAGE, data).map_err(unreadable)? {
                 Record::Message { header, data } if header.channel_id == channel => {
                     serde_json::from_slice(&data).map(Some).map_err(unreadable)
                 }
@@ -141,6 +150,16 @@ impl Iterator for Steps<'_> {
 }
 
 impl LoggedStep {
+    /// Delay of the cycle after its deadline [µs].
+    pub fn lateness_us(&self) -> f64 {
+        self.message.timing.late_us
+    }
+
+    /// Compute time of the cycle [µs].
+    pub fn compute_us(&self) -> f64 {
+        self.message.timing.compute_us
+    }
+
     /// Input of the step. `modes` are the modes of active devices that hold nothing.
     ///
     /// # Errors

@@ -1,11 +1,13 @@
 //! Recovery of a log that was cut: a whole file with all that can be read.
 
-use super::scan::{RecordReader, Scan, step_count, unreadable};
+use super::record_layout;
+use super::record_reader::RecordReader;
+use super::scan::{Scan, unreadable};
+use super::summary::{step_count, summary_of};
 use super::writer::{CHUNK_BYTES, failed, write_options};
 use crate::error::{Error, LogError};
-use mcap::read::parse_record;
 use mcap::records::{Record, op};
-use mcap::{Attachment, Summary, Writer};
+use mcap::{Attachment, Writer};
 use std::io::{Seek, Write};
 
 /// Content of a recovered log.
@@ -23,7 +25,7 @@ pub struct Recovered {
 /// If the log is whole, is no log, or has no whole step, or if writing fails.
 pub fn recover<W: Write + Seek>(bytes: &[u8], out: W) -> Result<(Recovered, W), Error> {
     let Scan { summary, whole, is_complete } = Scan::new(bytes)?;
-    if is_complete && Summary::read(bytes).is_ok_and(|summary| summary.is_some()) {
+    if is_complete && summary_of(bytes).is_some() {
         return Err(LogError::Whole.into());
     }
     let steps = step_count(&summary);
@@ -53,7 +55,7 @@ fn copy<W: Write + Seek>(writer: &mut Writer<W>, opcode: u8, data: &[u8]) -> Res
     if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT | op::METADATA) {
         return Ok(());
     }
-    let copied = match parse_record(opcode, data).map_err(unreadable)? {
+    let copied = match record_layout::parse(opcode, data).map_err(unreadable)? {
         Record::Schema { header, data } => {
             writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data).map(drop)
         }

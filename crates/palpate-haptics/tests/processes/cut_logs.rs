@@ -4,6 +4,7 @@ use super::logs::{names, write_log};
 use super::scenes::model;
 use palpate::{DeviceMode, State, step};
 use palpate_haptics::log::{LogReader, Recovered, WrittenLog, recover};
+use palpate_testkit::largest_allocation;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
 
 /// Steps of a log of several chunks.
@@ -190,4 +191,88 @@ fn a_disk_that_is_full_at_any_byte_keeps_the_steps_that_are_reported() {
         }
     }
     assert!(counts.iter().any(|steps| (1..STEPS).contains(steps)), "{counts:?}");
+}
+
+#[test]
+fn texts_that_claim_to_be_longer_than_the_file_take_no_memory() {
+    let whole = log();
+    // Every place where the file names the scene's file: its attachment, and the indices of the summary.
+    let places: Vec<usize> =
+        whole.windows(6).enumerate().filter(|(_, text)| text == b"a.toml").map(|(at, _)| at).collect();
+    assert!(places.len() >= 3, "{places:?}");
+    largest_allocation();
+    for at in places {
+        let mut damaged = whole.clone();
+        damaged[at - 4..at].copy_from_slice(&0xf000_0000_u32.to_le_bytes());
+        let read = LogReader::new(&damaged[..]).and_then(|log| log.files().and(log.metadata()));
+        if let Err(error) = read {
+            let text = error.to_string();
+            assert!(
+                text == "the log can't be read: Unexpected end of file"
+                    || text == "the log ends before its first whole step: nothing of it can be read",
+                "{text}"
+            );
+        }
+    }
+    let largest = largest_allocation();
+    assert!(largest < 64 << 20, "{largest}");
+}
+
+/// Reads the parts of a log, and its first steps. Whether it could be read does not matter.
+fn read_all(bytes: &[u8]) {
+    if let Ok(log) = LogReader::new(bytes) {
+        let _ = (log.metadata(), log.files(), log.logged_steps().take(3).count());
+    }
+}
+
+#[test]
+fn records_cut_at_any_byte_are_refused() {
+    let whole = log();
+    let mut start = 8;
+    while start < whole.len() - 8 {
+        let content = start + 9;
+        let length = usize::from_le_bytes(whole[start + 1..content].try_into().expect("8 bytes"));
+        // The fields of a chunk end before its messages. Three bytes less than its checksum are what the parser panics at.
+        for kept in (0..length.min(200)).step_by(3) {
+            let mut damaged = whole[..content + kept].to_vec();
+            damaged[start + 1..content].copy_from_slice(&kept.to_le_bytes());
+            damaged.extend_from_slice(&whole[content + length..]);
+            read_all(&damaged);
+        }
+        start = content + length;
+    }
+}
+
+/// MCAP record.
+fn record(opcode: u8, content: &[&[u8]]) -> Vec<u8> {
+    let content = content.concat();
+    [&[opcode][..], &content.len().to_le_bytes(), &content].concat()
+}
+
+#[test]
+fn a_summary_within_an_attachment_is_none() {
+    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+    let claims_too_much = record(0x0d, &[&[0; 16], &0xf000_0000_u32.to_le_bytes()]);
+    let length = claims_too_much.len().to_le_bytes();
+    let attachment = record(0x09, &[&[0; 24], &length, &claims_too_much, &[0; 4]]);
+    let start = [MAGIC, &record(0x01, &[&[0; 8]]), &attachment].concat();
+    let place = start.len() - 4 - claims_too_much.len();
+    let file = [&start, &record(0x02, &[&place.to_le_bytes(), &[0; 12]])[..], MAGIC].concat();
+    largest_allocation();
+    let error = LogReader::new(&file[..]).err().expect("it has no summary").to_string();
+    assert_eq!(error, "the log ends before its first whole step: nothing of it can be read");
+    let largest = largest_allocation();
+    assert!(largest < 64 << 20, "{largest}");
+}
+
+#[test]
+fn a_record_longer_than_its_chunk_is_an_error() {
+    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+    // A message of 60 bytes in a chunk of 20, without compression or checksum; what follows would fill it.
+    let message = [&[0x05][..], &60_u64.to_le_bytes(), &[0; 11]].concat();
+    let length = (message.len() as u64).to_le_bytes();
+    let chunk = record(0x06, &[&[0; 16], &length, &[0; 4], &[0; 4], &length, &message]);
+    let file = [MAGIC, &record(0x01, &[&[0; 8]]), &chunk, &record(0x0f, &[&[0; 4]]), &[0; 100]].concat();
+    let error = LogReader::new(&file[..]).err().expect("it has no step").to_string();
+    assert_eq!(error, "the log ends before its first whole step: nothing of it can be read");
 }

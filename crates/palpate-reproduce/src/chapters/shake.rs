@@ -1,133 +1,264 @@
-//! Figure 5(b), live: two devices in processes of their own hold the cube's sides over links and shake it at 2 Hz, free of gravity.
+//! Figures 4 and 5(b), live: two devices in processes of their own hold the cube's sides over links and shake it at 2 Hz, free of gravity; on R[s]
+//! and in modal form.
 
+use super::forms::{Form, held_nodes, paper_cycle, record_table};
 use super::shake_figure;
 use crate::chapter::Chapter;
 use crate::error::ReproduceError;
 use crate::findings::Finding;
 use crate::image_series::ImageRenderer;
+use crate::log_steps::{cycle_times_us, logged_steps, longest_again_us};
 use crate::options::Options;
-use crate::page::{Section, code, paragraph, table};
+use crate::page::{Section, code, figure, paragraph, table};
 use crate::processes::{number, report, start};
 use crate::progress::StageProgress;
+use crate::statements::Statement;
+use crate::system_drawing::{System, drawing};
+use crate::verdict::quantity;
+use glam::DVec3;
 use palpate_export::write_atomically;
+use palpate_fem::RecordedBody;
 use serde_json::Value;
+use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::net::{SocketAddr, UdpSocket};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Frequency of the shaking [Hz].
+/// Frequency of the shaking [Hz], and its way to each side [m].
 pub const SHAKES_HZ: f64 = 2.0;
-const SWAY_M: f64 = 0.02;
-/// The devices come before they shake, and shake until the end.
-const SETTLING_S: f64 = 1.0;
-const SECONDS: f64 = 10.0;
+pub const SWAY_M: f64 = 0.05;
+/// The devices come before they shake; the shaking grows, goes on, and stops on the right; the hands then stay, and leave [s].
+const SETTLING_S: f64 = 0.5;
+const GROWING_S: f64 = 1.5;
+const STOP_S: f64 = SETTLING_S + 4.625;
+const LEAVING_S: f64 = 8.0;
+const SECONDS: f64 = 9.0;
 pub const SIDES: [(&str, f64); 2] = [("left", -0.05), ("right", 0.05)];
 
-/// Steps of the runs [s]: the paper's and half of it.
-const STEPS_S: [f64; 2] = [2e-3, 1e-3];
+/// The runs: form of the response and step [s]. The figure is of the first one, at the paper's rate.
+const RUNS: [(Form, f64); 3] = [(Form::Modal, 2e-3), (Form::Table, 2e-3), (Form::Modal, 1e-3)];
 
-/// The log of the run at the faster rate.
+/// Computers of the runs, where the paper has two, and the paper's time of a force [ms].
+const COMPUTERS: f64 = 1.0;
+const PAPER_FORCE_MS: f64 = 0.5;
+
+/// Damping of the cube as `palpate record` takes it: that of `paper_cube::DAMPING`.
+const DAMPING: &str = "2,2e-4";
+
+/// The log of the run that the figure shows.
 pub const LOG_NAME: &str = "figure5b.mcap";
 
-/// A run: the report of the force process, those of the devices.
+/// A run: the report of the force process, those of the devices, times from deadlines to the ends of cycles [µs], sorted, and the longest step
+/// when they are computed again [µs].
 struct Ran {
+    form: Form,
+    step_s: f64,
     scene: Value,
     devices: Vec<Value>,
+    log: PathBuf,
+    cycles_us: Vec<f64>,
+    longest_again_us: f64,
 }
 
-/// Runs at both rates, and the figure from the log of the faster one.
+impl Ran {
+    fn force(&self, key: &str) -> Result<f64, ReproduceError> {
+        number(&self.scene, &format!("/force_process/{key}"))
+    }
+
+    fn deformation(&self, key: &str) -> Result<f64, ReproduceError> {
+        number(&self.scene, &format!("/deformation_process/{key}"))
+    }
+
+    fn name(&self) -> String {
+        format!("{}, {:.0} Hz", self.form.name(), 1.0 / self.step_s)
+    }
+
+    /// Largest of a number of the devices' reports.
+    fn worst(&self, key: &str) -> Result<f64, ReproduceError> {
+        self.devices.iter().map(|device| number(device, key)).try_fold(0.0, |most, own| Ok(own?.max(most)))
+    }
+
+    /// Time from the deadline to the end of a cycle [ms] that a share of the cycles stays within.
+    fn cycle_ms(&self, share: f64) -> f64 {
+        let at = (share * self.cycles_us.len() as f64).ceil() as usize;
+        1e-3 * self.cycles_us.get(at.max(1) - 1).copied().unwrap_or(f64::NAN)
+    }
+
+    fn row(&self) -> Result<Vec<String>, ReproduceError> {
+        let ms = |key: &str| Ok::<f64, ReproduceError>(1e-3 * self.force(&format!("compute_us/{key}"))?);
+        Ok(vec![
+            self.name(),
+            format!("{:.3} / {:.3} / {:.3} ms", ms("p50")?, ms("p999")?, ms("max")?),
+            format!("{:.2} ms", self.cycle_ms(0.999)),
+            format!("{} of {}", self.force("overruns")?, self.force("cycles")?),
+            format!("{:.3} ms", 1e-3 * self.longest_again_us),
+            format!(
+                "{:.1} ms, {:.0} a second",
+                1e-3 * self.deformation("compute_us/p50")?,
+                self.deformation("cycles")? / SECONDS
+            ),
+            format!(
+                "{:.1} / {:.1} ms",
+                1e-3 * self.worst("/answer_us/p50")?,
+                1e-3 * self.worst("/answer_us/p99")?
+            ),
+        ])
+    }
+}
+
+/// The runs, and the figure from the log of the first.
 pub fn chapter(
     options: &Options,
+    body: &RecordedBody,
     renderer: &ImageRenderer,
     progress: &mut dyn StageProgress,
 ) -> Result<Chapter, ReproduceError> {
-    progress.begin("two devices, live", STEPS_S.len() as u64);
+    progress.begin("two devices, live", RUNS.len() as u64 + 1);
     let folder = options.scenes();
     for (name, side) in SIDES {
         write_atomically(&folder.join(format!("{name}.csv")), path(side).as_bytes())?;
     }
-    let mut rows = vec![vec![
-        "the paper, 500 Hz".into(),
-        "0.5 ms at most".into(),
-        "not told".into(),
-        "every cycle within 2 ms".into(),
-        "not told".into(),
-    ]];
-    let mut findings = Vec::new();
-    for (at, step_s) in STEPS_S.into_iter().enumerate() {
-        write_atomically(&folder.join(scene_name(step_s)), scene(step_s).as_bytes())?;
-        let ran = run(&options.program, &folder, step_s)?;
-        rows.push(row(step_s, &ran)?);
-        findings.extend(found(step_s, &ran)?);
+    let nodes = held_nodes(body, &SIDES.map(|(_, side)| DVec3::X * side));
+    let record = record_table(options, (options.effort.cells, "cube"), DAMPING, &nodes)?;
+    let mut runs = Vec::new();
+    for (at, (form, step_s)) in RUNS.into_iter().enumerate() {
         progress.advance(at as u64 + 1);
+        write_atomically(&folder.join(scene_name(form, step_s)), scene(form, step_s).as_bytes())?;
+        runs.push(run(options, form, step_s)?);
     }
     progress.finish();
-    let mut html = paragraph(&format!(
-        "The left and the right side of the cube are held by two devices, each in a process of its own, that reach the force \
-         process over links (QUIC datagrams on this machine) and shake it from side to side at {SHAKES_HZ} Hz by ±{:.0} mm for \
-         {:.0} s. The step is the time from the begin of a cycle to its forces; motion to force is what a device sees from telling \
-         where it is to a force that answers it.",
+    let log = options.output.join(LOG_NAME);
+    let steps = logged_steps(&log)?;
+    let computed = shake_figure::on_table(&log, body, &nodes)?;
+    // A table is not in its log, so its steps are computed again from the motions of the first run.
+    for ran in &mut runs {
+        ran.longest_again_us = match ran.form {
+            Form::Table => computed.longest_us,
+            Form::Modal => longest_again_us(&logged_steps(&ran.log)?),
+        };
+    }
+    let ([modal, on_table], _) = runs.split_at(2) else {
+        return Err(ReproduceError::Measurement("two devices, live: a run is missing".into()));
+    };
+    let figure5b = shake_figure::figure(options, body, (&steps, &computed), renderer, progress)?;
+    let link = format!("{:.1} ms", 1e-3 * modal.worst("/answer_us/p50")?);
+    let system = System {
+        link,
+        force: format!("a force: {:.0} µs", on_table.force("compute_us/p50")?),
+        deformation: format!("{:.0} ms each", 1e-3 * on_table.deformation("compute_us/p50")?),
+    };
+    let mut html = figure(
+        &drawing(&system),
+        "The paper's figure 4, the experimental system, as it is here: three processes on one machine (dashed: one process) joined by QUIC datagrams where the paper has two computers, two PHANToM devices and \
+         TCP/IP. The times are medians of the run on R[s]; that of the links is from telling a motion to receiving a force that answers it.",
+    );
+    html += &paragraph(&format!(
+        "The left and the right side of the cube are held by two devices, each in a process of its own, which shake it from side to side at {SHAKES_HZ} Hz \
+         by ±{:.0} mm without gravity. Hands don't jump: the shaking grows over {GROWING_S} s, goes on, and stops on the right, where the hands stay until they \
+         leave. The deformation process runs beside the force process in every run. R[s] has the paper's 500 samples of 2 ms.",
         1e3 * SWAY_M,
-        SECONDS - SETTLING_S
     ));
-    let head = ["", "step: median / 99.9 %", "motion to force: median / 99 %", "overruns", "force at most"];
-    html += &table("The force process with two devices over links", &head, &rows);
-    let figure = shake_figure::figure(options, renderer, progress)?;
-    html += &figure.html;
+    let mut rows = vec![paper_cycle(7)];
+    rows.extend(runs.iter().map(Ran::row).collect::<Result<Vec<_>, _>>()?);
+    let head = [
+        "",
+        "force: median / 99.9 % / most",
+        "cycle, 99.9 %",
+        "late cycles",
+        "longest step again",
+        "deformation",
+        "motion to force: median / 99 %",
+    ];
+    html += &table(
+        "The force process with two devices over links. Force: from the begin of a cycle to its forces. Cycle: from its deadline to its end, waiting for the core included. \
+         Late: ended after the next deadline. Longest step again: the longest of all steps of the run, each by the least of four times when it is computed again from the log; what takes longer in a run is the machine's doing",
+        &head,
+        &rows,
+    );
+    html += &figure5b.html;
     html += &code(&format!(
-        "palpate run scenes/{} --realtime --duration {SECONDS} --log {LOG_NAME}\npalpate device left --path scenes/left.csv\n\
+        "palpate {}\npalpate run scenes/{} --realtime --duration {SECONDS} --log {LOG_NAME}\npalpate device left --path scenes/left.csv\n\
          palpate device right --path scenes/right.csv\npalpate serve {LOG_NAME}",
-        scene_name(STEPS_S[1])
+        record.join(" "),
+        scene_name(RUNS[0].0, RUNS[0].1)
     ));
-    findings.push(finding(
-        "two hands hold the cube and shake it at 2 Hz",
-        "figure 5(b)",
-        "pictures, no numbers",
-        figure.found,
-    ));
-    let section =
-        Section { id: "shake".into(), heading: "Figure 5(b): two devices, live".into(), body: html };
-    Ok(Chapter { section, data: vec![figure.data], findings })
-}
-
-fn finding(what: &str, place: &'static str, paper: &str, ours: String) -> Finding {
-    Finding { what: what.into(), place, paper: paper.into(), ours, section: "shake" }
-}
-
-/// Findings on the force process.
-fn found(step_s: f64, ran: &Ran) -> Result<Vec<Finding>, ReproduceError> {
-    let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
-    let hertz = 1.0 / step_s;
-    let is_papers = step_s == STEPS_S[0];
-    let (cost, cycle) =
-        if is_papers { ("at most approximately 0.5 ms", "within every cycle of 2 ms") } else { ("", "") };
-    Ok(vec![
-        finding(
-            &format!("computing the forces on two hands, {hertz:.0} Hz"),
-            "section 3.3",
-            cost,
+    let forces = |ran: &Ran| -> Result<String, ReproduceError> {
+        let ms = |key: &str| Ok::<f64, ReproduceError>(1e-3 * ran.force(&format!("compute_us/{key}"))?);
+        Ok(format!(
+            "{}: {:.3} ms median, {:.3} ms in 99.9 %, {:.3} ms at most",
+            ran.name(),
+            ms("p50")?,
+            ms("p999")?,
+            ms("max")?
+        ))
+    };
+    let cycles = |ran: &Ran| -> Result<String, ReproduceError> {
+        Ok(format!(
+            "{}: 99.9 % within {:.2} ms, {} of {} late, where the longest step, computed again, takes {:.3} ms",
+            ran.name(),
+            ran.cycle_ms(0.999),
+            ran.force("overruns")?,
+            ran.force("cycles")?,
+            1e-3 * ran.longest_again_us
+        ))
+    };
+    let deformations = |ran: &Ran| -> Result<String, ReproduceError> {
+        Ok(format!(
+            "{}: {:.1} ms each, {:.0} a second",
+            ran.name(),
+            1e-3 * ran.deformation("compute_us/p50")?,
+            ran.deformation("cycles")? / SECONDS
+        ))
+    };
+    let both = |of: &dyn Fn(&Ran) -> Result<String, ReproduceError>| -> Result<String, ReproduceError> {
+        Ok(format!("{}; {}", of(on_table)?, of(modal)?))
+    };
+    let findings = vec![
+        Finding::measured(Statement::FreeToMove, figure5b.momentum.0, figure5b.momentum.1),
+        Finding::measured(
+            Statement::Figure4,
+            quantity("computers", COMPUTERS, "").at_least(2.0),
             format!(
-                "{:.3} ms median, {:.3} ms in 99.9 %",
-                1e-3 * force("compute_us/p50")?,
-                1e-3 * force("compute_us/p999")?
+                "drawn; one machine, three processes; motion to force {:.1} ms (median)",
+                1e-3 * modal.worst("/answer_us/p50")?
             ),
         ),
-        finding(
-            &format!("the whole force process, {hertz:.0} Hz"),
-            "section 3.3",
-            cycle,
-            format!(
-                "{} of {} cycles late by their own work, {} by the machine",
-                force("own_overruns")?,
-                force("cycles")?,
-                force("overruns")? - force("own_overruns")?
-            ),
+        Finding::measured(
+            Statement::SeparateDeformation,
+            quantity("deformations on R[s]", on_table.deformation("cycles")?, "").at_least(1.0),
+            both(&deformations)?,
         ),
-    ])
+        Finding::measured(Statement::Figure5b, figure5b.found.0, figure5b.found.1),
+        Finding::measured(
+            Statement::ForceTime,
+            quantity("longest step again, R[s]", 1e-3 * on_table.longest_again_us, "ms")
+                .at_most(PAPER_FORCE_MS),
+            format!("{}; on one thread", both(&forces)?),
+        ),
+        Finding::measured(
+            Statement::CycleTime,
+            quantity("late cycles, R[s]", on_table.force("overruns")?, "").at_most(0.0),
+            both(&cycles)?,
+        ),
+    ];
+    let section = Section {
+        id: "shake".into(),
+        heading: "Two devices, live (the paper's figures 4 and 5(b), section 3.3)".into(),
+        body: html,
+    };
+    Ok(Chapter { section, data: figure5b.data, findings })
 }
 
-fn scene_name(step_s: f64) -> String {
-    format!("shake-{:.0}-hz.toml", 1.0 / step_s)
+fn scene_name(form: Form, step_s: f64) -> String {
+    format!("shake-{}-{:.0}-hz.toml", form.word(), 1.0 / step_s)
+}
+
+/// Displacement of the hands to the right [m] at a time of their path [s].
+fn sway(t: f64) -> f64 {
+    let shaken = (t.min(STOP_S) - SETTLING_S).max(0.0);
+    // Half a cosine, which begins and ends without a jump of the speed.
+    let size = 0.5 - 0.5 * (TAU / 2.0 * (shaken / GROWING_S).min(1.0)).cos();
+    SWAY_M * size * (TAU * SHAKES_HZ * shaken).sin()
 }
 
 /// Path of a device as CSV: t,x,y,z.
@@ -135,17 +266,13 @@ fn path(side: f64) -> String {
     let mut text = "t,x,y,z\n".to_string();
     for tick in 0..=((SECONDS * 1e3) as u32) {
         let t = 1e-3 * f64::from(tick);
-        let shaken = (t - SETTLING_S).max(0.0);
-        // It begins without a jump of the speed.
-        let size = SWAY_M * (4.0 * shaken).min(1.0);
-        let x = side + size * (std::f64::consts::TAU * SHAKES_HZ * shaken).sin();
-        let _ = writeln!(text, "{t:.3},{x:.7},0,0");
+        let _ = writeln!(text, "{t:.3},{:.7},0,0", side + sway(t));
     }
     text
 }
 
-fn scene(step_s: f64) -> String {
-    let mut text = format!("step = {step_s}\n\n[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\n");
+fn scene(form: Form, step_s: f64) -> String {
+    let mut text = format!("step = {step_s}\n{}", form.object("cube"));
     for (name, side) in SIDES {
         let _ = write!(
             text,
@@ -157,26 +284,25 @@ fn scene(step_s: f64) -> String {
 }
 
 /// Three processes: the scene, and a device each.
-fn run(program: &Path, folder: &Path, step_s: f64) -> Result<Ran, ReproduceError> {
+fn run(options: &Options, form: Form, step_s: f64) -> Result<Ran, ReproduceError> {
+    let (program, folder): (&Path, _) = (&options.program, options.scenes());
     let failed =
         |e: std::io::Error| ReproduceError::Process(format!("two devices, live: no port is free: {e}"));
     let address = free_port().map_err(failed)?.to_string();
-    let (duration, log) = (SECONDS.to_string(), format!("../{LOG_NAME}"));
-    let mut scene_arguments =
-        vec!["run", "--realtime", "--pictures", "0", "--duration", &duration, "--listen", &address];
-    if step_s == STEPS_S[1] {
-        scene_arguments.extend(["--log", &log]);
-    }
-    let name = scene_name(step_s);
-    scene_arguments.push(&name);
+    let name = scene_name(form, step_s);
+    let log_name =
+        if (form, step_s) == RUNS[0] { LOG_NAME.to_owned() } else { name.replace(".toml", ".mcap") };
+    let (duration, log_from_there) = (SECONDS.to_string(), format!("../{log_name}"));
+    let scene_arguments =
+        ["run", &name, "--realtime", "--duration", &duration, "--listen", &address, "--log", &log_from_there];
     let files = SIDES.map(|(name, _)| (name, format!("{name}.csv")));
-    let mut children = vec![start(program, folder, &scene_arguments)?];
+    let mut children = vec![start(program, &folder, &scene_arguments)?];
     // They leave a second before the scene does.
-    let short = (SECONDS - 1.0).to_string();
+    let short = LEAVING_S.to_string();
     for (name, file) in &files {
         let arguments =
             ["device", name, "--path", file, "--connect", &address, "--duration", &short, "--wait", "10"];
-        match start(program, folder, &arguments) {
+        match start(program, &folder, &arguments) {
             Ok(device) => children.push(device),
             Err(failure) => {
                 children.iter_mut().for_each(|child| drop(child.kill()));
@@ -187,7 +313,18 @@ fn run(program: &Path, folder: &Path, step_s: f64) -> Result<Ran, ReproduceError
     let reports: Result<Vec<Value>, ReproduceError> = children.into_iter().map(report).collect();
     let mut reports =
         reports.map_err(|failure| ReproduceError::Process(format!("two devices, live: {failure}")))?;
-    Ok(Ran { scene: reports.remove(0), devices: reports })
+    let log = options.output.join(&log_name);
+    let mut cycles_us = cycle_times_us(&log)?;
+    cycles_us.sort_by(f64::total_cmp);
+    Ok(Ran {
+        form,
+        step_s,
+        scene: reports.remove(0),
+        devices: reports,
+        log,
+        cycles_us,
+        longest_again_us: f64::NAN,
+    })
 }
 
 /// A port of this machine that nobody listens on.
@@ -195,16 +332,18 @@ fn free_port() -> std::io::Result<SocketAddr> {
     UdpSocket::bind("127.0.0.1:0")?.local_addr()
 }
 
-fn row(step_s: f64, ran: &Ran) -> Result<Vec<String>, ReproduceError> {
-    let force = |key: &str| number(&ran.scene, &format!("/force_process/{key}"));
-    let worst = |key: &str| -> Result<f64, ReproduceError> {
-        ran.devices.iter().map(|device| number(device, key)).try_fold(0.0, |most, own| Ok(own?.max(most)))
-    };
-    Ok(vec![
-        format!("palpate, {:.0} Hz", 1.0 / step_s),
-        format!("{:.3} / {:.3} ms", 1e-3 * force("compute_us/p50")?, 1e-3 * force("compute_us/p999")?),
-        format!("{:.1} / {:.1} ms", 1e-3 * worst("/answer_us/p50")?, 1e-3 * worst("/answer_us/p99")?),
-        format!("{} of {}, {} by themselves", force("overruns")?, force("cycles")?, force("own_overruns")?),
-        format!("{:.2} N", worst("/force_max_n")?),
-    ])
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shaking_grows_smoothly_stops_on_the_right_and_the_hands_stay() {
+        assert_eq!((sway(0.0), sway(SETTLING_S)), (0.0, 0.0));
+        assert!((sway(STOP_S) - SWAY_M).abs() < 1e-12, "{}", sway(STOP_S));
+        assert_eq!(sway(STOP_S), sway(LEAVING_S));
+        let fastest = (0..9000)
+            .map(|k| (sway(1e-3 * f64::from(k + 1)) - sway(1e-3 * f64::from(k))).abs())
+            .fold(0.0, f64::max);
+        assert!(fastest < 1.1e-3 * SWAY_M * TAU * SHAKES_HZ, "{fastest} m in a millisecond");
+    }
 }

@@ -11,6 +11,9 @@ const COMPARISON_DASHES: [&str; 3] = ["5 5", "1 5", "5 5 1 5"];
 const SHAPES: [&str; 4] =
     ["m-4 0a4 4 0 1 0 8 0a4 4 0 1 0-8 0z", "m-3.5-3.5h7v7h-7z", "m0-5 4.6 8h-9.2z", "m0-5 5 5-5 5-5-5z"];
 
+/// Marker shapes of series without a line: a slim triangle that points down to the value, and one that points up.
+const POINTERS: [&str; 2] = ["m0 0-3.5-11h7z", "m0 0-3.5 11h7z"];
+
 /// Number of `--series-…` colours of the page.
 const COLOURS: usize = 6;
 
@@ -33,6 +36,7 @@ pub fn looks(series: &[Series]) -> impl Iterator<Item = Look> {
             Style::Line => (LINE_DASHES[of_its_style % LINE_DASHES.len()], ""),
             Style::Dashed => (COMPARISON_DASHES[of_its_style % COMPARISON_DASHES.len()], ""),
             Style::LineAndMarkers => ("", SHAPES[of_its_style % SHAPES.len()]),
+            Style::Markers => ("", POINTERS[of_its_style % POINTERS.len()]),
         };
         Look { style: one.style, colour: at % COLOURS + 1, dashes, shape }
     })
@@ -50,6 +54,9 @@ impl Look {
     }
 
     fn curve(&self, runs: &[Vec<DVec2>]) -> String {
+        if self.style == Style::Markers {
+            return String::new();
+        }
         let class = if self.style == Style::Line { "line" } else { "thin" };
         let dashes = match self.dashes {
             "" => String::new(),

@@ -57,6 +57,8 @@ pub enum Style {
     LineAndMarkers,
     /// A thin line with short dashes, for comparison.
     Dashed,
+    /// A marker at each point, without a line.
+    Markers,
 }
 
 /// A thin line at one value of an axis, across the chart.
@@ -307,7 +309,7 @@ mod tests {
     #[test]
     fn everything_stays_within_the_view_box_whatever_the_data() {
         let wild = vec![(1e-9, -1e300), (f64::NAN, 1.0), (1e12, f64::INFINITY), (3.0, 4.0), (0.0, 1e-200)];
-        for style in [Style::Line, Style::LineAndMarkers, Style::Dashed] {
+        for style in [Style::Line, Style::LineAndMarkers, Style::Dashed, Style::Markers] {
             for (x, y) in [(Scale::Linear, Scale::Log), (Scale::Log, Scale::Linear)] {
                 for points in [wild.clone(), vec![(1.0, 1.0); 3], vec![(5.0, 2.0)], Vec::new()] {
                     let mut chart = chart(x, y, vec![series(points, style); 9]);

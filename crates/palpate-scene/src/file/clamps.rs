@@ -6,7 +6,7 @@ use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneClamp;
 use glam::DVec3;
-use palpate::{Clamp, ModelObject, Pose, ResponseForm, Surface, SurfacePoint};
+use palpate::{Clamp, ModelObject, Pose, Surface, SurfacePoint};
 use palpate_haptics::Columns;
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
@@ -27,11 +27,6 @@ pub(super) fn read_clamp(
     let (name, wanted) = (entry.name.get_ref(), entry.object.get_ref());
     let number = named_object(source, &entry.object, object_names)?;
     let object = &objects[number];
-    if !matches!(object.response, ResponseForm::Modal) {
-        let message =
-            format!("{wanted:?} uses a table, which knows points only: a clamp needs response = \"modal\"");
-        return source.fail(entry.object.span(), SceneErrorKind::Conflict, "object", message);
-    }
     let surface = &object.recording.surface;
     let (triangles, span) = match (&entry.face, &entry.region) {
         (Some(face), None) => {

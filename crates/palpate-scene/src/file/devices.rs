@@ -8,17 +8,22 @@ use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use crate::warning::{Warning, WarningKind};
-use palpate::{AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm};
+use palpate::{
+    AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm, Surface,
+};
 use palpate_haptics::{Columns, MotionLimits};
 use toml::Spanned;
 
 /// Distance of a device's start from its held point that gets a warning, as a share of the diagonal.
 const FAR_START: f64 = 0.01;
 
-/// Patch radii, in mean edges, below which quadratic and linear elements are too stiff by more than 2 to 3 % (measured,
+/// Patch radii, in edges around them, below which quadratic and linear elements are too stiff by more than 2 to 3 % (measured,
 /// docs/contact.md).
 const SMOOTH_PATCH: f64 = 3.0;
 const SMOOTH_PATCH_LINEAR: f64 = 6.0;
+
+/// Share of a surface's area with longer edges that gets no warning: a few long triangles are no coarse place.
+const COARSE_SHARE: f64 = 0.05;
 
 /// Parameters of a device for the model, with a check of keys that exclude one another.
 pub(super) fn read_parameters(source: &Source, device: &DeviceEntry) -> Result<DeviceParameters, SceneError> {
@@ -129,10 +134,6 @@ fn read_force(
             "mode = \"force\" needs path = { file = \"…\" } with the columns t,fx,fy,fz: the force on the object in world axes [N]",
         );
     };
-    if let (Some(radius), ResponseForm::Fir(_)) = (&device.patch_radius, &objects[grasp.object].response) {
-        let message = "patch_radius needs response = \"modal\": a table knows points only";
-        return source.fail(radius.span(), SceneErrorKind::Conflict, "patch_radius", message);
-    }
     let path = source.motion_path(entry, Columns::Force)?;
     let applied = AppliedForce { grasp, force: path.at(0.0).position };
     let device = SceneDevice {
@@ -306,22 +307,52 @@ fn far_start(device: &SceneDevice, objects: &[ModelObject]) -> Option<Warning> {
 
 fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]) -> Vec<Warning> {
     let radius = device.parameters.patch_radius;
-    let touched =
-        objects.iter().zip(names).filter(|(object, _)| matches!(object.response, ResponseForm::Modal));
-    touched
+    objects
+        .iter()
+        .zip(names)
         .filter_map(|(object, name)| {
             let edges =
                 if object.recording.metadata.mesh.order == 2 { SMOOTH_PATCH } else { SMOOTH_PATCH_LINEAR };
-            let smooth = edges * object.recording.surface.mean_edge();
-            (radius > 0.0 && radius < smooth).then(|| {
+            let local = local_edges(&object.recording.surface);
+            let area_above = |edge: f64| local.iter().filter(|(own, _)| *own > edge).map(|(_, area)| area).sum::<f64>();
+            let share = area_above(radius / edges) / area_above(0.0);
+            (radius > 0.0 && share > COARSE_SHARE).then(|| {
+                // The last edge above which there is more than that share.
+                let enough = local.partition_point(|(own, _)| area_above(*own) > COARSE_SHARE * area_above(0.0));
+                let smooth = edges * local.get(enough).map_or(0.0, |(own, _)| *own);
                 let message = format!(
-                    "device {:?} touches with a patch of {radius:.2e} m, less than {edges} mean edges of {name:?}: its finite \
-                     elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
+                    "device {:?} touches with a patch of {radius:.2e} m, less than {edges} edges of the mesh on {:.0} % of {name:?}: its \
+                     finite elements are too stiff for that by more than 2 %, and the feel shows the mesh; with patch_radius = \
                      {smooth:.2e} it does not",
-                    device.name
+                    device.name,
+                    100.0 * share
                 );
                 Warning::new(WarningKind::SmallPatch, &device.name, message)
             })
         })
         .collect()
+}
+
+/// Mean length [m] of the edges around each triangle, those of all triangles at its corners, and its area [m²]; ascending.
+fn local_edges(surface: &Surface) -> Vec<(f64, f64)> {
+    let corners = |triangle: &[u32; 3]| triangle.map(|node| surface.positions[node as usize]);
+    let mut at_node = vec![(0.0, 0.0); surface.positions.len()];
+    for triangle in &surface.triangles {
+        let [a, b, c] = corners(triangle);
+        let mean = ((b - a).length() + (c - b).length() + (a - c).length()) / 3.0;
+        for &node in triangle {
+            let (sum, count) = &mut at_node[node as usize];
+            (*sum, *count) = (*sum + mean, *count + 1.0);
+        }
+    }
+    let local = |triangle: &[u32; 3]| {
+        let [a, b, c] = corners(triangle);
+        let edge =
+            triangle.map(|node| at_node[node as usize].0 / at_node[node as usize].1).iter().sum::<f64>()
+                / 3.0;
+        (edge, 0.5 * (b - a).cross(c - a).length())
+    };
+    let mut edges: Vec<_> = surface.triangles.iter().map(local).collect();
+    edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+    edges
 }

@@ -13,7 +13,6 @@ mod source;
 use crate::error::{SceneError, SceneErrorKind};
 use crate::initial_checks::check_start;
 use crate::scene::Scene;
-use crate::warning::Warning;
 use glam::DVec3;
 use keys::{Gravity, RETIRED_KEYS, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, ResponseForm, RigidCompliance, RigidIntegrator, Support};
@@ -67,7 +66,7 @@ pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -
 
 /// Reads the text of a scene file that is stored at `stored`.
 pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError> {
-    let bytes = palpate_fem::read_regular_file(stored)
+    let bytes = palpate_mesh::read_regular_file(stored)
         .map_err(|error| SceneError::io("read the scene", path, &error))?;
     String::from_utf8(bytes).map_err(|_| {
         let message = "it is not a text file; a scene is TOML (docs/scene.md)";
@@ -178,7 +177,7 @@ fn assemble(
     let probe = |entry| places::read_probe(source, entry, &objects, &object_names);
     let probes = file.probe.iter().map(probe).collect::<Result<_, _>>()?;
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
-    let held_only: Vec<Warning> = objects::objects_with_tables(&objects, &object_names).collect();
+    warnings.extend(objects::short_tables(&objects, &object_names));
     let inputs = inputs(source, file);
     let mut scene = Scene {
         model: Arc::new(model),
@@ -193,8 +192,8 @@ fn assemble(
         choices,
         inputs,
     };
-    if scene.can_touch() {
-        scene.warnings.extend(held_only);
+    if scene.can_touch() || !scene.clamps.is_empty() {
+        scene.warnings.extend(objects::prepare_tables(source, &file.object, &objects)?);
     }
     scene.warnings.extend(check_start(&scene, &objects));
     Ok(scene)

@@ -133,7 +133,7 @@ const FRICTION: f64 = 0.5;
 /// # Errors
 /// When the file cannot be read, or is no path.
 pub fn read_path(path: &Path, columns: Columns) -> Result<MotionPath, SceneError> {
-    let text = palpate_fem::read_regular_text(path)
+    let text = palpate_mesh::read_regular_text(path)
         .map_err(|error| SceneError::io("read the path", path, &error))?;
     MotionPath::parse(&text, columns).map_err(|what| {
         SceneError::of_file(SceneErrorKind::Path, path, format!("path {}: {what}", path.display()))

@@ -290,15 +290,12 @@ pub fn paper_cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
     RecordingRecipe {
         source: paper_cube::source(cells),
         scale: 1.0,
+        cell_size: None,
         material: paper_cube::material(),
         order: ElementOrder::Linear,
         modes,
         damping: paper_cube::DAMPING,
     }
-}
-
-fn material(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Material {
-    Material { region: String::new(), young_pa, poisson, density_kg_m3 }
 }
 
 /// Recipe by its name in a built-in scene.
@@ -307,7 +304,7 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
     let of =
         |source: &str, young: f64, poisson: f64, density: f64, modes: usize, beta: f64| RecordingRecipe {
             source: source.into(),
-            material: material(young, poisson, density),
+            material: Material::isotropic(young, poisson, density),
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta },
             ..cube()

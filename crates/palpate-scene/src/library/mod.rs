@@ -61,12 +61,14 @@ pub struct SettingsChange {
 /// Mesh to be recorded for a new scene.
 #[derive(Debug, Clone)]
 pub struct MeshUpload {
-    /// File name; its extension decides the format.
+    /// File name; the content tells the format.
     pub name: String,
     /// Content of the file.
     pub bytes: Vec<u8>,
     /// Scale to metres.
     pub scale: f64,
+    /// Side of the cells that a surface is filled with [m]; none for the default.
+    pub cell_size: Option<f64>,
     /// Material of the whole mesh.
     pub material: Material,
     /// Number of modes.
@@ -280,23 +282,16 @@ impl SceneLibrary {
     /// Records an uploaded mesh, and opens a scene in which it falls on a floor.
     ///
     /// # Errors
-    /// When it is no mesh of tetrahedra, or cannot be recorded.
+    /// When it is no mesh of solid elements nor a closed surface, or cannot be recorded.
     pub fn record_upload(
         &self,
         upload: MeshUpload,
         progress: &mut dyn Progress,
     ) -> Result<OpenedScene, SceneError> {
         let refused = |message: String| SceneError::new(SceneErrorKind::Mesh, message);
-        let MeshUpload { name, bytes, scale, material, modes } = upload;
+        let MeshUpload { name, bytes, scale, cell_size, material, modes } = upload;
         let file = Path::new(&name).file_name().filter(|name| !name.is_empty());
         let Some(file) = file else { return Err(refused("the mesh file has no name".into())) };
-        let kind = Path::new(file).extension().map(|kind| kind.to_string_lossy().to_lowercase());
-        if matches!(kind.as_deref(), Some("obj" | "stl")) {
-            return Err(refused(format!(
-                "{name} is a surface, and has no inside that could deform: give tetrahedra (.msh of Gmsh, .vtk), as Gmsh, \
-                 TetGen or fTetWild make them of it"
-            )));
-        }
         let number = {
             let mut current = self.lock();
             current.uploads += 1;
@@ -309,6 +304,7 @@ impl SceneLibrary {
         let recipe = RecordingRecipe {
             source: source.display().to_string(),
             scale,
+            cell_size,
             material,
             order: ElementOrder::Quadratic,
             modes,
@@ -319,7 +315,13 @@ impl SceneLibrary {
             let message = error.message.replace(&format!("{}/", folder.display()), "");
             SceneError { message, ..error }
         };
-        let path = recipe.record_cached(&folder, progress).map_err(without_folder)?;
+        // Repairs are told where the scene is described.
+        let mesh = recipe.mesh(progress);
+        let checked = mesh.and_then(|mesh| mesh.checked().map_err(|error| recipe.refused(error)));
+        let mesh = checked.map_err(&without_folder)?;
+        let repairs = mesh.warnings.clone();
+        let recorded = recipe.record_mesh(mesh, progress).map_err(without_folder)?;
+        let path = recipe.store(&recorded, &folder)?;
         let recording = read_recording(&path)?;
         let lowest =
             recording.surface.positions.iter().map(|position| position.y).fold(f64::INFINITY, f64::min);
@@ -333,7 +335,9 @@ impl SceneLibrary {
         let current = Current {
             id: None,
             title: file.to_string_lossy().into_owned(),
-            about: "Your own mesh. Press and drag it.".into(),
+            about: [&["Your own mesh. Press and drag it.".to_owned()], repairs.as_slice()]
+                .concat()
+                .join(" Note: "),
             path: folder.join("scene.toml"),
             text: Table::new(),
             recipes: HashMap::from([(path, recipe)]),

@@ -18,7 +18,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, Recording, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, floor, object_at, scene};
 use std::sync::Arc;
 

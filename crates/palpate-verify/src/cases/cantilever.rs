@@ -18,8 +18,8 @@ use glam::DVec3;
 use palpate::{
     Damping, DeviceInput, DeviceParameters, Grasp, InitialDeformation, Input, Model, Recording, State, step,
 };
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::{ElementOrder, RecordExtent, RecordParameters};
+use palpate_mesh::box_mesh;
 use palpate_testkit::{GRAVITY_M_S2, nodes_where, object_at, recorded, scene, smoothstep, undamped};
 use std::sync::Arc;
 

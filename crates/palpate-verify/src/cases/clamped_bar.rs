@@ -12,7 +12,7 @@ use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
 use palpate::{Clamp, Input, Model, ModelParameters, Pose, Recording, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, half_extent, object_at, smoothstep};
 use std::sync::Arc;
 

@@ -9,8 +9,8 @@ use palpate::{
     step,
 };
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::{ball_mesh, box_mesh};
 use palpate_fem::paper_cube::{self, CELLS};
+use palpate_mesh::{ball_mesh, box_mesh};
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, PAPER_MATERIAL, floor, object_at};
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, floor, object_at, scene};
 
 const LENGTH: f64 = 0.1;

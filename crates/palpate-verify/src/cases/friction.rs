@@ -6,7 +6,7 @@ use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
 use palpate::{Input, ModelObject, Pose, Recording, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, scene};
 use std::sync::Arc;
 

@@ -17,7 +17,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, Model, ModelParameters, Obstacle, Pose, Recording, Shape, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::{Mesh, box_mesh};
+use palpate_mesh::{Mesh, box_mesh};
 use palpate_testkit::{ElasticMaterial, object_at, smoothstep};
 use std::f64::consts::PI;
 use std::sync::Arc;

@@ -33,6 +33,7 @@ mod shaken_block;
 mod sphere;
 mod spinning_block;
 mod stack;
+mod tables;
 
 use crate::case::Case;
 
@@ -198,6 +199,11 @@ pub const CASES: &[Case] = &[
         name: "faces",
         about: "flat faces on one another: St Venant's two bars; cubes on cubes, aligned, shifted and turned",
         compute: aligned_faces::aligned_faces,
+    },
+    Case {
+        name: "tables",
+        about: "six bodies thrown, on one another and pressed, by convolution with tables against the modal form",
+        compute: tables::tables,
     },
     Case {
         name: "let-out",

@@ -9,7 +9,7 @@ use palpate::{
     SurfacePoint, step,
 };
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, object_at};
 use std::f64::consts::{PI, TAU};
 

@@ -9,8 +9,8 @@ use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Input, Recording, State, step};
-use palpate_fem::mesh::box_mesh;
 use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, RecordedBody};
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, PAPER_MATERIAL, object_at, recorded, scene, smoothstep};
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceParameters, Grasp, Input, Model, ModelParameters, Recording, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, PAPER_MATERIAL, object_at, smoothstep};
 use std::sync::Arc;
 

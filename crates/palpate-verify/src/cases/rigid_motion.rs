@@ -8,7 +8,7 @@ use palpate::{
     ObjectStart, Pose, Recording, State, Twist, inertia_in_world, step,
 };
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{Random, recorded, undamped};
 use std::sync::Arc;
 

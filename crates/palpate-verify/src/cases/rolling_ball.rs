@@ -16,7 +16,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, Model, ModelParameters, Recording, State, Twist, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::ball_mesh;
+use palpate_mesh::ball_mesh;
 use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, smoothstep, with_stiffness_damping};
 use std::f64::consts::PI;
 use std::sync::Arc;

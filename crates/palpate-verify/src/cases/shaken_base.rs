@@ -6,7 +6,7 @@ use crate::run_invariants::RunInvariants;
 use glam::DVec3;
 use palpate::{Input, Model, ModelParameters, State, step};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{ElasticMaterial, object_at};
 use std::f64::consts::{PI, TAU};
 

@@ -8,7 +8,7 @@ use palpate::{
     step,
 };
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::{object_at, recorded, undamped};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

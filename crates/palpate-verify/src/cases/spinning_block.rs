@@ -18,7 +18,7 @@ use glam::{DQuat, DVec3};
 use palpate::{Input, ObjectStart, Pose, Recording, State, Twist, step};
 use palpate::{Model, ModelObject, ModelParameters};
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::box_mesh;
+use palpate_mesh::box_mesh;
 use palpate_testkit::ElasticMaterial;
 use std::f64::consts::PI;
 use std::sync::Arc;

@@ -33,8 +33,7 @@ pub(crate) struct SweepAndPrune {
 
 impl SweepAndPrune {
     pub(super) fn new(objects: &[Object]) -> Self {
-        let is_touchable = |at: &u32| objects[*at as usize].is_touchable();
-        let order = (0..objects.len() as u32).filter(is_touchable).collect();
+        let order = (0..objects.len() as u32).collect();
         Self { order, boxes: vec![[DVec3::ZERO; 2]; objects.len()], axis: 0, widest: 0.0 }
     }
 

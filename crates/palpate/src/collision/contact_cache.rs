@@ -40,10 +40,7 @@ impl Bodies<'_> {
 
     /// Free a contact point.
     fn release(&mut self, object: usize, slot: usize) {
-        let own = &mut self.states[object];
-        let view =
-            &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
-        own.points.remove(view, slot);
+        self.states[object].points.remove(slot);
     }
 
     /// Put a contact point at a location: the known one, or a new one; none when the object has no room.

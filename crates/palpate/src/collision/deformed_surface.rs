@@ -72,7 +72,7 @@ pub(crate) struct DeformedSurface<'a> {
     /// Spring forces of the residual compliance, and those of them that act at points, by nodes.
     spring_forces: &'a [SpringForce],
     tip_springs: &'a [u32],
-    nodal: Option<&'a NodalForces>,
+    nodal: &'a NodalForces,
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
     own: OwnContacts,
     flat_radius: f64,
@@ -240,10 +240,7 @@ impl<'a> DeformedSurface<'a> {
         if self.footprint != Footprint::Point {
             return modal + self.spring_forces.iter().map(displacement).sum::<DVec3>();
         }
-        let mut position = modal;
-        if let Some(nodal) = self.nodal {
-            position += nodal.residual_displacement(self.body, self.spring_forces, node);
-        }
+        let mut position = modal + self.nodal.residual_displacement(self.body, self.spring_forces, node);
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
         for (own, own_displacement) in own() {
             let is_beside = |force: &&SpringForce| {

@@ -187,6 +187,10 @@ impl Solver {
         report.islands_out_of_budget += u32::from(is_out_of_budget);
         let round_off = island.round_off();
         // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
+        // Displacements are those of the forces, to the last change.
+        for &body in &self.bodies {
+            problem.states[body as usize].points.least_move = 0.0;
+        }
         let is_solved = (is_solved || is_out_of_budget) && {
             problem.project_forces(&self.members);
             self.evaluate_to(problem, round_off) <= UNSOLVED * island.reach

@@ -121,20 +121,14 @@ impl Object {
         radii.retain(|radius| *radius > 0.0);
         radii.sort_unstable_by(f64::total_cmp);
         radii.dedup();
-        let is_modal = matches!(response, Response::Modal(_));
-        let max_samples = if is_modal { rules.max_contact_samples } else { usize::MAX };
-        if !is_modal && !rules.cells.is_empty() {
-            return fail(
-                "clamps",
-                "uses a table, which knows points only: a clamp needs the modal form".into(),
-            );
-        }
         let is_same = |other: &&Self| {
             let has_clamps = !rules.cells.is_empty() || other.body.cells() > 0;
-            Arc::ptr_eq(&other.body.recording, &recording) && other.is_touchable() == is_modal && !has_clamps
+            Arc::ptr_eq(&other.body.recording, &recording) && !has_clamps
         };
         let known = others.iter().find(is_same).map(|other| other.body.clone());
-        let body = known.unwrap_or_else(|| Arc::new(Body::new(recording, &radii, max_samples, rules.cells)));
+        let body = known.unwrap_or_else(|| {
+            Arc::new(Body::new(recording, &radii, rules.max_contact_samples, rules.cells))
+        });
         Ok(Self {
             body,
             response,
@@ -146,19 +140,19 @@ impl Object {
         })
     }
 
-    /// Whether contacts are searched for on it: a table knows only points that are chosen beforehand.
-    pub(crate) fn is_touchable(&self) -> bool {
+    /// Whether its response is in modal form.
+    pub(crate) fn is_modal(&self) -> bool {
         matches!(self.response, Response::Modal(_))
     }
 
     /// Whether gravity may change: a table of a body with fixed nodes tells how it sags under a constant one.
     pub(crate) fn allows_gravity_change(&self) -> bool {
-        self.inertia.is_some() || self.is_touchable()
+        self.inertia.is_some() || self.is_modal()
     }
 
     /// Whether its base may move: that of a body with fixed nodes, in modal form.
     pub(crate) fn has_movable_base(&self) -> bool {
-        self.inertia.is_none() && self.is_touchable()
+        self.inertia.is_none() && self.is_modal()
     }
 
     /// Rigid motion over a step of h [s] under contact force [N], torque [N·m] and weight; a fixed body stays.

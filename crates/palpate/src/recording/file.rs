@@ -4,6 +4,7 @@
 //! a BLAKE3 hash over it and over every tensor (name, shape, bytes; names ascending). The reader
 //! checks the hash, then every length, index and number, and allocates no more than the file's size.
 
+use super::quantised::{QuantisedCompliance, shape_steps};
 use super::residual::lower_triangle;
 use super::sample_levels::LevelLists;
 use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
@@ -21,8 +22,11 @@ use safetensors::{Dtype, SafeTensors, View};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-/// Version of the file layout that is written; every earlier one is readable.
+/// Version of the layout with mode shapes of 64 bits.
 pub const FORMAT_VERSION: u32 = 1;
+
+/// Version of the compact layout, with mode shapes of 16 bits in whole steps.
+pub const COMPACT_FORMAT_VERSION: u32 = 2;
 
 /// Metadata entry `palpate`. The metadata's text is kept verbatim, because the hash covers it.
 #[derive(Serialize, Deserialize)]
@@ -60,6 +64,12 @@ fn tensor_f64(shape: &[usize], values: impl Iterator<Item = f64>) -> Tensor {
 fn tensor_f32(shape: &[usize], values: &[f32]) -> Tensor {
     let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     Tensor { dtype: Dtype::F32, shape: shape.to_vec(), bytes }
+}
+
+/// Tensor of whole steps.
+fn tensor_i16(shape: &[usize], values: impl Iterator<Item = f64>) -> Tensor {
+    let bytes = values.flat_map(|steps| (steps as i16).to_le_bytes()).collect();
+    Tensor { dtype: Dtype::I16, shape: shape.to_vec(), bytes }
 }
 
 fn tensor_u32(shape: &[usize], values: impl Iterator<Item = u32>) -> Tensor {
@@ -108,13 +118,27 @@ impl Recording {
             ("surface.source_nodes", tensor_u32(&[n], self.surface.source_nodes.iter().copied())),
             ("modes.angular_frequencies", tensor_f64(&[m], self.modes.angular_frequencies.iter().copied())),
             ("modes.damping_ratios", tensor_f64(&[m], self.modes.damping_ratios.iter().copied())),
-            ("modes.mode_shapes", tensor_f64(&[3 * n, m], self.modes.mode_shapes.iter().copied())),
         ];
+        let shapes = &self.modes.mode_shapes;
+        if self.metadata.format_version == COMPACT_FORMAT_VERSION {
+            let steps = shape_steps(shapes, m);
+            let whole = shapes.iter().zip(steps.iter().cycle()).map(|(shape, step)| shape / step);
+            tensors.push(("modes.mode_shapes", tensor_i16(&[3 * n, m], whole)));
+            tensors.push(("modes.steps", tensor_f64(&[m], steps.iter().copied())));
+        } else {
+            tensors.push(("modes.mode_shapes", tensor_f64(&[3 * n, m], shapes.iter().copied())));
+        }
         match &self.residual {
             ResidualCompliance::None => {}
             ResidualCompliance::Whole(blocks) => {
                 let packed = lower_triangle(blocks);
                 tensors.push(("residual.packed", tensor_f32(&[packed.len()], &packed)));
+            }
+            ResidualCompliance::Quantised(quantised) => {
+                let bytes = quantised.compressed();
+                tensors.push(("residual.scales", tensor_f32(&[3 * n], &quantised.scales)));
+                let shape = [bytes.len()].to_vec();
+                tensors.push(("residual.quantised", Tensor { dtype: Dtype::U8, shape, bytes }));
             }
             ResidualCompliance::NearField(near) => {
                 tensors.push(("residual.radius", tensor_f64(&[1], [near.radius].into_iter())));
@@ -173,8 +197,8 @@ impl Recording {
         };
         let header: Header = parse(json)?;
         let VersionOnly { format_version } = parse(header.metadata.get())?;
-        if format_version != FORMAT_VERSION {
-            let (found, supported) = (format_version, FORMAT_VERSION);
+        if !(FORMAT_VERSION..=COMPACT_FORMAT_VERSION).contains(&format_version) {
+            let (found, supported) = (format_version, COMPACT_FORMAT_VERSION);
             return Err(RecordingError::UnsupportedVersion { found, supported }.into());
         }
         let file = SafeTensors::deserialize(bytes).map_err(container)?;
@@ -203,13 +227,23 @@ impl Recording {
         let modes = ModalBasis {
             angular_frequencies: tensors.f64("modes.angular_frequencies")?,
             damping_ratios: tensors.f64("modes.damping_ratios")?,
-            mode_shapes: tensors.f64("modes.mode_shapes")?,
+            mode_shapes: if metadata.format_version == COMPACT_FORMAT_VERSION {
+                let steps = tensors.f64("modes.steps")?;
+                let shapes = tensors.i16("modes.mode_shapes")?.zip(steps.iter().cycle());
+                shapes.map(|(whole, step)| f64::from(whole) * step).collect()
+            } else {
+                tensors.f64("modes.mode_shapes")?
+            },
         };
         let residual = if tensors.has("residual.packed") {
             ResidualCompliance::from_lower_triangle(
                 surface.positions.len(),
                 &tensors.f32("residual.packed")?,
             )?
+        } else if tensors.has("residual.quantised") {
+            let scales = tensors.f32("residual.scales")?;
+            let compressed = tensors.bytes("residual.quantised", Dtype::U8)?;
+            ResidualCompliance::Quantised(QuantisedCompliance::from_compressed(scales, compressed)?)
         } else if tensors.has("residual.blocks") {
             ResidualCompliance::NearField(NearField {
                 radius: tensors.f64("residual.radius")?.first().copied().unwrap_or(f64::NAN),
@@ -256,8 +290,9 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> 
             "surface.positions" => &[nodes, 3],
             "surface.triangles" => &[count("surface.triangles"), 3],
             "surface.source_nodes" => &[nodes],
-            "modes.angular_frequencies" | "modes.damping_ratios" => &[modes],
+            "modes.angular_frequencies" | "modes.damping_ratios" | "modes.steps" => &[modes],
             "modes.mode_shapes" => &[nodes.saturating_mul(3), modes],
+            "residual.scales" => &[nodes.saturating_mul(3)],
             "residual.radius" => &[1],
             "residual.offsets" => &[nodes.saturating_add(1)],
             "residual.nodes" => &[blocks],
@@ -313,6 +348,11 @@ impl Tensors<'_> {
     fn f32(&self, name: &str) -> Result<Vec<f32>, RecordingError> {
         let bytes = self.bytes(name, Dtype::F32)?;
         Ok(bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
+    }
+
+    fn i16(&self, name: &str) -> Result<impl Iterator<Item = i16>, RecordingError> {
+        let bytes = self.bytes(name, Dtype::I16)?;
+        Ok(bytes.as_chunks::<2>().0.iter().map(|b| i16::from_le_bytes(*b)))
     }
 
     fn u32(&self, name: &str) -> Result<Vec<u32>, RecordingError> {

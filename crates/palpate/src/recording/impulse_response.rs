@@ -1,10 +1,11 @@
 //! Recorded impulse response R[s], a table (section 3.1 of the paper).
 //!
 //! R[s] [m/N], s = 0 … T−1, is the displacement of every observed degree of freedom s steps after a unit
-//! force was **held for one step** on a touchable one, elastic part only. A column holds all samples of one
-//! touchable degree of freedom, sample after sample, each with all observed ones, little-endian.
+//! force was **held for one step** on a touchable one, elastic part only. A column holds the responses to one touchable degree
+//! of freedom: in memory as a convolution reads them ([`Column`]), in a store sample after sample, as they are computed.
 
-use super::carry_movable_weight;
+use super::column::{Column, arrange_column};
+use super::{carry_movable_weight, has_weight};
 use crate::error::{Error, ModelError};
 use crate::surface::{Surface, SurfacePoint};
 use alloc::boxed::Box;
@@ -22,15 +23,6 @@ pub enum Sampling {
     End,
     /// Mean of the displacements in the middle and at the end of the step, as in the paper: not passive.
     Mean,
-}
-
-/// Column of a table, little-endian bytes.
-#[derive(Debug, Clone, Copy)]
-pub enum Column<'a> {
-    /// Single precision.
-    F32(&'a [u8]),
-    /// Double precision.
-    F64(&'a [u8]),
 }
 
 /// Storage of a table's columns: in memory, or in a store that is read on first use.
@@ -74,64 +66,28 @@ pub struct ImpulseResponse {
 
 /// Columns in memory, in double precision.
 pub struct ColumnsInMemory {
-    bytes: Vec<u8>,
-    column_bytes: usize,
-}
-
-impl Column<'_> {
-    /// Number [m/N] at an index, sample·observed + dof.
-    ///
-    /// # Real time
-    #[inline]
-    pub fn at(&self, index: usize) -> f64 {
-        match self {
-            Self::F32(bytes) => f64::from(f32::from_le_bytes(array(&bytes[4 * index..4 * index + 4]))),
-            Self::F64(bytes) => f64::from_le_bytes(array(&bytes[8 * index..8 * index + 8])),
-        }
-    }
-
-    /// Add `scale` times the numbers from an index on to `sum`.
-    ///
-    /// # Real time
-    pub fn add_to(&self, index: usize, scale: f64, sum: &mut [f64]) {
-        match self {
-            Self::F32(bytes) => {
-                let (numbers, _) = bytes[4 * index..4 * (index + sum.len())].as_chunks::<4>();
-                for (s, number) in sum.iter_mut().zip(numbers) {
-                    *s += scale * f64::from(f32::from_le_bytes(*number));
-                }
-            }
-            Self::F64(bytes) => {
-                let (numbers, _) = bytes[8 * index..8 * (index + sum.len())].as_chunks::<8>();
-                for (s, number) in sum.iter_mut().zip(numbers) {
-                    *s += scale * f64::from_le_bytes(*number);
-                }
-            }
-        }
-    }
-}
-
-#[inline]
-fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
-    core::array::from_fn(|i| bytes[i])
+    numbers: Vec<f64>,
+    length: usize,
 }
 
 impl ColumnsInMemory {
-    /// Columns from their numbers [m/N], column after column of `column_length`.
-    pub fn new(values: &[f64], column_length: usize) -> Self {
-        Self { bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(), column_bytes: 8 * column_length }
+    /// Columns from their numbers [m/N], column after column of `length`, each sample after sample.
+    pub fn new(numbers: &[f64], length: usize, samples: usize) -> Self {
+        let columns = numbers.chunks_exact(length);
+        let numbers = columns.flat_map(|column| arrange_column(column, samples)).collect();
+        Self { numbers, length }
     }
 }
 
 impl Debug for ColumnsInMemory {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "ColumnsInMemory({} bytes)", self.bytes.len())
+        write!(f, "ColumnsInMemory({} numbers)", self.numbers.len())
     }
 }
 
 impl ImpulseColumns for ColumnsInMemory {
     fn column_length(&self) -> usize {
-        self.column_bytes / 8
+        self.length
     }
 
     fn prepare(&self, _touchable: usize) -> Result<(), String> {
@@ -139,7 +95,7 @@ impl ImpulseColumns for ColumnsInMemory {
     }
 
     fn column(&self, touchable: usize) -> Column<'_> {
-        Column::F64(&self.bytes[touchable * self.column_bytes..(touchable + 1) * self.column_bytes])
+        Column::F64(&self.numbers[touchable * self.length..(touchable + 1) * self.length])
     }
 }
 
@@ -155,7 +111,7 @@ impl ImpulseResponse {
     /// Whether the displacement of a surface point is held.
     pub fn observes(&self, surface: &Surface, point: &SurfacePoint) -> bool {
         let observed = Self::dof_indices(surface, &self.observed_dofs);
-        surface.corners(point).into_iter().all(|(node, weight)| weight == 0.0 || observed[node].is_some())
+        surface.corners(point).into_iter().filter(has_weight).all(|(node, _)| observed[node].is_some())
     }
 
     /// Check the columns of a surface point and load them into memory, before the point is held in a scene.
@@ -166,7 +122,7 @@ impl ImpulseResponse {
     pub fn prepare(&self, surface: &Surface, point: &SurfacePoint) -> Result<(), Error> {
         let touchable = Self::dof_indices(surface, &self.touchable_dofs);
         let observed = Self::dof_indices(surface, &self.observed_dofs);
-        for (node, _) in surface.corners(point).into_iter().filter(|(_, weight)| *weight != 0.0) {
+        for (node, _) in surface.corners(point).into_iter().filter(has_weight) {
             let Some(columns) = touchable[node].filter(|_| observed[node].is_some()) else {
                 return Err(ModelError::NotTouchable { node: surface.source_nodes[node] }.into());
             };
@@ -179,7 +135,33 @@ impl ImpulseResponse {
         if is_movable { Ok(()) } else { Err(ModelError::FixedPoint.into()) }
     }
 
-    /// Whether corners with barycentric weights can move, by R[0] of their nodes, with the indices of all nodes.
+    /// Check all columns and load them into memory, before a scene in which contacts may come anywhere.
+    ///
+    /// # Errors
+    /// [`ModelError::ImpulseResponse`] for a column that cannot be read.
+    pub fn prepare_all(&self) -> Result<(), Error> {
+        for touchable in 0..self.touchable_dofs.len() {
+            self.columns.prepare(touchable).map_err(|what| ModelError::ImpulseResponse { what })?;
+        }
+        Ok(())
+    }
+
+    /// Memory of all columns [bytes].
+    pub fn bytes(&self) -> u64 {
+        let number = match self.columns.column(0) {
+            Column::F32(_) => 4,
+            Column::F64(_) => 8,
+        };
+        number * self.columns.column_length() as u64 * self.touchable_dofs.len() as u64
+    }
+
+    /// Surface nodes that forces may enter at, and all of them.
+    pub fn touchable_share(&self, surface: &Surface) -> (usize, usize) {
+        let touchable = Self::dof_indices(surface, &self.touchable_dofs);
+        (touchable.iter().flatten().count(), touchable.len())
+    }
+
+    /// Whether corners with barycentric weights can move along every axis, by R[0] of their nodes, with the indices of all nodes.
     ///
     /// # Real time
     pub(crate) fn moves(
@@ -192,7 +174,10 @@ impl ImpulseResponse {
         carry_movable_weight(used, |node| {
             let (Some(columns), Some(rows)) = (touchable[node], observed[node]) else { return false };
             let mut pairs = columns.into_iter().zip(rows);
-            pairs.any(|(column, row)| self.columns.column(column as usize).at(row as usize) > 0.0)
+            pairs.all(|(column, row)| {
+                let column = self.columns.column(column as usize);
+                column.series(row as usize, self.samples).at(0) > 0.0
+            })
         })
     }
 

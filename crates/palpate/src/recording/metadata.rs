@@ -65,11 +65,14 @@ impl Metadata {
             fail(format!("{name} is {value:e}, expected a number from {low:e} to below {high:e}"))
         };
         for material in &self.materials {
-            let Material { region, young_pa, poisson, density_kg_m3 } = material;
+            let Material { region, young_pa, poisson, density_kg_m3, stiffness_pa } = material;
             let name = |key: &str| format!("materials.{key} of the region {region:?}");
             range(&name("young_pa"), *young_pa, f64::MIN_POSITIVE, LARGEST)?;
             range(&name("poisson"), *poisson, -1.0, 0.5)?;
             range(&name("density_kg_m3"), *density_kg_m3, f64::MIN_POSITIVE, LARGEST)?;
+            for entry in stiffness_pa.iter().flatten().flatten() {
+                range(&name("stiffness_pa"), *entry, -LARGEST, LARGEST)?;
+            }
         }
         match self.damping {
             Damping::Rayleigh { alpha, beta } => {
@@ -132,17 +135,28 @@ pub enum Support {
     Fixed,
 }
 
-/// Linear isotropic material.
+/// Linear elastic material.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Region of the mesh; empty when there is one region.
     pub region: String,
-    /// Young's modulus [Pa].
+    /// Young's modulus [Pa]; of an anisotropic material a mean.
     pub young_pa: f64,
-    /// Poisson's ratio [1].
+    /// Poisson's ratio [1]; of an anisotropic material a mean.
     pub poisson: f64,
     /// Density [kg/m³].
     pub density_kg_m3: f64,
+    /// Stiffness matrix [Pa] of an anisotropic material: stress by strain in the order xx, yy, zz, yz, xz, xy with engineering shear
+    /// strains; none for an isotropic one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness_pa: Option<[[f64; 6]; 6]>,
+}
+
+impl Material {
+    /// Isotropic material of a body of one region: Young's modulus [Pa], Poisson's ratio, density [kg/m³].
+    pub const fn isotropic(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Self {
+        Self { region: String::new(), young_pa, poisson, density_kg_m3, stiffness_pa: None }
+    }
 }
 
 /// Damping of the elastic modes. The rigid motion is not damped.
@@ -190,7 +204,7 @@ pub struct MeshCounts {
     pub elements: u64,
     /// 1: linear, 2: quadratic.
     pub order: u32,
-    /// Nodes that are fixed.
+    /// Nodes that are fixed, held along an axis, or on springs.
     pub fixed_nodes: u64,
 }
 

@@ -1,18 +1,22 @@
 //! Recording: responses, surface, mass and certificate of one body, computed offline for the runtime.
 
+mod column;
 mod file;
 mod impulse_response;
 mod metadata;
+mod quantised;
 mod residual;
 mod sample_levels;
 mod validation;
 
-pub use file::FORMAT_VERSION;
-pub use impulse_response::{Column, ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
+pub use column::{Column, ResponseSeries, arrange_column};
+pub use file::{COMPACT_FORMAT_VERSION, FORMAT_VERSION};
+pub use impulse_response::{ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
 pub use metadata::{
     Certificate, CertificateEvent, CertificateLevel, Damping, MassProperties, Material, MeshCounts, Metadata,
     PeakForceError, Provenance, Support,
 };
+pub use quantised::{MAX_QUANTISED_NODES, QuantisedCompliance, round_mode_shape};
 pub(crate) use residual::block_at;
 pub use residual::{NearField, ResidualCompliance};
 
@@ -92,6 +96,14 @@ const LARGEST: f64 = 1e18;
 /// free point's, at a thousandth of an edge.
 const MIN_MOVABLE_WEIGHT: f64 = 1e-3;
 
+/// Barycentric weight [1] up to which a corner counts as round-off: of places that are given with six digits.
+const ROUND_OFF_WEIGHT: f64 = 1e-6;
+
+/// Whether a corner carries more weight than round-off.
+pub(crate) fn has_weight(&(_, weight): &(usize, f64)) -> bool {
+    weight > ROUND_OFF_WEIGHT
+}
+
 /// Whether corners with barycentric weights can move: those of nodes that move carry more than a thousandth.
 fn carry_movable_weight(corners: [(usize, f64); 3], moves: impl Fn(usize) -> bool) -> bool {
     let movable: f64 = corners.into_iter().filter(|&(node, _)| moves(node)).map(|(_, weight)| weight).sum();
@@ -109,12 +121,13 @@ impl Recording {
         }
     }
 
-    /// Whether a surface point can move: its corners are not all fixed nodes, but for a thousandth of their weight.
+    /// Whether a surface point can move along every axis: its corners are not all nodes that are fixed or held along an axis, but for a
+    /// thousandth of their weight.
     ///
     /// # Real time
     pub fn is_movable(&self, point: &crate::surface::SurfacePoint) -> bool {
         let moves = |node: usize| {
-            (0..3).any(|axis| {
+            (0..3).all(|axis| {
                 self.modes.row(node, axis).iter().any(|phi| *phi != 0.0)
                     || self.residual.block(node, node).col(axis)[axis] != 0.0
             })

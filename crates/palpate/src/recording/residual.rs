@@ -1,11 +1,13 @@
 //! Residual compliance S: static compliance of the modes that are not kept.
 //!
-//! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. Whole for small surfaces; for large ones its near field
+//! S = G − Φ·Λ⁻¹·Φᵀ on the surface [m/N], symmetric and positive semi-definite. Whole for small surfaces, in single precision or
+//! [quantised](super::quantised); for large ones its near field
 //! S ∘ ψ(|xᵢ − xⱼ|/r), with Wendland's function ψ(s) = (1 − s)⁴(4s + 1) for s < 1, 0 beyond. ψ
 //! is positive definite in space, so by Schur's product theorem the near field is positive
 //! semi-definite too, and its diagonal is exact (Wendland 1995, Adv. Comput. Math. 4, 389).
 
 use super::LARGEST;
+use super::quantised::QuantisedCompliance;
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
@@ -19,6 +21,8 @@ pub enum ResidualCompliance {
     None,
     /// Node blocks of the lower triangle, block (i, j ≤ i) at i(i+1)/2 + j, nine numbers each, row by row [m/N].
     Whole(Vec<f32>),
+    /// Node blocks of the lower triangle as whole numbers of 16 bits.
+    Quantised(QuantisedCompliance),
     /// Node blocks near the diagonal.
     NearField(NearField),
 }
@@ -47,6 +51,10 @@ impl ResidualCompliance {
                 let block = block_at(blocks, lower_block(i.max(j), i.min(j)));
                 if i >= j { block } else { block.transpose() }
             }
+            Self::Quantised(quantised) => {
+                let block = quantised.lower_block(i.max(j), i.min(j));
+                if i >= j { block } else { block.transpose() }
+            }
             Self::NearField(near) => {
                 let row = near.offsets[i] as usize..near.offsets[i + 1] as usize;
                 match near.nodes[row.clone()].binary_search(&(j as u32)) {
@@ -55,6 +63,11 @@ impl ResidualCompliance {
                 }
             }
         }
+    }
+
+    /// Whether every pair of nodes has a block.
+    pub(crate) fn is_whole(&self) -> bool {
+        matches!(self, Self::Whole(_) | Self::Quantised(_))
     }
 
     /// Trace of a block [m/N].
@@ -103,6 +116,10 @@ impl ResidualCompliance {
                     ));
                 }
                 ("residual.packed", blocks)
+            }
+            Self::Quantised(quantised) => {
+                quantised.validate(nodes).or_else(fail)?;
+                ("residual.scales", &quantised.scales)
             }
             Self::NearField(near) => {
                 near.validate(nodes).or_else(fail)?;
@@ -203,7 +220,7 @@ impl NearField {
 }
 
 /// Number of the block (i, j ≤ i) in a lower triangle.
-fn lower_block(i: usize, j: usize) -> usize {
+pub(super) fn lower_block(i: usize, j: usize) -> usize {
     i * (i + 1) / 2 + j
 }
 

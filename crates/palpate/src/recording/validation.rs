@@ -3,6 +3,8 @@
 //! A hash tells that a file is the one that was written, not that what was written is a body. The checks need no more memory than
 //! the recording, and their time grows with its size.
 
+use super::file::COMPACT_FORMAT_VERSION;
+use super::quantised::shape_steps;
 use super::{LARGEST, Recording, ResidualCompliance, Support};
 use crate::error::{Error, RecordingError, RecordingPart};
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -119,6 +121,16 @@ impl Recording {
         frequencies.check(self.modes.angular_frequencies.iter().copied())?;
         ratios.check(self.modes.damping_ratios.iter().copied())?;
         shapes.check(self.modes.mode_shapes.iter().copied())?;
+        if self.metadata.format_version == COMPACT_FORMAT_VERSION {
+            let steps = shape_steps(&self.modes.mode_shapes, modes);
+            let mut in_steps =
+                self.modes.mode_shapes.iter().zip(steps.iter().cycle()).map(|(shape, step)| shape / step);
+            if let Some(at) = in_steps.position(|steps| steps != libm::rint(steps)) {
+                return shapes.fail(format!(
+                    "hold a number at {at} that is no whole step of its mode, as compact recordings need"
+                ));
+            }
+        }
         let pairs = self.modes.angular_frequencies.windows(2);
         match pairs.into_iter().position(|pair| pair[0] > pair[1]) {
             Some(at) => {
@@ -186,7 +198,7 @@ impl Recording {
         };
         match &self.residual {
             ResidualCompliance::None => Ok(()),
-            ResidualCompliance::Whole(_) => {
+            ResidualCompliance::Whole(_) | ResidualCompliance::Quantised(_) => {
                 let mut pairs = (0..roots.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
                 pairs.try_for_each(|(i, j)| check(i, j, self.residual.block(i, j)))
             }

@@ -2,13 +2,13 @@
 //!
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
-use super::dot_products::{dot3, dot3_single};
 use super::level_residual::{LevelPair, LevelResidual};
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
 use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
 use super::sampled_residual::{ResidualMemory, SampledResidual};
+use crate::dot_products::{dot3, dot3_single};
 use crate::recording::Recording;
 use crate::surface::{
     Bands, Bounds, Cell, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals,
@@ -506,11 +506,12 @@ impl Body {
         kernel.displacement(&self.recording, node, forces)
     }
 
-    /// Distribution of a force at a location to nodes, with weights; a node may come more than once.
+    /// Distribution of a force at a location to nodes, with weights; a node may come more than once. Corners that have no weight but for
+    /// round-off get none.
     pub(super) fn distribute(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
         for (corner, weight) in self.corners(location) {
             match self.patch(location.footprint) {
-                _ if weight == 0.0 => {}
+                _ if weight.abs() <= f64::EPSILON => {}
                 None => give(corner, weight),
                 Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
             }

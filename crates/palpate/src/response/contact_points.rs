@@ -5,7 +5,8 @@
 //!
 //! Equations: docs/theory.md (C31), (C32), (C34).
 
-use super::{ContactLocation, Footprint, LocationState, ResponseView, dot};
+use super::{ContactLocation, Footprint, LocationState, ResponseView};
+use crate::dot_products::dot;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -155,8 +156,7 @@ impl ContactPoints {
     /// Remove a point.
     ///
     /// # Real time
-    pub(crate) fn remove(&mut self, view: &mut ResponseView, slot: usize) {
-        view.state.release(slot);
+    pub(crate) fn remove(&mut self, slot: usize) {
         let (at, last) = (self.at[slot], self.points.len() - 1);
         self.drop_force(at);
         if at != last {
@@ -248,7 +248,7 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn predict(&mut self, view: &mut ResponseView) {
         for point in &mut self.points {
-            point.free = view.free(point.slot, &point.state);
+            point.free = view.free((point.slot, &point.location), &point.state);
         }
     }
 
@@ -258,7 +258,7 @@ impl ContactPoints {
     pub(crate) fn read_state(&mut self, view: &mut ResponseView) {
         for point in &mut self.points {
             point.state = view.assign(point.slot, &point.location);
-            point.free = view.free(point.slot, &point.state);
+            point.free = view.free((point.slot, &point.location), &point.state);
         }
     }
 
@@ -280,7 +280,7 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn predict_new(&mut self, view: &mut ResponseView) {
         for point in self.points.iter_mut().filter(|point| point.is_new) {
-            point.free = view.free(point.slot, &point.state);
+            point.free = view.free((point.slot, &point.location), &point.state);
             point.is_new = false;
         }
     }

@@ -1,78 +1,115 @@
-//! Force history of one object over the last T steps, for the paper's convolution; buffers are made once.
+//! Force history of one object over the last T steps, for the paper's convolution: a force series per touchable node. Buffers are made
+//! once.
 
 use super::fir::Fir;
-use crate::surface::SurfacePoint;
+use crate::bounded_vec::BoundedVec;
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use glam::DVec3;
 
-/// Point of unused entries.
-const NOWHERE: SurfacePoint = SurfacePoint { triangle: u32::MAX, weights: [0.0; 3] };
+/// Mark of a node that is no source.
+const NONE: u32 = u32::MAX;
 
-/// Surface point that was loaded in the last T steps.
+/// Node that was loaded in the last T steps.
 #[derive(Debug, Clone, Copy)]
-struct Source {
-    point: SurfacePoint,
-    /// Age of its first force [steps]; none for a free entry.
-    oldest: Option<usize>,
-    /// Age of its last force [steps].
+struct Loaded {
+    source: u32,
+    /// Number among all sources that were loaded so far, which spreads the work of a blocked convolution.
+    phase: usize,
+    /// Ages of its first and of its last force [steps].
+    oldest: usize,
     newest: usize,
 }
 
-/// Past force on a point for which no source was free.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stray {
-    pub(super) point: SurfacePoint,
-    /// Force [N, body].
-    pub(super) force: DVec3,
-}
-
-/// Past forces by loaded point, newest first.
+/// Past forces by node, newest first.
 #[derive(Debug, Clone)]
 pub(crate) struct ForceHistory {
     /// Number of samples T.
     samples: usize,
-    /// Upper limit of forces in a step.
-    width: usize,
     steps: u64,
-    sources: Vec<Source>,
-    /// Forces of each source in the last T steps [N, body], newest first: a ring buffer of length T, written twice, so that T
-    /// successive entries always begin at `head`.
-    forces: Vec<DVec3>,
+    /// Touchable surface nodes, the sources of force, and the source of each surface node.
+    nodes: Arc<[u32]>,
+    source_of: Arc<[u32]>,
+    loaded: BoundedVec<Loaded>,
+    /// Sources that were loaded so far.
+    loads: usize,
+    /// Index in `loaded` of each source, from 1; 0 for unloaded ones.
+    at: Vec<u32>,
+    /// Forces of each source in the last T steps [N, body], a series per axis, newest first: ring buffers of length T, written twice, so
+    /// that T successive entries always begin at `head`.
+    forces: Vec<f64>,
     head: usize,
-    /// Ring buffer of T steps with at most one stray force per slot; it begins at `head`.
-    strays: Vec<Stray>,
-    stray_counts: Vec<u32>,
-    stray_total: usize,
+}
+
+/// Force series of a loaded node.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ForceSeries<'a> {
+    pub(super) node: usize,
+    pub(super) phase: usize,
+    /// Ages outside of which its forces are zero [steps].
+    ages: (usize, usize),
+    /// Forces along each axis [N, body], by age.
+    axes: [&'a [f64]; 3],
+}
+
+impl<'a> ForceSeries<'a> {
+    /// Ages of a range with forces, of those that a convolution `ahead` of the last step still needs.
+    pub(super) fn ages(&self, ahead: usize, range: Range<usize>) -> Range<usize> {
+        let end = (self.ages.1 + 1).min(range.end).min(self.axes[0].len() - ahead);
+        self.ages.0.max(range.start).min(end)..end
+    }
+
+    /// Forces along an axis [N], by age.
+    pub(super) fn along(&self, axis: usize) -> &'a [f64] {
+        self.axes[axis]
+    }
+
+    /// Force at an age [N, body].
+    fn force(&self, age: usize) -> DVec3 {
+        DVec3::from_array(self.axes.map(|forces| forces[age]))
+    }
 }
 
 impl ForceHistory {
-    /// History of T samples, with at most `width` forces in a step.
-    pub(super) fn new(samples: usize, width: usize) -> Self {
-        // More sources than simultaneous contacts: a moving contact leaves some behind.
-        let sources = (4 * width).max(32).min(width * samples);
+    /// History of T samples of forces on touchable nodes; `touchable` tells which surface nodes are.
+    pub(super) fn new(samples: usize, touchable: impl Iterator<Item = bool>) -> Self {
+        let (mut nodes, mut source_of) = (Vec::new(), Vec::new());
+        for (node, is_touchable) in touchable.enumerate() {
+            source_of.push(if is_touchable { nodes.len() as u32 } else { NONE });
+            if is_touchable {
+                nodes.push(node as u32);
+            }
+        }
+        let sources = nodes.len();
         Self {
             samples,
-            width,
             steps: 0,
-            sources: vec![Source { point: NOWHERE, oldest: None, newest: 0 }; sources],
-            forces: vec![DVec3::ZERO; 2 * samples * sources],
+            nodes: nodes.into(),
+            source_of: source_of.into(),
+            loaded: BoundedVec::new(sources),
+            loads: 0,
+            at: vec![0; sources],
+            forces: vec![0.0; 6 * samples * sources],
             head: 0,
-            strays: vec![Stray { point: NOWHERE, force: DVec3::ZERO }; samples * width],
-            stray_counts: vec![0; samples],
-            stray_total: 0,
         }
     }
 
-    /// Copy another history of equal size.
+    /// Copy another history of equal size: the series of loaded nodes.
     ///
     /// # Real time
     pub(super) fn copy_from(&mut self, other: &Self) {
-        (self.steps, self.head, self.stray_total) = (other.steps, other.head, other.stray_total);
-        self.sources.copy_from_slice(&other.sources);
-        self.forces.copy_from_slice(&other.forces);
-        self.strays.copy_from_slice(&other.strays);
-        self.stray_counts.copy_from_slice(&other.stray_counts);
+        (self.steps, self.head, self.loads) = (other.steps, other.head, other.loads);
+        self.loaded.clear();
+        self.loaded.extend_from_slice(&other.loaded);
+        self.at.copy_from_slice(&other.at);
+        for loaded in other.loaded.iter() {
+            for axis in 0..3 {
+                let window = self.window(loaded.source as usize, axis);
+                self.forces[window.clone()].copy_from_slice(&other.forces[window]);
+            }
+        }
     }
 
     /// Steps since the start.
@@ -80,47 +117,34 @@ impl ForceHistory {
         self.steps
     }
 
-    /// Number of sources, used or free.
-    pub(super) fn sources(&self) -> usize {
-        self.sources.len()
+    /// Number of samples T.
+    pub(super) fn samples(&self) -> usize {
+        self.samples
     }
 
-    /// Surface point of a source.
-    pub(super) fn point(&self, source: usize) -> SurfacePoint {
-        self.sources[source].point
+    fn window(&self, source: usize, axis: usize) -> Range<usize> {
+        let start = 2 * self.samples * (3 * source + axis) + self.head;
+        start..start + self.samples
     }
 
-    /// Forces of a source [N, body], newest first, and the range of ages outside of which they are zero.
-    pub(super) fn window(&self, source: usize) -> Option<(&[DVec3], core::ops::Range<usize>)> {
-        let Source { oldest, newest, .. } = self.sources[source];
-        let forces = &self.forces[2 * self.samples * source + self.head..][..self.samples];
-        Some((forces, newest..(oldest? + 1).min(self.samples)))
-    }
-
-    /// Stray forces with their ages [steps].
-    pub(super) fn strays(&self) -> impl Iterator<Item = (usize, &Stray)> {
-        let ages = if self.stray_total > 0 { self.samples } else { 0 };
-        (0..ages).flat_map(move |age| {
-            let step = (self.head + age) % self.samples;
-            let count = self.stray_counts[step] as usize;
-            self.strays[step * self.width..][..count].iter().map(move |stray| (age, stray))
+    /// Series of the nodes that were loaded in the last T steps.
+    pub(super) fn series(&self) -> impl Iterator<Item = ForceSeries<'_>> {
+        self.loaded.iter().map(|&Loaded { source, phase, oldest, newest }| {
+            let source = source as usize;
+            ForceSeries {
+                node: self.nodes[source] as usize,
+                phase,
+                ages: (newest, oldest),
+                axes: core::array::from_fn(|axis| &self.forces[self.window(source, axis)]),
+            }
         })
     }
 
-    /// Age a source by a step. Gives whether it becomes free.
-    ///
-    /// # Real time
-    pub(super) fn ages(&mut self, source: usize) -> bool {
-        let samples = self.samples;
-        let source = &mut self.sources[source];
-        let Some(oldest) = &mut source.oldest else { return false };
-        *oldest += 1;
-        source.newest += 1;
-        let free = source.newest == samples;
-        if free {
-            source.oldest = None;
-        }
-        free
+    /// Forces that the next step makes older than T steps, with their nodes.
+    pub(super) fn leaving(&self) -> impl Iterator<Item = (usize, DVec3)> {
+        let last = self.samples - 1;
+        let has_left = move |series: &ForceSeries| !series.ages(0, last..self.samples).is_empty();
+        self.series().filter(has_left).map(move |series| (series.node, series.force(last)))
     }
 
     /// Begin a step without force, and drop forces older than T steps.
@@ -129,53 +153,62 @@ impl ForceHistory {
     pub(super) fn begin_step(&mut self) {
         self.steps += 1;
         self.head = (self.head + self.samples - 1) % self.samples;
-        (0..self.sources.len()).for_each(|source| self.write(source, DVec3::ZERO));
-        let dropped = core::mem::take(&mut self.stray_counts[self.head]) as usize;
-        self.stray_total -= dropped;
+        let mut index = 0;
+        while let Some(loaded) = self.loaded.get_mut(index) {
+            loaded.oldest = (loaded.oldest + 1).min(self.samples - 1);
+            loaded.newest += 1;
+            let source = loaded.source as usize;
+            if loaded.newest == self.samples {
+                self.at[source] = 0;
+                self.loaded.swap_remove(index);
+                if let Some(moved) = self.loaded.get(index) {
+                    self.at[moved.source as usize] = index as u32 + 1;
+                }
+                continue;
+            }
+            self.write(source, DVec3::ZERO);
+            index += 1;
+        }
     }
 
-    /// Add a force [N, body] to the step.
+    /// Add a force [N, body] on a node to the step; a node that is no source takes none.
     ///
     /// # Real time
-    pub(super) fn add(&mut self, point: &SurfacePoint, force: DVec3) {
-        let found = self.sources.iter().position(|s| s.oldest.is_some() && s.point == *point);
-        match found.or_else(|| self.sources.iter().position(|s| s.oldest.is_none())) {
-            Some(at) => {
-                let source = &mut self.sources[at];
-                source.point = *point;
-                source.newest = 0;
-                source.oldest = source.oldest.or(Some(0));
-                let before = self.forces[2 * self.samples * at + self.head];
-                // Two slots may share a point; the entry of a new source is stale.
-                let shared = if found.is_some() { before } else { DVec3::ZERO };
-                self.write(at, shared + force);
-            }
-            None => {
-                let count = &mut self.stray_counts[self.head];
-                self.strays[self.head * self.width + *count as usize] = Stray { point: *point, force };
-                *count += 1;
-                self.stray_total += 1;
-            }
+    pub(super) fn add(&mut self, node: usize, force: DVec3) {
+        let source = self.source_of[node];
+        if source == NONE {
+            return;
         }
+        let at = &mut self.at[source as usize];
+        if *at == 0 {
+            self.loaded.push(Loaded { source, phase: self.loads, oldest: 0, newest: 0 });
+            self.loads += 1;
+            *at = self.loaded.len() as u32;
+            self.write(source as usize, force);
+            return;
+        }
+        self.loaded[*at as usize - 1].newest = 0;
+        let before = |axis: usize| self.forces[self.window(source as usize, axis).start];
+        let before = DVec3::new(before(0), before(1), before(2));
+        self.write(source as usize, before + force);
     }
 
     fn write(&mut self, source: usize, force: DVec3) {
-        let ring = &mut self.forces[2 * self.samples * source..][..2 * self.samples];
-        ring[self.head] = force;
-        ring[self.head + self.samples] = force;
+        for (axis, force) in force.to_array().into_iter().enumerate() {
+            let start = self.window(source, axis).start;
+            self.forces[start] = force;
+            self.forces[start + self.samples] = force;
+        }
     }
 
-    /// Displacement of every surface node [m, body], equation (6); zero for nodes that are not observed.
-    pub(super) fn surface_displacement(&self, fir: &Fir, gravity: DVec3, out: &mut [DVec3]) {
-        let mut sum = vec![0.0; fir.observed_dofs()];
-        let mut add = |age: usize, point: &SurfacePoint, force: DVec3| fir.add(age, point, force, &mut sum);
-        for (at, source) in self.sources.iter().enumerate() {
-            let Some((forces, ages)) = self.window(at) else { continue };
-            ages.for_each(|age| add(age, &source.point, forces[age]));
-        }
-        self.strays().for_each(|(age, stray)| add(age, &stray.point, stray.force));
-        for (node, u) in out.iter_mut().enumerate() {
-            *u = fir.observed(node, &sum) + fir.sag(node, gravity, self.steps);
-        }
+    /// Displacement of a surface node, so many steps ahead of the last one without more force [m, body], equations (5) and (6); zero if it is
+    /// not observed.
+    ///
+    /// # Real time
+    /// Costs the forces of the last T steps.
+    pub(super) fn displacement(&self, fir: &Fir, (node, ahead): (usize, usize), gravity: DVec3) -> DVec3 {
+        let by = |forces: ForceSeries| fir.convolve((node, ahead), &forces, 0..self.samples);
+        let by_forces: DVec3 = self.series().map(by).sum();
+        by_forces + fir.sag(node, gravity, self.steps + ahead as u64)
     }
 }

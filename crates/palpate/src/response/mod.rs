@@ -1,9 +1,10 @@
 //! Impulse response of a body: displacement under contact forces, in modal form with residual compliance, or by direct
 //! convolution of the paper's recorded table.
 
+mod blocked_convolution;
 mod body;
 mod contact_points;
-mod dot_products;
+mod convolution;
 mod fir;
 mod force_history;
 mod level_residual;
@@ -22,7 +23,7 @@ mod spring_forces;
 
 pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
-pub(crate) use dot_products::dot;
+
 pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
 pub(crate) use residual_fields::ResidualFields;
@@ -33,7 +34,8 @@ use crate::recording::{ImpulseResponse, Recording};
 use crate::surface::SurfacePoint;
 use alloc::boxed::Box;
 use alloc::sync::Arc;
-use fir::{Fir, FirState};
+use convolution::FirState;
+use fir::Fir;
 use force_history::ForceHistory;
 use glam::{DMat3, DVec3};
 use modal::{ModalDeformation, ModalState, SampledModes};
@@ -71,6 +73,12 @@ pub(crate) struct ResponseEnergy {
     pub(crate) residual: f64,
 }
 
+impl ResponseEnergy {
+    fn sum(&self) -> f64 {
+        self.kinetic + self.elastic + self.residual
+    }
+}
+
 impl Response {
     pub(crate) fn new(
         recording: &Arc<Recording>,
@@ -83,12 +91,17 @@ impl Response {
         })
     }
 
-    /// Number of modes; 0 for a table.
-    pub(crate) fn modes(&self) -> usize {
+    /// Modal form: the response itself, or, of a table, the motion of the surface that contacts are searched for on.
+    fn modal(&self) -> &SampledModes {
         match self {
-            Self::Modal(modes) => modes.len(),
-            Self::Fir(_) => 0,
+            Self::Modal(modes) => modes,
+            Self::Fir(fir) => &fir.modes,
         }
+    }
+
+    /// Number of modes.
+    pub(crate) fn modes(&self) -> usize {
+        self.modal().len()
     }
 
     /// Whether the sag of a body with fixed nodes is known.
@@ -140,7 +153,7 @@ impl Response {
             Self::Modal(modes) => {
                 ResponseState::Modal(Box::new(ModalState::new(modes.len(), nodes, capacity)))
             }
-            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, capacity))),
+            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, nodes, capacity))),
         }
     }
 }
@@ -165,16 +178,14 @@ impl ResponseView<'_> {
                 modes.assign(self.body, state, slot, location, self.gravity)
             }
             (Response::Fir(fir), ResponseState::Fir(state)) => {
-                state.release(slot);
-                let displacement = state.assign(fir, slot, &location.point, self.gravity);
-                LocationState { displacement, ..LocationState::default() }
+                state.assign((fir, self.body), slot, location, self.gravity)
             }
             _ => LocationState::default(),
         }
     }
 
-    /// Move the spring forces of locations to others, where contacts take their place; a table has none. Gives the energy [J] that
-    /// is dissipated.
+    /// Move the spring forces of locations to others, where contacts take their place. Gives the energy [J] that is dissipated; with a table
+    /// none, since its forces stay where they were.
     ///
     /// # Real time
     /// Costs the square of the number of spring forces.
@@ -186,6 +197,10 @@ impl ResponseView<'_> {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
                 state.move_spring_forces(self.body, &modes.residual, from, to)
+            }
+            (Response::Fir(fir), ResponseState::Fir(state)) => {
+                state.surface.move_spring_forces(self.body, &fir.modes.residual, from, to);
+                0.0
             }
             _ => 0.0,
         }
@@ -207,7 +222,7 @@ impl ResponseView<'_> {
             }
             (Response::Fir(fir), _) => {
                 for (index, point) in points.iter().enumerate() {
-                    give(index, fir.compliance(&location.point, &point.location.point));
+                    give(index, fir.compliance(self.body, location, &point.location));
                 }
             }
             _ => {}
@@ -223,6 +238,10 @@ impl ResponseView<'_> {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
                 modes.predict(&self.body.recording, state, self.gravity)
             }
+            (Response::Fir(fir), ResponseState::Fir(state)) => {
+                fir.modes.predict(&self.body.recording, &mut state.surface, self.gravity);
+                false
+            }
             _ => false,
         }
     }
@@ -230,10 +249,16 @@ impl ResponseView<'_> {
     /// Free displacement ũ of a slot's location at the end of the step without contact force [m, body].
     ///
     /// # Real time
-    pub(crate) fn free(&mut self, slot: usize, start: &LocationState) -> DVec3 {
+    pub(crate) fn free(
+        &mut self,
+        (slot, location): (usize, &ContactLocation),
+        start: &LocationState,
+    ) -> DVec3 {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => modes.free(state, slot, start),
-            (Response::Fir(fir), ResponseState::Fir(state)) => state.free(fir, slot, self.gravity),
+            (Response::Fir(fir), ResponseState::Fir(state)) => {
+                state.free((fir, self.body), location, self.gravity)
+            }
             _ => DVec3::ZERO,
         }
     }
@@ -247,9 +272,8 @@ impl ResponseView<'_> {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
                 modes.advance(self.body, state, points, self.gravity)
             }
-            (Response::Fir(_), ResponseState::Fir(state)) => {
-                state.advance(points);
-                0.0
+            (Response::Fir(fir), ResponseState::Fir(state)) => {
+                state.advance((fir, self.body), points, self.gravity)
             }
             _ => 0.0,
         }
@@ -257,21 +281,17 @@ impl ResponseView<'_> {
 }
 
 impl ResponseState {
-    /// Release a slot.
-    ///
-    /// # Real time
-    pub(crate) fn release(&mut self, slot: usize) {
-        if let Self::Fir(state) = self {
-            state.release(slot);
+    /// Modal form: the response itself, or, of a table, the surface that contacts are searched for on.
+    fn modal(&self) -> &ModalState {
+        match self {
+            Self::Modal(state) => state,
+            Self::Fir(state) => &state.surface,
         }
     }
 
-    /// Modal coordinates q at the start of the step; none with a table.
+    /// Modal coordinates q at the start of the step.
     pub(crate) fn coordinates(&self) -> &[f64] {
-        match self {
-            Self::Modal(state) => &state.q,
-            Self::Fir(_) => &[],
-        }
+        &self.modal().q
     }
 
     /// Start at the static equilibrium with a gravity [m/s², body]; a table starts undeformed.
@@ -281,55 +301,41 @@ impl ResponseState {
         }
     }
 
-    /// Modal coordinates at the end of the step without contact force; none with a table.
+    /// Modal coordinates at the end of the step without contact force.
     pub(crate) fn free_coordinates(&self) -> &[f64] {
-        match self {
-            Self::Modal(state) => &state.free,
-            Self::Fir(_) => &[],
-        }
+        &self.modal().free
     }
 
-    /// Spring forces of the residual compliance with their locations; none with a table.
+    /// Spring forces of the residual compliance with their locations.
     pub(crate) fn spring_forces(&self) -> &[SpringForce] {
-        match self {
-            Self::Modal(state) => &state.spring_forces,
-            Self::Fir(_) => &[],
-        }
+        &self.modal().spring_forces
     }
 
     /// Indices of the spring forces on patches of tips.
     pub(crate) fn tip_springs(&self) -> &[u32] {
-        match self {
-            Self::Modal(state) => &state.tip_springs,
-            Self::Fir(_) => &[],
-        }
+        &self.modal().tip_springs
     }
 
-    /// Spring forces at points, distributed to nodes; none with a table.
-    pub(crate) fn nodal(&self) -> Option<&NodalForces> {
-        match self {
-            Self::Modal(state) => Some(&state.nodal),
-            Self::Fir(_) => None,
-        }
+    /// Spring forces at points, distributed to nodes.
+    pub(crate) fn nodal(&self) -> &NodalForces {
+        &self.modal().nodal
     }
 
     /// √(dᵀ·S·d) of the forces d whose static displacement the residual one is [√J].
     pub(crate) fn residual_norm(&self) -> f64 {
-        match self {
-            Self::Modal(state) => state.residual_norm,
-            Self::Fir(_) => 0.0,
-        }
+        self.modal().residual_norm
     }
 
-    /// Upper bound of the residual displacement of any node [m]: at points and contact samples, or at patches of tips.
+    /// Upper bound of the displacement of any node beyond the modes [m]: at points and contact samples, or at patches of tips.
     pub(crate) fn max_residual(&self, of_tips: bool) -> f64 {
-        match self {
-            Self::Modal(state) => state.residual_bounds[usize::from(of_tips)].total,
-            Self::Fir(_) => 0.0,
-        }
+        let beyond_the_surface = match self {
+            Self::Modal(_) => 0.0,
+            Self::Fir(state) => state.surface_error,
+        };
+        self.modal().residual_bounds[usize::from(of_tips)].total + beyond_the_surface
     }
 
-    /// Energies [J]. A table does not separate stored from dissipated energy: all net work counts as elastic.
+    /// Energies [J].
     ///
     /// # Real time
     pub(crate) fn energy(&self, response: &Response) -> ResponseEnergy {
@@ -338,7 +344,7 @@ impl ResponseState {
                 let [kinetic, elastic, residual] = modes.energy(state);
                 ResponseEnergy { kinetic, elastic, residual }
             }
-            (_, Self::Fir(state)) => ResponseEnergy { elastic: state.work(), ..ResponseEnergy::default() },
+            (Response::Fir(fir), Self::Fir(state)) => state.energy(fir),
             _ => ResponseEnergy::default(),
         }
     }
@@ -434,7 +440,11 @@ impl DeformationData {
             (Response::Modal(modes), Self::Modal(deformed)) => {
                 modes.surface_displacement(body, deformed, gravity, residual_fields, out);
             }
-            (Response::Fir(fir), Self::Fir(history)) => history.surface_displacement(fir, gravity, out),
+            (Response::Fir(fir), Self::Fir(history)) => {
+                for (node, u) in out.iter_mut().enumerate() {
+                    *u = history.displacement(fir, (node, 0), gravity);
+                }
+            }
             _ => {}
         }
     }

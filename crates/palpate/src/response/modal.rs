@@ -6,7 +6,6 @@
 //! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
 
 use super::ContactPoint;
-use super::dot_products::{dot, dot3, dot9, dots};
 use super::nodal_compliance::NodalCompliance;
 use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
@@ -15,6 +14,7 @@ use super::sampled_residual::{Products, SampledResidual};
 use super::spring_forces::RELAXING;
 use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 use crate::bounded_vec::BoundedVec;
+use crate::dot_products::{dot, dot3, dot9, dots};
 use crate::recording::Recording;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -266,6 +266,73 @@ impl SampledModes {
         points: &mut [ContactPoint],
         next_gravity: DVec3,
     ) -> f64 {
+        // S·f, from the displacement that the contact problem has found.
+        self.advance_with(body, state, points, next_gravity, |_, point, by_modes| {
+            let residual = point.displacement - by_modes;
+            let LocationState { sag, memory, .. } = &point.state;
+            (residual, (residual - *sag - self.residual.free(memory)) / self.residual_share())
+        })
+    }
+
+    /// Advance beside another response, which the displacements of the points are of, with their static displacements S·f. Gives the
+    /// largest distance between the points' displacements by both [m].
+    ///
+    /// # Real time
+    pub(super) fn advance_beside(
+        &self,
+        body: &Body,
+        state: &mut ModalState,
+        points: &mut [ContactPoint],
+        next_gravity: DVec3,
+        held: &[DVec3],
+    ) -> f64 {
+        let mut apart = 0.0_f64;
+        self.advance_with(body, state, points, next_gravity, |at, point, by_modes| {
+            let LocationState { sag, memory, .. } = &point.state;
+            let residual = *sag + self.residual.free(memory) + held[at] * self.residual_share();
+            apart = apart.max((point.displacement - by_modes - residual).length());
+            (residual, held[at])
+        });
+        apart
+    }
+
+    /// State of each mode some steps after the one in which a unit modal force was held.
+    pub(super) fn states_after(&self, steps: usize) -> Vec<OscillatorState> {
+        let after = |oscillator: &SampledOscillator| {
+            let held = oscillator.advance(OscillatorState::default(), 1.0);
+            (0..steps).fold(held, |state, _| oscillator.advance(state, 0.0))
+        };
+        self.oscillators.iter().map(after).collect()
+    }
+
+    /// Subtract what a past force on a node [N, body] has left, by the states that unit modal forces of its age have left.
+    ///
+    /// # Real time
+    pub(super) fn forget(
+        &self,
+        recording: &Recording,
+        state: &mut ModalState,
+        (node, force): (usize, DVec3),
+        left: &[OscillatorState],
+    ) {
+        for (axis, force) in force.to_array().into_iter().enumerate() {
+            let modes = state.modes.iter_mut().zip(recording.modes.row(node, axis)).zip(left);
+            for ((mode, phi), left) in modes {
+                mode.q -= left.q * phi * force;
+                mode.v -= left.v * phi * force;
+            }
+        }
+    }
+
+    /// Advance, with the residual displacement [m] and S·f [m] of each point by its index and its displacement by the modes.
+    fn advance_with(
+        &self,
+        body: &Body,
+        state: &mut ModalState,
+        points: &mut [ContactPoint],
+        next_gravity: DVec3,
+        mut residual_of: impl FnMut(usize, &ContactPoint, DVec3) -> (DVec3, DVec3),
+    ) -> f64 {
         let m = self.len();
         // p = Φᵀ·Jᵀ·g.
         for point in points.iter().filter(|point| point.force_in_body != DVec3::ZERO) {
@@ -290,17 +357,14 @@ impl SampledModes {
         self.predict(&body.recording, state, next_gravity);
 
         // The residual compliance dissipates the work that it does not store.
-        let residual_share = self.residual_share();
         let (mut work, mut products) = (0.0, [0.0; 3]);
         let mut largest = [(0.0_f64, 0.0_f64); 2];
         state.relax(&self.residual);
-        for point in points.iter_mut() {
+        for (at, point) in points.iter_mut().enumerate() {
             let rows = &state.rows[3 * m * point.slot..3 * m * (point.slot + 1)];
             let [modal, free] = dots(rows, [&state.q, &state.free]);
-            let residual = point.displacement - modal;
+            let (residual, held) = residual_of(at, point, modal);
             let LocationState { residual: start, sag, memory, .. } = &mut point.state;
-            // S·f, from the displacement that the contact problem has found.
-            let held = (residual - *sag - self.residual.free(memory)) / residual_share;
             let force = point.force_in_body;
             work += force.dot(residual - *start);
             for (sum, displacement) in products.iter_mut().zip([memory.relaxed, memory.held, held]) {

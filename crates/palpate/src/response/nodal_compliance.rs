@@ -6,9 +6,9 @@
 //!
 //! Equations: docs/theory.md (C7).
 
-use super::dot_products::dot9;
 use super::modal::SampledModes;
 use super::{Body, ContactLocation};
+use crate::dot_products::dot9;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DMat3;

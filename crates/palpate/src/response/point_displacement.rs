@@ -6,10 +6,12 @@
 //!
 //! Equations: docs/theory.md (C3), (C8).
 
-use super::dot_products::dot3;
-use super::fir::{Fir, FirState};
+use super::convolution::FirState;
+use super::fir::Fir;
 use super::modal::ModalState;
 use super::{Body, ContactLocation, Footprint, Response, ResponseState};
+use crate::dot_products::dot3;
+use crate::recording::has_weight;
 use crate::surface::SurfacePoint;
 use glam::DVec3;
 
@@ -26,7 +28,9 @@ impl ResponseState {
     ) -> DVec3 {
         match (response, self) {
             (Response::Modal(_), Self::Modal(state)) => modal_displacement(body, state, point, gravity),
-            (Response::Fir(fir), Self::Fir(state)) => convolved_displacement(fir, state, point, gravity),
+            (Response::Fir(fir), Self::Fir(state)) => {
+                convolved_displacement((fir, body), state, point, gravity)
+            }
             _ => DVec3::ZERO,
         }
     }
@@ -52,18 +56,12 @@ fn modal_displacement(body: &Body, state: &ModalState, point: &SurfacePoint, gra
     displacement
 }
 
-fn convolved_displacement(fir: &Fir, state: &FirState, point: &SurfacePoint, gravity: DVec3) -> DVec3 {
-    let history = &state.history;
-    let mut displacement = fir.sag_of_point(point, gravity, history.steps());
-    let mut add = |age: usize, source: &SurfacePoint, force: DVec3| {
-        let [a, b, c, d, e, f, g, h, i] = fir.block(age, point, source);
-        displacement +=
-            DVec3::new(a, d, g) * force.x + DVec3::new(b, e, h) * force.y + DVec3::new(c, f, i) * force.z;
-    };
-    for source in 0..history.sources() {
-        let Some((forces, ages)) = history.window(source) else { continue };
-        ages.for_each(|age| add(age, &history.point(source), forces[age]));
-    }
-    history.strays().for_each(|(age, stray)| add(age, &stray.point, stray.force));
-    displacement
+fn convolved_displacement(
+    (fir, body): (&Fir, &Body),
+    state: &FirState,
+    point: &SurfacePoint,
+    gravity: DVec3,
+) -> DVec3 {
+    let corners = body.recording.surface.corners(point).into_iter().filter(has_weight);
+    corners.map(|(node, weight)| state.history.displacement(fir, (node, 0), gravity) * weight).sum()
 }

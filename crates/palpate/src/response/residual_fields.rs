@@ -8,7 +8,6 @@
 //! rendered frame, and each loads dozens of nodes of a whole S.
 
 use super::body::{Body, Footprint, SpringForce};
-use crate::recording::ResidualCompliance;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -28,7 +27,7 @@ pub(crate) struct ResidualFields {
 impl ResidualFields {
     /// Add the residual displacements under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
     pub(super) fn add(&mut self, body: &Body, patches: &[SpringForce], out: &mut [DVec3]) -> bool {
-        if !matches!(body.recording.residual, ResidualCompliance::Whole(_)) {
+        if !body.recording.residual.is_whole() {
             return false;
         }
         self.frame += 1;

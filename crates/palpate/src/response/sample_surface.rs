@@ -203,7 +203,7 @@ fn averaged(
     let count = weights.len();
     match residual {
         ResidualCompliance::None => ResidualCompliance::None,
-        ResidualCompliance::Whole(_) => {
+        ResidualCompliance::Whole(_) | ResidualCompliance::Quantised(_) => {
             let pairs = (0..count).flat_map(|c| (0..=c).map(move |d| (c, d)));
             let block = |(c, d): (usize, usize)| {
                 let block = to_nodes.averaged(c, weights.of(d));
@@ -271,7 +271,7 @@ impl PatchNodeCompliance {
             for (node, w) in weights.of(c) {
                 match residual {
                     ResidualCompliance::None => {}
-                    ResidualCompliance::Whole(_) => {
+                    ResidualCompliance::Whole(_) | ResidualCompliance::Quantised(_) => {
                         (0..node_count).for_each(|other| sums.add(other, residual.block(node, other) * w));
                     }
                     ResidualCompliance::NearField(near) => {

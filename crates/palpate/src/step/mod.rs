@@ -272,7 +272,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
             }
         }
     }
-    for object in context.sleepers.awake_indices().filter(|&at| model.objects[at].is_touchable()) {
+    for object in context.sleepers.awake_indices() {
         for (number, (before, after)) in before.iter().zip(after).enumerate() {
             context.find_obstacle_contacts(object, number, *before, *after);
         }

@@ -15,7 +15,7 @@ use crate::contact::ContactProblem;
 use crate::device::PrescribedForce;
 use crate::io::{AppliedForce, DeviceMode, Input};
 use crate::object::Object;
-use crate::response::{ContactLocation, Footprint};
+use crate::response::ContactLocation;
 use crate::scene::Model;
 use crate::state::State;
 use crate::surface::SurfacePoint;
@@ -32,9 +32,7 @@ pub(super) fn place(model: &Model, state: &mut State, input: &Input) {
         if let Some(PrescribedForce { object, slot }) = device.prescribed
             && applied.is_none_or(|applied| applied.grasp.object != object)
         {
-            let (object, own) = (&model.objects[object], &mut objects[object]);
-            let felt = own.felt_gravity(gravity);
-            own.points.remove(&mut object.view(felt, &own.rigid, &mut own.response), slot);
+            objects[object].points.remove(slot);
             device.prescribed = None;
         }
         let Some(AppliedForce { grasp, force }) = applied else { continue };
@@ -60,11 +58,9 @@ pub(super) fn place(model: &Model, state: &mut State, input: &Input) {
     }
 }
 
-/// Point, or patch about it; a table knows points only.
+/// Point, or patch about it.
 fn location(object: &Object, point: SurfacePoint, patch_radius: f64) -> ContactLocation {
-    let footprint =
-        if object.is_touchable() { object.body.footprint(patch_radius) } else { Footprint::Point };
-    ContactLocation { point, footprint }
+    ContactLocation { point, footprint: object.body.footprint(patch_radius) }
 }
 
 /// Predict the objects that prescribed forces act on: their motion without contact force.

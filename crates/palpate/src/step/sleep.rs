@@ -128,7 +128,7 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
 /// Whether an object is still at the end of a step, in contact. Objects with clamps, or with tables, never are.
 fn is_still(object: &Object, own: &ObjectState) -> bool {
     let speed = STILL_SPEED * object.radius;
-    object.is_touchable()
+    object.is_modal()
         && object.body.cells() == 0
         && !own.base.moves()
         && own.points.points.iter().any(|point| point.force != DVec3::ZERO)

@@ -318,7 +318,7 @@ mod tests {
             for [a, b, c] in [[[0, 0], [2, 0], [2, 2]], [[0, 0], [2, 2], [0, 2]]] {
                 let middle = |p: [u32; 2], q: [u32; 2]| [(p[0] + q[0]) / 2, (p[1] + q[1]) / 2];
                 let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-                for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+                for corners in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
                     surface.triangles.push(corners.map(|[x, y]| node(i + x, j + y)));
                 }
             }

@@ -1,8 +1,8 @@
 //! Shape functions on surface triangles: linear, or quadratic over the face of a quadratic element that the triangle is a
 //! quarter of.
 //!
-//! A quadratic face is stored in the surface as four triangles: one of its three mid-edge nodes, and one at each corner.
-//! Mid-edge nodes have larger numbers in the finite element model than corners.
+//! A quadratic face of corners a, b, c and mid-edge nodes ab, bc, ca is stored in the surface as four triangles, one after another:
+//! (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca).
 
 use super::{EDGE_COSINE, Surface, area_normal};
 use alloc::collections::BTreeMap;
@@ -20,6 +20,19 @@ struct Part {
     vertices: [[f64; 3]; 3],
 }
 
+/// Barycentric weights of a node of a quadratic face.
+fn weights(corners: [u32; 3], middles: [u32; 3], node: u32) -> [f64; 3] {
+    let mut weights = [0.0; 3];
+    for k in 0..3 {
+        if corners[k] == node {
+            weights[k] = 1.0;
+        } else if middles[k] == node {
+            (weights[k], weights[(k + 1) % 3]) = (0.5, 0.5);
+        }
+    }
+    weights
+}
+
 /// Quadratic faces of a surface's triangles.
 #[derive(Debug, Clone)]
 pub(crate) struct QuadraticFaces {
@@ -33,52 +46,17 @@ impl QuadraticFaces {
         if order != 2 {
             return faces;
         }
-        // Every triangle of a quadratic face has at least two mid-edge nodes; the smallest of all is second in some triangle.
-        let second = |corners: &[u32; 3]| {
-            let mut numbers = corners.map(|node| surface.source_nodes[node as usize]);
-            numbers.sort_unstable();
-            numbers[1]
-        };
-        let least = surface.triangles.iter().map(second).min().unwrap_or_default();
-        let is_middle = |node: u32| surface.source_nodes[node as usize] >= least;
-        // Corner triangles, by their edge between two mid-edge nodes.
-        let mut at_corners = BTreeMap::new();
-        for (t, nodes) in surface.triangles.iter().enumerate() {
-            if let Some(k) = (0..3).find(|&k| !is_middle(nodes[k])) {
-                at_corners.insert((nodes[(k + 2) % 3], nodes[(k + 1) % 3]), (t, nodes[k]));
-            }
-        }
-        for (t, middles) in surface.triangles.iter().enumerate() {
-            if middles.iter().all(|&node| is_middle(node)) {
-                let over = |k: usize| at_corners.get(&(middles[k], middles[(k + 1) % 3])).copied();
-                if let (Some(a), Some(b), Some(c)) = (over(0), over(1), over(2)) {
-                    faces.insert(surface, t, *middles, [a, b, c]);
+        for (at, four) in (0..).step_by(4).zip(surface.triangles.chunks_exact(4)) {
+            let (&[a, ab, ca], &[_, b, bc], &[_, _, c]) = (&four[0], &four[1], &four[2]);
+            if four[1][0] == ab && four[2][..2] == [ca, bc] && four[3] == [ab, bc, ca] {
+                let (corners, middles) = ([a, b, c], [ab, bc, ca]);
+                for t in at..at + 4 {
+                    let vertices = surface.triangles[t].map(|node| weights(corners, middles, node));
+                    faces.parts[t] = Some(Part { corners, middles, vertices });
                 }
             }
         }
         faces
-    }
-
-    /// Insert the face of a middle triangle and the triangles at its corners, in the order of the middle one's edges.
-    fn insert(&mut self, surface: &Surface, middle: usize, nodes: [u32; 3], around: [(usize, u32); 3]) {
-        let corners = around.map(|(_, corner)| corner);
-        // Between the first two corners lies the node that the first two edges share.
-        let middles = [nodes[1], nodes[2], nodes[0]];
-        let weights = |node: u32| {
-            let mut weights = [0.0; 3];
-            for k in 0..3 {
-                if corners[k] == node {
-                    weights[k] = 1.0;
-                } else if middles[k] == node {
-                    (weights[k], weights[(k + 1) % 3]) = (0.5, 0.5);
-                }
-            }
-            weights
-        };
-        for t in [middle, around[0].0, around[1].0, around[2].0] {
-            let vertices = surface.triangles[t].map(weights);
-            self.parts[t] = Some(Part { corners, middles, vertices });
-        }
     }
 
     /// Nodes and shape functions at a point of a triangle with barycentric weights, passed to `give`.
@@ -174,7 +152,7 @@ mod tests {
                 })
             };
             let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            out.triangles.extend([[ab, bc, ca], [a, ab, ca], [ab, b, bc], [ca, bc, c]]);
+            out.triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
         }
         out.source_nodes = (0..out.positions.len() as u32).collect();
         out

@@ -21,7 +21,7 @@ pub fn save(path: &Path, rows: &[Value]) -> Result<(), Failure> {
 /// Read the rows of a baseline.
 pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
     let fail = |what: String| Failure(format!("cannot read the baseline {}: {what}", path.display()));
-    let text = palpate_fem::read_regular_text(path).map_err(|error| fail(error.to_string()))?;
+    let text = palpate_mesh::read_regular_text(path).map_err(|error| fail(error.to_string()))?;
     let content: Value = serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
     let rows = content.get("step_time_us").and_then(Value::as_array);
     rows.cloned().ok_or_else(|| fail("it has no step times; write one with palpate bench --save".into()))

@@ -4,6 +4,7 @@ mod baseline;
 mod frames;
 mod many;
 mod rough;
+mod table;
 mod touch;
 
 use crate::commands::demo::cached_cube;
@@ -22,7 +23,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time a step: against the mesh, the modes, held points and objects; fingers, floors, rough motion, many bodies; and the encoding of frames
+/// Time a step: against the mesh, the modes, held points and objects; fingers, floors, recorded tables, rough motion, many bodies; and the encoding of frames
 ///
 /// Everything is measured in one run on this machine, so that rows can be compared; single numbers are not a promise
 /// for another machine. Recording the largest cube takes about a minute the first time.
@@ -103,9 +104,11 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
         (label, Box::new(move |steps| held_steps(&case, steps)))
     });
     let touch = touch::cases(usual.clone(), cube(16, 200)?);
+    let table = table::cases(cube(4, 100)?);
     let rough = rough::cases(usual, arguments.cache.as_deref());
     let wanted = |label: &str| arguments.only.as_deref().is_none_or(|text| label.contains(text));
-    let cases = held.chain(touch).chain(rough).chain(many::cases()).filter(|(label, _)| wanted(label));
+    let cases =
+        held.chain(touch).chain(table).chain(rough).chain(many::cases()).filter(|(label, _)| wanted(label));
     if !arguments.json {
         let ratios = if arguments.against.is_some() { "  now/then" } else { "" };
         print(&format!(

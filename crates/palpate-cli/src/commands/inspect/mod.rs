@@ -184,7 +184,11 @@ fn ranges(numbers: &[usize]) -> String {
 fn material_text(material: &Material) -> String {
     let region = if material.region.is_empty() { String::new() } else { format!("{}: ", material.region) };
     let Material { young_pa, poisson, density_kg_m3, .. } = material;
-    format!("{region}E = {young_pa} Pa, ν = {poisson}, ρ = {density_kg_m3} kg/m³")
+    let law = match material.stiffness_pa {
+        None => format!("E = {young_pa} Pa, ν = {poisson}"),
+        Some(_) => format!("anisotropic, means E = {young_pa:.3e} Pa, ν = {poisson:.3}"),
+    };
+    format!("{region}{law}, ρ = {density_kg_m3} kg/m³")
 }
 
 fn frequencies_hz(recording: &Recording) -> Vec<f64> {
@@ -205,6 +209,7 @@ pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
     let residual: Value = match &recording.residual {
         ResidualCompliance::None => json!({ "kind": "none" }),
         ResidualCompliance::Whole(_) => json!({ "kind": "whole" }),
+        ResidualCompliance::Quantised(_) => json!({ "kind": "whole", "quantised": true }),
         ResidualCompliance::NearField(near) => {
             json!({ "kind": "near_field", "radius_m": near.radius })
         }
@@ -281,6 +286,9 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
         }
         ResidualCompliance::Whole(_) => {
             writeln!(out, "  residual     compliance of what the modes miss: whole")?
+        }
+        ResidualCompliance::Quantised(_) => {
+            writeln!(out, "  residual     compliance of what the modes miss: whole, in 16 bits")?
         }
         ResidualCompliance::NearField(near) => {
             writeln!(out, "  residual     compliance of what the modes miss: within {:.4} m", near.radius)?

@@ -1,32 +1,39 @@
 //! `palpate record`: from a mesh to a recording.
 
+mod dry_run;
+mod material_choice;
 mod node_selection;
+mod support_options;
 mod table;
 
 use crate::commands::inspect;
 use crate::failure::Failure;
 use crate::progress::Bars;
 use clap::Args;
-use node_selection::select;
-use palpate::{Damping, Material};
+use material_choice::{damping, materials};
 use palpate_export::{check_writable, write_atomically};
-use palpate_fem::mesh::Mesh;
 use palpate_fem::{
-    ElementOrder, Progress, RecordExtent, RecordParameters, RecordedBody, ResidualChoice,
-    materials_from_toml, read_regular_text,
+    ElementOrder, ErrorTarget, Precision, Progress, RecordExtent, RecordParameters, RecordedBody,
+    ResidualChoice,
 };
-use palpate_scene::{read_mesh, source_name};
+use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Repair};
+use palpate_scene::{read_body, source_name};
 use std::path::{Path, PathBuf};
+use support_options::supports;
 use table::{TableArguments, TableCommand};
 
 /// Record the impulse responses of an elastic body by finite elements
 ///
-/// Reads or makes a tetrahedral mesh, computes its lowest elastic modes and the residual compliance, certifies the error
+/// Reads or makes a tetrahedral mesh, or fills a closed surface with tetrahedra, computes its lowest elastic modes and the residual compliance, certifies the error
 /// against the unreduced model, and writes one recording for `palpate run`.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = "Examples:
   palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 -o cube.palp
   palpate record liver.msh --scale 0.001 --young 5e3 --poisson 0.45 --density 1060 --fix ligament -o liver.palp
+  palpate record box:0.2x0.05x0.05/12x3x3 --material rubber --fix 'x: x<-0.099' --spring '1e6: z<-0.024' -o bar.palp
+  palpate record liver.stl --scale 0.001 --young 5e3 --poisson 0.45 --density 1060 --cell-size 0.008 -o liver.palp
+  palpate record liver.msh --scale 0.001 --material liver --damping-ratio 0.1 -o liver.palp     # `palpate materials` has the names
+  palpate record liver.stl --scale 0.001 --cell-size 0.004 --material liver --dry-run     # what it will take
   palpate record hand.msh --materials hand.toml -o hand.palp
   palpate record box:0.1x0.1x0.1/12x12x12 --order 1 --young 2000 --poisson 0.49 --density 110 --rayleigh 2,2e-4 \
       --dense cube.zarr --method transient --step 0.002 --duration 1
@@ -36,22 +43,41 @@ A material file has a table per region of the mesh:
   region = \"skin\"      # name or number in the mesh file
   young = 5e4          # Pa
   poisson = 0.45
-  density = 1000.0     # kg/m³")]
+  density = 1000.0     # kg/m³
+In place of young and poisson a table may have name = \"liver\", or for anisotropic materials
+  orthotropic = { young = [E1, E2, E3], poisson = [ν12, ν13, ν23], shear = [G12, G13, G23] }
+  stiffness = [21 numbers]          # upper triangle by rows; xx, yy, zz, yz, xz, xy; Pa
+  axes = [[1, 0, 0], [0, 1, 0]]     # the material's first and second axis in the mesh")]
 pub struct Arguments {
-    /// A Gmsh (.msh) or VTK legacy (.vtk) file, box:LXxLYxLZ/NXxNYxNZ (metres / cells), or sphere:RADIUS/N
+    /// A mesh file of solid elements (Gmsh, VTK, VTU, TetGen, MEDIT, Vega, Abaqus) or of a closed surface (STL, OBJ, PLY, OFF, glTF), see `palpate mesh --help`; box:LXxLYxLZ/NXxNYxNZ (metres / cells; five tetrahedra per cell, or six with /6 after it: for thin plates), or sphere:RADIUS/N
     pub source: String,
     /// The recording to write; may be left out with --dense
-    #[arg(short, long, value_name = "OUT.palp", required_unless_present = "dense")]
+    #[arg(short, long, value_name = "OUT.palp", required_unless_present_any = ["dense", "dry_run"])]
     pub output: Option<PathBuf>,
-    /// Young's modulus [Pa]
-    #[arg(long, value_name = "PA", allow_negative_numbers = true, required_unless_present = "materials")]
+    /// Young's modulus [Pa]; may be left out with its two fellows where the mesh file gives materials
+    #[arg(
+        long,
+        value_name = "PA",
+        allow_negative_numbers = true,
+        requires = "poisson",
+        requires = "density"
+    )]
     pub young: Option<f64>,
     /// Poisson's ratio, below 0.5
-    #[arg(long, allow_negative_numbers = true, required_unless_present = "materials")]
+    #[arg(long, allow_negative_numbers = true, requires = "young", requires = "density")]
     pub poisson: Option<f64>,
     /// Density [kg/m³]
-    #[arg(long, value_name = "KG/M³", allow_negative_numbers = true, required_unless_present = "materials")]
+    #[arg(
+        long,
+        value_name = "KG/M³",
+        allow_negative_numbers = true,
+        requires = "young",
+        requires = "poisson"
+    )]
     pub density: Option<f64>,
+    /// Material by name, for the whole body or for a region of the mesh: see `palpate materials`; may be repeated
+    #[arg(long, value_name = "NAME|REGION=NAME", conflicts_with_all = ["young", "poisson", "density", "materials"])]
+    pub material: Vec<String>,
     /// Materials by region of the mesh, a TOML file (see below)
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["young", "poisson", "density"])]
     pub materials: Option<PathBuf>,
@@ -65,33 +91,90 @@ pub struct Arguments {
         conflicts_with = "damping_ratio"
     )]
     pub rayleigh: Option<Vec<f64>>,
-    /// Damping ratio of every mode; without it and --rayleigh nothing is damped
+    /// Damping ratio of every mode; without it and --rayleigh nothing is damped, unless a --material says so
     #[arg(long, value_name = "ZETA", allow_negative_numbers = true)]
     pub damping_ratio: Option<f64>,
     /// Elastic modes to keep: more for faster events (see `bandwidth` in the certificate)
     #[arg(long, default_value_t = 200)]
     pub modes: usize,
-    /// Order of the elements; 1 locks for Poisson's ratios near 0.5
+    /// Choose the modes by the error, the fewest of 25, 50, 100, …: upper limit of the peak force error in the certificate, 0.01 for 1 %
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, conflicts_with_all = ["modes", "dense", "dry_run"])]
+    pub force_error: Option<f64>,
+    /// Choose the modes by the bandwidth in the certificate: its lower limit [Hz]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, conflicts_with_all = ["modes", "dense", "dry_run"])]
+    pub bandwidth: Option<f64>,
+    /// Order of the elements; 1 locks for Poisson's ratios near 0.5, and takes curved edges of the mesh straight
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
     /// Scale from the file's units to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     pub scale: f64,
-    /// Fix nodes: a named group of the mesh, a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale, or the words of --touchable; may be repeated. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 are fixed when both ends of their edge are
-    #[arg(long, value_name = "GROUP|CONDITION")]
+    /// Side of the cells that a surface is filled with [m]: tetrahedra have edges of 0.87 to 1 of it. Without it about 2,000 nodes come out
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub cell_size: Option<f64>,
+    /// Fix nodes: a named group of the mesh, a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale, or the words of --touchable; may be repeated. Axes before a colon hold these alone, as rollers do: 'z: z<0.001'. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 count as nodes, each by its own place; in a group they are where the file has them, or else where both ends of their edge are
+    #[arg(long, value_name = "[AXES:] GROUP|CONDITION")]
     pub fix: Vec<String>,
-    /// Merge nodes at the same point
-    #[arg(long)]
-    pub merge_nodes: bool,
+    /// Put faces of the surface on springs to the ground: stiffness per area [N/m³], axes (all without), and nodes as for --fix; may be repeated
+    #[arg(long, value_name = "STIFFNESS [AXES]: NODES")]
+    pub spring: Vec<String>,
+    /// Merge nodes at the same point: auto, where the body falls into fewer pieces by it; always; never
+    #[arg(long, value_name = "WHEN", value_enum, num_args = 0..=1, require_equals = true, default_value = "auto", default_missing_value = "always")]
+    pub merge_nodes: MergeChoice,
+    /// Piece of a body in several pieces: largest, or its number in `palpate mesh`
+    #[arg(long, value_name = "largest|N", value_parser = piece_choice)]
+    pub piece: Option<PieceChoice>,
     /// Residual compliance: auto, whole, none, or a cut-off radius in metres
     #[arg(long, default_value = "auto", allow_hyphen_values = true, value_parser = residual_choice)]
     pub residual: ResidualChoice,
+    /// Precision of the file: compact rounds compliances by 0.012 % at most, which the certificate includes. Without it compact, and full with --dense
+    #[arg(long)]
+    pub precision: Option<PrecisionOption>,
+    /// Say what the recording will take, nodes, memory, time and size of the file, and record nothing
+    #[arg(long, conflicts_with = "dense")]
+    pub dry_run: bool,
     /// Print what `inspect --json` prints; of the store, if there is no -o
     #[arg(long)]
     pub json: bool,
     /// The paper's table
     #[command(flatten)]
     pub dense: TableArguments,
+}
+
+/// Values of `--merge-nodes`.
+#[derive(clap::ValueEnum, Debug, Clone, Copy)]
+pub enum MergeChoice {
+    Auto,
+    Always,
+    Never,
+}
+
+impl From<MergeChoice> for MergeNodes {
+    fn from(choice: MergeChoice) -> Self {
+        match choice {
+            MergeChoice::Auto => Self::JoiningPieces,
+            MergeChoice::Always => Self::Always,
+            MergeChoice::Never => Self::Never,
+        }
+    }
+}
+
+/// Value of `--piece`.
+pub fn piece_choice(text: &str) -> Result<PieceChoice, String> {
+    match (text, text.parse()) {
+        ("largest", _) => Ok(PieceChoice::Largest),
+        (_, Ok(number)) if number > 0 => Ok(PieceChoice::Number(number)),
+        _ => Err("expected largest, or a number from 1".into()),
+    }
+}
+
+/// Precision, as on the command line.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub enum PrecisionOption {
+    /// 16 bits, compressed: about 4 MB for 900 surface nodes.
+    Compact,
+    /// Mode shapes of 64 bits, compliances of 32: four to five times larger.
+    Full,
 }
 
 fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
@@ -114,17 +197,27 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         check_writable(output, &inputs)?;
     }
     let mut progress = Bars::new();
-    let mut mesh = read_mesh(&arguments.source)?;
-    mesh.scale(arguments.scale)?;
-    if arguments.merge_nodes {
-        let merged = mesh.merge_coincident_nodes();
-        progress.warn(&format!("{merged} nodes lay on others and were merged"));
+    let meshing = MeshingParameters { cell_size: arguments.cell_size };
+    let mut mesh = read_body(&arguments.source, arguments.scale, &meshing, &mut progress)?;
+    let repair =
+        Repair { merge_nodes: arguments.merge_nodes.into(), piece: arguments.piece.unwrap_or_default() };
+    mesh.repair(&repair).map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
+    if arguments.order == 2 {
+        mesh.add_mid_edge_nodes();
     }
     let table = TableCommand::new(&arguments.dense, &mesh)?;
     let extent = table.as_ref().map_or(RecordExtent::Full, |table| table.extent(arguments.output.is_some()));
     let parameters = parameters(arguments, extent, &mesh)?;
-    let recorded = RecordedBody::new(mesh, &parameters, &mut progress)
-        .map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
+    if arguments.dry_run {
+        return dry_run::print_estimate(arguments, mesh, &parameters);
+    }
+    let target = ErrorTarget { force_error: arguments.force_error, bandwidth_hz: arguments.bandwidth };
+    let recorded = if target == ErrorTarget::default() {
+        RecordedBody::new(mesh, &parameters, &mut progress)
+    } else {
+        RecordedBody::within(&mesh, &parameters, &target, &mut progress)
+    };
+    let recorded = recorded.map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
     let mut written = None;
     if let Some(output) = &arguments.output {
         progress.begin("writing", 1);
@@ -147,37 +240,21 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn parameters(arguments: &Arguments, extent: RecordExtent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
-    let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
-        (Some(path), ..) => {
-            let text = read_regular_text(path).map_err(|e| Failure::file("read the materials", path, &e))?;
-            materials_from_toml(&text, mesh).map_err(|e| Failure(format!("{}: {e}", path.display())))?
-        }
-        (None, Some(young_pa), Some(poisson), Some(density_kg_m3)) => {
-            let material = Material { region: String::new(), young_pa, poisson, density_kg_m3 };
-            vec![material; mesh.regions.len()]
-        }
-        _ => {
-            return Err(Failure("give --young, --poisson and --density, or --materials".into()));
-        }
-    };
-    let damping = match (arguments.rayleigh.as_deref(), arguments.damping_ratio) {
-        (Some(&[alpha, beta]), _) => Damping::Rayleigh { alpha, beta },
-        (Some(other), _) => {
-            return Err(Failure(format!("--rayleigh is {other:?}, expected two numbers ALPHA,BETA")));
-        }
-        (None, ratio) => Damping::Ratio(ratio.unwrap_or(0.0)),
-    };
-    let mut fixed_nodes = Vec::new();
-    for selection in &arguments.fix {
-        fixed_nodes.extend(select(mesh, "--fix", selection)?.mesh_nodes);
-    }
+    let (materials, named_damping) = materials(arguments, mesh)?;
+    let damping = damping(arguments, named_damping)?;
+    let (fixed_nodes, supports) = supports(mesh, &arguments.fix, &arguments.spring)?;
     Ok(RecordParameters {
         materials,
         order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
         modes: arguments.modes,
         damping,
         residual: arguments.residual,
+        precision: match (arguments.precision, &arguments.dense.dense) {
+            (Some(PrecisionOption::Compact), _) | (None, None) => Precision::Compact,
+            (Some(PrecisionOption::Full), _) | (None, Some(_)) => Precision::Full,
+        },
         fixed_nodes,
+        supports,
         source: source_name(&arguments.source),
         extent,
     })

@@ -1,19 +1,18 @@
 //! Selection of nodes by text: fixed, touchable, observed.
 //!
 //! `all`, `surface`, `region:NAME`, `nodes:1,5-9` (numbers in the input mesh, from 0), a named group of the mesh, or a
-//! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold.
+//! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold. Mid-edge nodes are nodes of the mesh as any
+//! other ([`Mesh::add_mid_edge_nodes`]).
 
 use crate::failure::Failure;
 use palpate_fem::RecordedBody;
-use palpate_fem::mesh::{Mesh, Region};
+use palpate_mesh::{Mesh, Region};
 
 /// Nodes of a mesh, selected by a text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
     /// Ascending.
     pub mesh_nodes: Vec<u32>,
-    /// Whether `surface` is one of the conditions: then mid-edge nodes must lie on it, too.
-    surface: bool,
 }
 
 /// Nodes that a text selects; `option` names it in errors.
@@ -34,19 +33,15 @@ pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failur
     if mesh_nodes.is_empty() {
         return Err(Failure(format!("{option} {text:?} selects no node; {}", extent(mesh))));
     }
-    Ok(Selection { mesh_nodes, surface: parts.contains(&"surface") })
+    Ok(Selection { mesh_nodes })
 }
 
 /// Nodes of a discretisation in the union of selections, ascending.
 pub fn union(body: &RecordedBody, selections: &[Selection]) -> Vec<u32> {
     let mut chosen = vec![false; body.nodes().len()];
-    let mut on_surface = vec![false; body.nodes().len()];
-    body.surface_nodes().iter().for_each(|&node| on_surface[node as usize] = true);
     for selection in selections {
         let among = body.nodes_in_set(&selection.mesh_nodes);
-        for (node, chosen) in chosen.iter_mut().enumerate() {
-            *chosen |= among[node] && (!selection.surface || on_surface[node]);
-        }
+        chosen.iter_mut().zip(among).for_each(|(chosen, among)| *chosen |= among);
     }
     (0..chosen.len() as u32).filter(|&node| chosen[node as usize]).collect()
 }
@@ -59,14 +54,14 @@ fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
     } else if part == "all" {
         holds.fill(true);
     } else if part == "surface" {
-        mesh.boundary().iter().flatten().for_each(|&node| holds[node as usize] = true);
+        mark(mesh, mesh.boundary().iter().map(|triangle| &triangle[..]), &mut holds);
     } else if let Some(name) = part.strip_prefix("region:") {
         let named = |at: u32| {
             let region = &mesh.regions[at as usize];
             region.label() == name || region.tag.to_string() == name
         };
         let tets = mesh.tets.iter().zip(&mesh.tet_regions).filter(|(_, region)| named(**region));
-        tets.flat_map(|(tet, _)| tet).for_each(|&node| holds[node as usize] = true);
+        mark(mesh, tets.map(|(tet, _)| &tet[..]), &mut holds);
         if !holds.contains(&true) {
             let regions: Vec<String> = mesh.regions.iter().map(Region::label).collect();
             return Err(Failure(format!("the mesh has no region {name:?}; it has {}", regions.join(", "))));
@@ -91,6 +86,17 @@ fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
         return Ok(None);
     }
     Ok(Some(holds))
+}
+
+/// Marks the corners of triangles or tetrahedra, and the nodes on their edges.
+fn mark<'a>(mesh: &Mesh, simplices: impl Iterator<Item = &'a [u32]>, holds: &mut [bool]) {
+    for corners in simplices {
+        for (at, &a) in corners.iter().enumerate() {
+            holds[a as usize] = true;
+            let middles = corners[..at].iter().filter_map(|&b| mesh.mid_edge_node(a, b));
+            middles.for_each(|node| holds[node as usize] = true);
+        }
+    }
 }
 
 fn known_groups(mesh: &Mesh) -> String {
@@ -140,8 +146,8 @@ impl Condition {
 mod tests {
     use super::*;
     use palpate::{Damping, Material};
-    use palpate_fem::mesh::{NodeGroup, box_mesh};
     use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, ResidualChoice, SilentProgress};
+    use palpate_mesh::{NodeGroup, box_mesh};
 
     fn chosen(mesh: &Mesh, text: &str) -> usize {
         select(mesh, "--fix", text).map_or(0, |selection| selection.mesh_nodes.len())
@@ -177,22 +183,27 @@ mod tests {
     }
 
     #[test]
+    fn mid_edge_nodes_are_selected_by_their_own_place() {
+        let mut mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
+        mesh.add_mid_edge_nodes();
+        assert_eq!(chosen(&mesh, "all"), 26);
+        // Of the low face: four corners, four middles of sides and one of its diagonal.
+        assert_eq!(chosen(&mesh, "x<-0.4"), 9);
+        // Ends are on no corner, and corners of two edges are no reason for their middle.
+        assert_eq!(chosen(&mesh, "x<-0.4 & y>-0.4 & y<0.4"), 3);
+        assert_eq!(chosen(&mesh, "nodes:0-3"), 4);
+        assert_eq!(chosen(&mesh, "region:0"), 26);
+    }
+
+    #[test]
     fn the_surface_of_quadratic_elements_has_no_node_inside() {
-        let mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
+        let mut mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
+        mesh.add_mid_edge_nodes();
+        let soft = Material::isotropic(1e4, 0.3, 1e3);
         let parameters = RecordParameters {
-            materials: vec![Material {
-                region: String::new(),
-                young_pa: 1e4,
-                poisson: 0.3,
-                density_kg_m3: 1e3,
-            }],
-            order: ElementOrder::Quadratic,
-            modes: 1,
-            damping: Damping::Ratio(0.0),
             residual: ResidualChoice::None,
-            fixed_nodes: Vec::new(),
-            source: String::new(),
             extent: RecordExtent::NoModes,
+            ..RecordParameters::new(vec![soft], ElementOrder::Quadratic, 1, Damping::Ratio(0.0))
         };
         let body = RecordedBody::new(mesh.clone(), &parameters, &mut SilentProgress).expect("a body");
         let selection = select(&mesh, "--touchable", "surface").expect("a surface");

@@ -6,9 +6,9 @@ use crate::progress::Bars;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use palpate::{Metadata, Sampling};
-use palpate_fem::mesh::Mesh;
 use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use palpate_fem::{Progress, RecordExtent, RecordedBody};
+use palpate_mesh::Mesh;
 use palpate_store::{Compression, Location, Number, Part, TableAttributes, TableContent, TableStore};
 use rayon::prelude::*;
 

@@ -112,7 +112,8 @@ impl SceneProvider for LibraryProvider {
 
     fn record(&self, upload: Upload, job: JobControl) -> Result<ViewerScene, SceneError> {
         let Upload { name, bytes, scale, material, modes } = upload;
-        let upload = MeshUpload { name, bytes, scale, material: uniform(material), modes };
+        let material = uniform(material);
+        let upload = MeshUpload { name, bytes, scale, cell_size: None, material, modes };
         self.provided(self.library.record_upload(upload, &mut JobProgress::new(job)))
     }
 }
@@ -147,7 +148,7 @@ impl Progress for JobProgress<'_> {
 /// Material of all regions.
 fn uniform(material: MaterialDescription) -> Material {
     let MaterialDescription { young, poisson, density } = material;
-    Material { region: String::new(), young_pa: young, poisson, density_kg_m3: density }
+    Material::isotropic(young, poisson, density)
 }
 
 fn viewer_device(device: &SceneDevice) -> ViewerDevice {

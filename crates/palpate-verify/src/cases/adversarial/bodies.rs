@@ -4,7 +4,7 @@ use crate::error::VerifyError;
 use glam::DVec3;
 use palpate::Recording;
 use palpate_fem::ElementOrder;
-use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
+use palpate_mesh::{Mesh, ball_mesh, box_mesh};
 use palpate_testkit::ElasticMaterial;
 use std::sync::Arc;
 

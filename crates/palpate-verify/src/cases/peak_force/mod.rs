@@ -10,9 +10,9 @@ use crate::error::VerifyError;
 use glam::DVec3;
 use motions::{Hands, Motion, RISE, WAIT, forces_of, motions};
 use palpate::{Damping, PeakForceError, Recording};
-use palpate_fem::mesh::{Mesh, ball_mesh, box_mesh};
 use palpate_fem::paper_cube::{DENSITY_KG_M3, POISSON, YOUNG_PA};
 use palpate_fem::{ElementOrder, RecordExtent, RecordParameters, SilentProgress, record};
+use palpate_mesh::{Mesh, ball_mesh, box_mesh};
 use palpate_testkit::{nodes_where, undamped};
 use std::sync::Arc;
 

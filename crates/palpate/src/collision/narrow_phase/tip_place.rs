@@ -78,7 +78,7 @@ impl CollisionContext<'_> {
         let (body, parameters) = (&object.body, &self.scene.devices[number]);
         let (centre, tip) = (pose.body_from_world(place), parameters.ball_radius(body));
         let (query, mut surface) = self.query_and_surface(number, at);
-        if !object.is_touchable() || centre.length() - tip > object.radius + surface.max_displacement() {
+        if centre.length() - tip > object.radius + surface.max_displacement() {
             return None;
         }
         let nearest = ProximityQuery::nearest(&mut surface, centre, f64::INFINITY)?;
