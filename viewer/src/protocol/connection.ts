@@ -21,6 +21,7 @@ export interface ConnectionListener {
 const FIRST_RETRY_MS = 400;
 const MAX_RETRY_MS = 8000;
 const SILENCE_TIMEOUT_MS = 5000;
+const WATCHDOG_INTERVAL_MS = 1000;
 const SEND_BUFFER_BYTES = 1 << 20;
 
 /** Delay before reconnection attempt n = 0, 1, … [ms]: exponential backoff with an upper bound. */
@@ -34,13 +35,15 @@ export class Connection {
   private attempt = 0;
   private timer = 0;
   private receivedAt = 0;
+  private checkedAt = 0;
   private expectsStatus = false;
   private watchdog = 0;
 
   constructor(private readonly listener: ConnectionListener) {}
 
   start(): void {
-    this.watchdog = window.setInterval(() => this.checkAlive(), 1000);
+    this.checkedAt = performance.now();
+    this.watchdog = window.setInterval(() => this.checkAlive(), WATCHDOG_INTERVAL_MS);
     this.connect();
   }
 
@@ -113,16 +116,19 @@ export class Connection {
     this.timer = window.setTimeout(() => this.connect(), wait);
   }
 
-  /** Reconnects when a server that sends status messages falls silent. */
+  /** Reconnects when a server that sends status messages falls silent. Messages that came while the page was hidden or stalled (suspended computer, slow drawing) are still queued, so silence counts from then. */
   private checkAlive(): void {
-    if (document.hidden) {
-      this.receivedAt = performance.now();
+    const now = performance.now();
+    const stalled = now - this.checkedAt > 2 * WATCHDOG_INTERVAL_MS;
+    this.checkedAt = now;
+    if (document.hidden || stalled) {
+      this.receivedAt = now;
       return;
     }
     const socket = this.socket;
     const connecting = socket?.readyState === WebSocket.CONNECTING;
     if (socket === null || !(this.expectsStatus || connecting)) return;
-    if (performance.now() - this.receivedAt < (connecting ? 2 * SILENCE_TIMEOUT_MS : SILENCE_TIMEOUT_MS)) return;
+    if (now - this.receivedAt < (connecting ? 2 * SILENCE_TIMEOUT_MS : SILENCE_TIMEOUT_MS)) return;
     this.handleLoss("the server does not respond");
     socket.close();
   }

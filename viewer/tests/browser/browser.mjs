@@ -77,19 +77,26 @@ export async function waitForScene(page) {
   await page.waitForFunction(() => (window.palpate?.sceneView.graphs[0]?.frame ?? null) !== null, null, { timeout: 60_000 });
 }
 
-/** Summary of the newest frame. */
-export function latestFrame(page) {
-  return page.evaluate(() => {
-    const { frame } = window.palpate.sceneView.graphs[0];
-    return {
-      step: frame.step,
-      time: frame.time,
-      generation: frame.generation,
-      devices: frame.devices.map(({ mode, force, position }) => ({ mode, position, force: Math.hypot(...force) })),
-      contacts: frame.contacts.length,
-      pose: [...frame.objects[0].pose],
-    };
-  });
+/** Summary of the newest frame; waits for the first one of a scene that the page is loading (again). */
+export async function latestFrame(page) {
+  const summary = await page.waitForFunction(
+    () => {
+      const frame = window.palpate?.sceneView.graphs[0]?.frame ?? null;
+      return (
+        frame !== null && {
+          step: frame.step,
+          time: frame.time,
+          generation: frame.generation,
+          devices: frame.devices.map(({ mode, force, position }) => ({ mode, position, force: Math.hypot(...force) })),
+          contacts: frame.contacts.length,
+          pose: [...frame.objects[0].pose],
+        }
+      );
+    },
+    null,
+    { polling: 50, timeout: 60_000 },
+  );
+  return summary.jsonValue();
 }
 
 /** Page position [px] of a point `right` and `up` of the first object's centre, in object radii. */

@@ -131,6 +131,27 @@ export const liveCases = [
     },
   },
   {
+    name: "a page that stalled keeps its connection",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      // The status tells the page that this server is never silent.
+      await page.waitForFunction(() => document.querySelector(".timing")?.textContent.includes("Lateness"));
+      const kept = await page.evaluate(async () => {
+        const { sceneView } = window.palpate;
+        const [graph] = sceneView.graphs;
+        const { step } = graph.frame;
+        const end = performance.now() + 7000;
+        while (performance.now() < end);
+        await new Promise((done) => setTimeout(done, 1500));
+        return sceneView.graphs[0] === graph && graph.frame.step > step;
+      });
+      assert(kept, "the page has connected again");
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
     name: "two viewers see the same scene and the viewer count",
     async run(browser) {
       const server = browser.keep(await start());
