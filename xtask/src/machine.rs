@@ -93,7 +93,7 @@ fn place(program: &str) -> Option<PathBuf> {
 }
 
 /// Install Debian packages where that is possible: apt, as root.
-fn install(packages: &[&str]) {
+pub fn install(packages: &[&str]) {
     let root = Command::new("id").arg("-u").output().is_ok_and(|out| out.stdout.trim_ascii() == b"0");
     if !root || !runs("apt-get", &["--version"]) {
         return;

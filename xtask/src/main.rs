@@ -7,6 +7,9 @@ mod dependencies;
 mod fuzz;
 mod machine;
 mod process;
+mod sanitizers;
+mod standard_library;
+mod systems;
 mod tests;
 mod viewer;
 
@@ -84,6 +87,18 @@ const CHORES: &[Chore] = &[
         summary: "build the runtime for a target without an operating system (no_std)",
         flags: &[],
         run: |_| bare::build(),
+    },
+    Chore {
+        name: "systems",
+        summary: "check palpate for Windows and macOS",
+        flags: &[("--only", systems::NAMES, "one of them")],
+        run: |flags| systems::check_all(flags.value("--only")),
+    },
+    Chore {
+        name: "sanitizers",
+        summary: "run the tests of the force process, devices and links under the thread and the address sanitizer",
+        flags: &[("--only", sanitizers::SANITIZERS, "one of them")],
+        run: |flags| sanitizers::run_tests(flags.value("--only")),
     },
     Chore {
         name: "fuzz",

@@ -34,6 +34,21 @@ pub fn cargo(arguments: &[&str]) -> Result<(), String> {
     run(Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(arguments))
 }
 
+/// `cargo check` for a target, with its outputs in a folder. Nothing of it runs but macros and build scripts, so nothing is optimised.
+pub fn check(target: &str, folder: PathBuf) -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args([
+        "check",
+        "--locked",
+        "--target",
+        target,
+        "--config",
+        "profile.dev.package.\"*\".opt-level=0",
+    ]);
+    cargo.env("CARGO_TARGET_DIR", folder);
+    cargo
+}
+
 /// Release build of palpate.
 pub fn program() -> PathBuf {
     root().join("target/release/palpate").with_extension(std::env::consts::EXE_EXTENSION)

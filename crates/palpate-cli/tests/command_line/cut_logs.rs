@@ -1,7 +1,7 @@
-//! Logs of runs that were killed, or had no room on the disk.
+//! Logs and other outputs of runs that were killed, or had no room on the disk or in memory.
 
 use crate::viewer::Serving;
-use crate::workplace::{CUBE, Workplace, with_room};
+use crate::workplace::{CUBE, Workplace, with_memory, with_room};
 use palpate_testkit::wait_until;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
@@ -247,6 +247,45 @@ fn other_outputs_that_do_not_fit_are_told_and_leave_nothing() {
     let text = String::from_utf8(output.stderr).expect("text");
     assert!(text.ends_with("File too large (os error 27)\n") && output.status.code() == Some(1), "{text}");
     assert_eq!(workplace.files(), before);
+}
+
+#[test]
+fn outputs_are_whole_or_not_there_wherever_memory_runs_out() {
+    let workplace = Workplace::with_scene();
+    let record = [&CUBE[..], &["new.palp"]].concat();
+    let run = ["run", "scene.toml", "--realtime", "--duration", "0.05", "--log", "run.mcap"];
+    let csv = ["run", "scene.toml", "--csv", "steps.csv"];
+    let gltf = ["export", "cube.palp", "--gltf", "modes.glb"];
+    for (arguments, output) in
+        [(&record[..], "new.palp"), (&run, "run.mcap"), (&csv, "steps.csv"), (&gltf, "modes.glb")]
+    {
+        // Less than the program itself needs at first, then an eighth more each time.
+        let (mut failed, mut kilobytes) = (0, 8192);
+        loop {
+            let ended = with_memory(kilobytes)
+                .args(arguments)
+                .current_dir(workplace.path("."))
+                .output()
+                .expect("a shell");
+            if ended.status.success() {
+                break;
+            }
+            failed += 1;
+            assert!(!workplace.path(output).exists(), "{arguments:?} with {kilobytes} kB");
+            if workplace.path("run.mcap.part").exists() {
+                workplace.logged_steps("run.mcap.part");
+            }
+            kilobytes += kilobytes / 8;
+        }
+        assert!(failed >= 5, "{arguments:?}: {failed} attempts failed before {kilobytes} kB were enough");
+        let whole = workplace.read(output);
+        // What failed attempts have left hinders nothing.
+        std::fs::remove_file(workplace.path(output)).expect("an output");
+        workplace.succeed(arguments);
+        if output != "run.mcap" {
+            assert!(workplace.read(output) == whole, "{output}");
+        }
+    }
 }
 
 #[test]

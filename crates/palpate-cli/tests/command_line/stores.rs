@@ -1,6 +1,6 @@
 //! Stores of impulse responses: written, interrupted, shared, damaged, and used in scenes.
 
-use crate::workplace::{CUBE, SCENE, Table, Workplace};
+use crate::workplace::{CUBE, SCENE, Table, Workplace, with_memory};
 use palpate_testkit::{Random, made_once_per_run, wait_until};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -113,6 +113,30 @@ fn a_recording_that_is_killed_ten_times_ends_with_the_same_bytes() {
         child.wait().expect("a child");
     }
     assert!(interrupted >= 5, "most runs are killed while they work: {interrupted}");
+    workplace.succeed(&TABLE);
+    same(&whole_store().0, &workplace.path("t.zarr"));
+}
+
+#[test]
+fn a_recording_without_room_or_memory_goes_on_where_it_stood() {
+    let workplace = Workplace::new();
+    for blocks in [0, 1, 2, 4, 8, 16, 32, 64] {
+        let output = workplace.palpate_with_room(blocks, &TABLE);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "with {blocks} blocks: {text}");
+        assert!(text.contains("File too large (os error 27)"), "with {blocks} blocks: {text}");
+    }
+    let mut failed = 0;
+    let mut kilobytes = 8192;
+    loop {
+        let output = with_memory(kilobytes).args(TABLE).current_dir(workplace.path("")).output();
+        if output.expect("a shell").status.success() {
+            break;
+        }
+        failed += 1;
+        kilobytes += kilobytes / 8;
+    }
+    assert!(failed >= 5, "{failed} attempts failed before {kilobytes} kB were enough");
     workplace.succeed(&TABLE);
     same(&whole_store().0, &workplace.path("t.zarr"));
 }

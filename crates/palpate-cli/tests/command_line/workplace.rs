@@ -49,6 +49,16 @@ pub fn with_room(blocks: u64) -> Command {
     command
 }
 
+/// The command `palpate` with an address space of so many kilobytes: allocations beyond it fail.
+pub fn with_memory(kilobytes: u64) -> Command {
+    let mut command = Command::new("sh");
+    // No core files.
+    command
+        .args(["-c", &format!("ulimit -c 0; ulimit -v {kilobytes}; exec \"$@\""), "sh"])
+        .arg(env!("CARGO_BIN_EXE_palpate"));
+    command
+}
+
 /// The recording of [`CUBE`], made once per run.
 fn cube() -> PathBuf {
     let folder = made_once_per_run(Path::new(env!("CARGO_TARGET_TMPDIR")), "cube", |folder| {

@@ -2,6 +2,7 @@
 
 use super::client::{Client, Place, Shares};
 use super::limits::Limits;
+use super::paced_stream::PacedStream;
 use super::tls::TlsIdentity;
 use axum::Router;
 use hyper::server::conn::http1;
@@ -14,7 +15,6 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{sleep, timeout};
-use tokio_io_timeout::TimeoutStream;
 use tower_service::Service;
 
 /// Size limit of the head of a request [bytes]; also of what is buffered to be sent.
@@ -115,9 +115,7 @@ async fn serve_connection(
 ) {
     // Frames and forces are small, and late ones are useless.
     let _ = stream.set_nodelay(true);
-    let mut stream = TimeoutStream::new(stream);
-    stream.set_write_timeout(Some(limits.write_time));
-    let stream = Box::pin(stream);
+    let stream = PacedStream::new(stream, &limits);
     match &tls {
         None => serve_http(stream, client, router, &limits).await,
         Some(tls) => {

@@ -8,6 +8,7 @@ mod content;
 mod guard;
 mod headers;
 mod limits;
+mod paced_stream;
 mod page;
 mod routes;
 mod session;
