@@ -13,8 +13,8 @@ pub const NAMES: &[&str] = &["windows", "macos"];
 /// Target of a system, in the order of [`NAMES`].
 const TARGETS: [&str; 2] = ["x86_64-pc-windows-gnu", "x86_64-apple-darwin"];
 
-/// C compiler for Windows, and Debian's package of it. There is none for macOS.
-const MINGW: [&str; 2] = ["x86_64-w64-mingw32-gcc", "gcc-mingw-w64-x86-64"];
+/// C and C++ compiler for Windows, and Debian's package of it. There is none for macOS.
+const MINGW: [&str; 2] = ["x86_64-w64-mingw32-g++", "g++-mingw-w64-x86-64"];
 
 /// Check palpate for one system, or all.
 pub fn check_all(only: Option<&str>) -> Result<(), String> {
