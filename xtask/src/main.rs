@@ -3,6 +3,7 @@
 //! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
 
 mod bare;
+mod c_library;
 mod dependencies;
 mod fuzz;
 mod machine;
@@ -87,6 +88,12 @@ const CHORES: &[Chore] = &[
         summary: "build the runtime for a target without an operating system (no_std)",
         flags: &[],
         run: |_| bare::build(),
+    },
+    Chore {
+        name: "c",
+        summary: "build the C library with its header, pkg-config file and CMake package under target/palpate-c",
+        flags: &[],
+        run: |_| c_library::build(),
     },
     Chore {
         name: "systems",

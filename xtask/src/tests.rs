@@ -1,11 +1,11 @@
-//! Tests, by part: Rust, doc comments, Python, and the page in a browser. One release build serves them all.
+//! Tests, by part: Rust, doc comments, Python, C, and the page in a browser. One release build serves them all.
 
 use crate::process::{cargo, program, run};
-use crate::{machine, viewer};
+use crate::{c_library, machine, viewer};
 use std::process::Command;
 
 /// Parts of the tests in the order in which they run: the last lines are those of the Rust tests' runner.
-pub const PARTS: &[&str] = &["build", "python", "viewer", "doc", "rust"];
+pub const PARTS: &[&str] = &["build", "python", "viewer", "c", "doc", "rust"];
 
 /// All workspace members, as one release build.
 const WORKSPACE: &[&str] = &["--release", "--workspace", "--locked"];
@@ -22,6 +22,11 @@ pub fn run_parts(only: Option<&str>) -> Result<(), String> {
                 build()?;
                 viewer::test(&program())?;
             }
+            "c" => {
+                c_library::install_tools();
+                build()?;
+                c_library::test()?;
+            }
             "doc" => cargo(&[&["test"], WORKSPACE, &["--doc"]].concat())?,
             _ => rust()?,
         }
@@ -35,6 +40,7 @@ fn build() -> Result<(), String> {
 }
 
 fn rust() -> Result<(), String> {
+    c_library::install_tools();
     if machine::runs("cargo", &["nextest", "--version"]) {
         return cargo(&[&["nextest", "run"], WORKSPACE, &["--no-fail-fast"]].concat());
     }

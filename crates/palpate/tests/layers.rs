@@ -95,6 +95,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-render",
         ],
     ),
+    ("palpate-c", &["palpate", "palpate-scene"]),
     // Attacks see what strangers see.
     ("palpate-attack", &[]),
     ("xtask", &[]),

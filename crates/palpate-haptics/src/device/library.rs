@@ -2,6 +2,7 @@
 
 use crate::error::{DeviceError, Error};
 use libloading::Library;
+use std::mem::ManuallyDrop;
 
 /// Library of a vendor, and how to find it.
 pub(super) struct Vendor {
@@ -39,7 +40,7 @@ impl LibraryFiles {
 
 /// Loaded library. It is never unloaded: threads of the vendor may outlive the last device.
 pub(super) struct Loaded {
-    library: &'static Library,
+    library: ManuallyDrop<Library>,
     file: String,
     vendor: &'static Vendor,
 }
@@ -54,7 +55,7 @@ impl Vendor {
             // that is, the vendor's installation or the user says.
             match unsafe { Library::new(file) } {
                 Ok(library) => {
-                    let library = Box::leak(Box::new(library));
+                    let library = ManuallyDrop::new(library);
                     return Ok(Loaded { library, file: (*file).to_string(), vendor: self });
                 }
                 Err(error) => reason = error.to_string(),

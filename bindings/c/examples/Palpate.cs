@@ -1,0 +1,162 @@
+// palpate from C#, as in Unity: scene, state, steps, forces and surfaces. Put it beside libpalpate_c (palpate_c.dll on Windows).
+
+using System;
+using System.Runtime.InteropServices;
+
+namespace Palpate
+{
+    /// <summary>Vector in SI units.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Vector
+    {
+        public double X, Y, Z;
+
+        public Vector(double x, double y, double z)
+        {
+            X = x;
+            Y = y;
+            Z = z;
+        }
+    }
+
+    /// <summary>Device after a step: force on the hand [N], and proxy [m].</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct DeviceOutput
+    {
+        public Vector ForceOnHand, Proxy;
+    }
+
+    /// <summary>Failure of the library, with its status (PalpateStatus in palpate.h).</summary>
+    public class PalpateException : Exception
+    {
+        public readonly int Status;
+
+        public PalpateException(int status, string message) : base(message)
+        {
+            Status = status;
+        }
+    }
+
+    static class Library
+    {
+        const string Name = "palpate_c";
+
+        public const uint AbiVersion = 1;
+
+        [StructLayout(LayoutKind.Sequential)]
+        public struct Error
+        {
+            public int Status;
+            public uint Line;
+            [MarshalAs(UnmanagedType.ByValArray, SizeConst = 1024)]
+            public byte[] Message;
+        }
+
+        [DllImport(Name)] public static extern uint palpate_abi_version();
+        [DllImport(Name)] public static extern int palpate_scene_load(byte[] path, uint purpose, out IntPtr scene, out Error error);
+        [DllImport(Name)] public static extern void palpate_scene_free(IntPtr scene);
+        [DllImport(Name)] public static extern double palpate_scene_step_s(IntPtr scene);
+        [DllImport(Name)] public static extern IntPtr palpate_scene_find(IntPtr scene, uint part, byte[] name);
+        [DllImport(Name)] public static extern UIntPtr palpate_scene_node_count(IntPtr scene, UIntPtr thing);
+        [DllImport(Name)] public static extern int palpate_state_new(IntPtr scene, out IntPtr state, out Error error);
+        [DllImport(Name)] public static extern void palpate_state_free(IntPtr state);
+        [DllImport(Name)] public static extern int palpate_state_set_position(IntPtr state, UIntPtr device, Vector position);
+        [DllImport(Name)] public static extern int palpate_state_step(IntPtr state);
+        [DllImport(Name)] public static extern IntPtr palpate_state_devices(IntPtr state, out UIntPtr count);
+        [DllImport(Name)] public static extern IntPtr palpate_state_contacts(IntPtr state, out UIntPtr count);
+        [DllImport(Name)] public static extern int palpate_state_surface(IntPtr state, UIntPtr thing, double[] positions, UIntPtr count);
+
+        public static byte[] Text(string text)
+        {
+            return System.Text.Encoding.UTF8.GetBytes(text + "\0");
+        }
+
+        public static void Check(int status, Error error)
+        {
+            if (status == 0) return;
+            int end = Array.IndexOf(error.Message, (byte)0);
+            throw new PalpateException(status, System.Text.Encoding.UTF8.GetString(error.Message, 0, end));
+        }
+
+        public static void Check(int status)
+        {
+            if (status != 0) throw new PalpateException(status, "status " + status + " (palpate.h)");
+        }
+    }
+
+    /// <summary>Scene and its state. Not for several threads at once.</summary>
+    public sealed class Simulation : IDisposable
+    {
+        const uint RealTime = 0, Device = 1;
+
+        IntPtr scene, state;
+
+        public Simulation(string sceneFile)
+        {
+            if (Library.palpate_abi_version() != Library.AbiVersion) throw new PalpateException(0, "the library is of another version");
+            Library.Error error;
+            Library.Check(Library.palpate_scene_load(Library.Text(sceneFile), RealTime, out scene, out error), error);
+            Library.Check(Library.palpate_state_new(scene, out state, out error), error);
+        }
+
+        /// <summary>Duration of a step [s].</summary>
+        public double Step
+        {
+            get { return Library.palpate_scene_step_s(scene); }
+        }
+
+        /// <summary>Number of a device by its name; -1 where there is none.</summary>
+        public int FindDevice(string name)
+        {
+            return (int)Library.palpate_scene_find(scene, Device, Library.Text(name));
+        }
+
+        /// <summary>Sets the position of a device at the end of the next step [m].</summary>
+        public void SetPosition(int device, Vector position)
+        {
+            Library.Check(Library.palpate_state_set_position(state, (UIntPtr)device, position));
+        }
+
+        /// <summary>Advances by one step.</summary>
+        public void Advance()
+        {
+            Library.Check(Library.palpate_state_step(state));
+        }
+
+        /// <summary>Device after the last step.</summary>
+        public DeviceOutput Output(int device)
+        {
+            UIntPtr count;
+            IntPtr first = Library.palpate_state_devices(state, out count);
+            if (device < 0 || device >= (int)count) throw new ArgumentOutOfRangeException("device");
+            IntPtr own = IntPtr.Add(first, device * Marshal.SizeOf(typeof(DeviceOutput)));
+            return (DeviceOutput)Marshal.PtrToStructure(own, typeof(DeviceOutput));
+        }
+
+        /// <summary>Number of contacts that carry force.</summary>
+        public int Contacts
+        {
+            get
+            {
+                UIntPtr count;
+                Library.palpate_state_contacts(state, out count);
+                return (int)count;
+            }
+        }
+
+        /// <summary>Positions of an object's surface nodes [m], x, y, z in turn.</summary>
+        public double[] Surface(int thing)
+        {
+            double[] positions = new double[3 * (int)Library.palpate_scene_node_count(scene, (UIntPtr)thing)];
+            Library.Check(Library.palpate_state_surface(state, (UIntPtr)thing, positions, (UIntPtr)positions.Length));
+            return positions;
+        }
+
+        public void Dispose()
+        {
+            Library.palpate_state_free(state);
+            Library.palpate_scene_free(scene);
+            state = scene = IntPtr.Zero;
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! States: steps, surfaces, and points on them.
+
+use crate::error::{Error, Failure, Status, checked};
+use crate::output::Outputs;
+use crate::scene::{Loaded, Scene, no_part};
+use crate::types::{SurfacePoint, Vector};
+use glam::DVec3;
+use palpate::{DeviceInput, Grasp, Input, ResidualFieldCache, step};
+use std::ptr;
+use std::sync::Arc;
+
+/// State of a scene: placement, motion and deformation of its objects, and the input of its next step.
+pub struct State {
+    pub(crate) scene: Arc<Loaded>,
+    pub(crate) state: palpate::State,
+    /// Input of the next step.
+    pub(crate) input: Input,
+    /// Input in the scene's mode, for devices that take no part before their first position.
+    pub(crate) waiting: Vec<Option<DeviceInput>>,
+    pub(crate) outputs: Outputs,
+    /// Displacements of an object's nodes, and what they share from one surface to the next.
+    displacements: Vec<DVec3>,
+    residual_fields: Vec<ResidualFieldCache>,
+}
+
+impl State {
+    fn new(scene: Arc<Loaded>) -> Self {
+        let state = palpate::State::new(scene.model());
+        let mut input = scene.scene.input_at(0.0);
+        let mut waiting = vec![None; input.devices.len()];
+        for ((waiting, input), device) in waiting.iter_mut().zip(&mut input.devices).zip(&scene.scene.devices)
+        {
+            if device.path.is_none() {
+                *waiting = Some(std::mem::replace(input, DeviceInput::inactive()));
+            }
+        }
+        let outputs = Outputs::of(state.output());
+        let residual_fields =
+            scene.scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect();
+        Self { scene, state, input, waiting, outputs, displacements: Vec::new(), residual_fields }
+    }
+
+    fn copy(&self) -> Self {
+        Self {
+            scene: self.scene.clone(),
+            state: self.state.clone(),
+            input: self.input.clone(),
+            waiting: self.waiting.clone(),
+            outputs: Outputs::of(self.state.output()),
+            displacements: Vec::new(),
+            residual_fields: self.residual_fields.clone(),
+        }
+    }
+
+    /// Computes the displacements of an object's nodes [m, body].
+    fn displace(&mut self, object: usize) -> Result<(), Failure> {
+        let nodes = self.scene.surface(object)?.positions.len();
+        self.displacements.resize(nodes, DVec3::ZERO);
+        let deformation = self.state.deformation(object);
+        let fields = &mut self.residual_fields[object];
+        deformation.surface_displacement_cached(self.scene.model(), fields, &mut self.displacements);
+        Ok(())
+    }
+
+    /// A point in the present placement and deformation of its object [m, world].
+    fn position(&self, grasp: &Grasp) -> Result<DVec3, Failure> {
+        let surface = self.scene.surface(grasp.object)?;
+        self.scene.model().check_grasp(grasp)?;
+        let pose = self.state.output().objects[grasp.object].pose;
+        let displacement = self.state.point_displacement(self.scene.model(), grasp.object, &grasp.point);
+        Ok(pose.position + pose.orientation * (surface.rest_position(&grasp.point) + displacement))
+    }
+}
+
+/// Make a state at the start of its scene. `*state` is null unless it succeeds; free it with [`palpate_state_free`].
+///
+/// # Safety
+/// `scene` is a scene or null; `state` can be written; `error` can be, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_new(
+    scene: *const Scene,
+    state: *mut *mut State,
+    error: *mut Error,
+) -> Status {
+    // SAFETY: as promised by the caller.
+    let (scene, state, error) = unsafe { (scene.as_ref(), state.as_mut(), error.as_mut()) };
+    checked(error, || {
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        *state = ptr::null_mut();
+        let scene = scene.ok_or_else(|| Failure::argument("scene is null"))?;
+        *state = Box::into_raw(Box::new(State::new(scene.0.clone())));
+        Ok(())
+    })
+}
+
+/// Copy a state, which goes on as the original does. `*copy` is null unless it succeeds; free it with [`palpate_state_free`].
+///
+/// # Safety
+/// `state` is a state or null; `copy` can be written; `error` can be, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_copy(
+    state: *const State,
+    copy: *mut *mut State,
+    error: *mut Error,
+) -> Status {
+    // SAFETY: as promised by the caller.
+    let (state, copy, error) = unsafe { (state.as_ref(), copy.as_mut(), error.as_mut()) };
+    checked(error, || {
+        let copy = copy.ok_or_else(|| Failure::argument("copy is null"))?;
+        *copy = ptr::null_mut();
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        *copy = Box::into_raw(Box::new(state.copy()));
+        Ok(())
+    })
+}
+
+/// Free a state. Null is left alone.
+///
+/// # Safety
+/// `state` is from [`palpate_state_new`] or [`palpate_state_copy`], and not used any more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_free(state: *mut State) {
+    if !state.is_null() {
+        // SAFETY: from `Box::into_raw`, as promised by the caller.
+        drop(unsafe { Box::from_raw(state) });
+    }
+}
+
+/// Advance by one step with the input that was set. It allocates nothing, takes no lock and makes no system call;
+/// [`palpate_state_status`](crate::palpate_state_status) tells what it could not do.
+///
+/// # Safety
+/// `state` is a state or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
+    // SAFETY: as promised by the caller.
+    let state = unsafe { state.as_mut() };
+    checked(None, || {
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        let output = step(state.scene.model(), &mut state.state, &state.input);
+        state.outputs.update(output);
+        Ok(())
+    })
+}
+
+/// Positions of the nodes of an object's surface at the end of the last step [m]: `count` numbers, three for each of the
+/// [`palpate_scene_node_count`](crate::palpate_scene_node_count) nodes. Costs nodes × modes: for drawing, not for each step.
+///
+/// # Safety
+/// `state` is a state or null; `count` numbers can be written to `positions`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_surface(
+    state: *mut State,
+    object: usize,
+    positions: *mut f64,
+    count: usize,
+) -> Status {
+    // SAFETY: as promised by the caller.
+    let state = unsafe { state.as_mut() };
+    checked(None, || {
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        state.displace(object)?;
+        if positions.is_null() || count != 3 * state.displacements.len() {
+            return Err(Failure::argument("three numbers per node are asked"));
+        }
+        // SAFETY: not null, and so many numbers, as promised by the caller.
+        let out = unsafe { std::slice::from_raw_parts_mut(positions, count) };
+        let pose = state.state.output().objects[object].pose;
+        let rest = &state.scene.surface(object)?.positions;
+        for ((out, rest), displacement) in out.chunks_exact_mut(3).zip(rest).zip(&state.displacements) {
+            out.copy_from_slice(&(pose.position + pose.orientation * (*rest + *displacement)).to_array());
+        }
+        Ok(())
+    })
+}
+
+/// Point on an object's surface at rest that is nearest to a position [m], in the object's present placement: a point to hold.
+///
+/// # Safety
+/// `state` is a state or null; `point` can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_nearest_point(
+    state: *const State,
+    object: usize,
+    position: Vector,
+    point: *mut SurfacePoint,
+) -> Status {
+    // SAFETY: as promised by the caller.
+    let (state, point) = unsafe { (state.as_ref(), point.as_mut()) };
+    checked(None, || {
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        let point = point.ok_or_else(|| Failure::argument("point is null"))?;
+        let surface = state.scene.surface(object)?;
+        let pose = state.state.output().objects[object].pose;
+        let in_body = pose.orientation.inverse() * (DVec3::from(position) - pose.position);
+        let (nearest, _) = surface.nearest(in_body).ok_or_else(|| no_part("surface of object", object))?;
+        *point = Grasp { object, point: nearest }.into();
+        Ok(())
+    })
+}
+
+/// Position of a point of a surface at the end of the last step [m].
+///
+/// # Safety
+/// `state` is a state or null; `position` can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_point_position(
+    state: *const State,
+    point: SurfacePoint,
+    position: *mut Vector,
+) -> Status {
+    // SAFETY: as promised by the caller.
+    let (state, position) = unsafe { (state.as_ref(), position.as_mut()) };
+    checked(None, || {
+        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+        let position = position.ok_or_else(|| Failure::argument("position is null"))?;
+        *position = state.position(&point.into())?.into();
+        Ok(())
+    })
+}
