@@ -95,7 +95,7 @@ pub fn test() -> Result<(), String> {
     Ok(())
 }
 
-/// What the example prints of a press.
+/// Output of the example for a press.
 fn press(program: &mut Command, prefix: &Path, work: &Path) -> Result<String, String> {
     let program = program
         .args(["press.toml", "400", "20"])

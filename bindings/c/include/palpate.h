@@ -134,7 +134,7 @@ typedef struct {
   PalpateVector force;
 } PalpateDeviceInput;
 
-// What failed.
+// Failure with its message.
 typedef struct {
   // Kind.
   PalpateStatus status;
@@ -241,7 +241,7 @@ typedef struct {
   double slip_speed;
 } PalpateContactOutput;
 
-// What a step could not do.
+// Status of a step: what it could not do.
 typedef struct {
   // Largest residual of a contact's law [m].
   double solver_residual_m;
@@ -341,7 +341,7 @@ const PalpateContactOutput *palpate_state_contacts(const PalpateState *state, si
 // state is a state or null.
 const PalpateEnergy *palpate_state_energy(const PalpateState *state);
 
-// What the last step could not do; null for null.
+// Status of the last step, what it could not do; null for null.
 //
 // state is a state or null.
 const PalpateStepStatus *palpate_state_status(const PalpateState *state);

@@ -49,7 +49,7 @@ pub enum Status {
 /// Length of a message with its end [bytes].
 const MESSAGE_LENGTH: usize = 1024;
 
-/// What failed.
+/// Failure with its message.
 #[repr(C)]
 pub struct Error {
     /// Kind.

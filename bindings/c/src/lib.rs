@@ -13,6 +13,7 @@
 //! - A state keeps its scene alive: either may be freed first.
 //! - Arrays that a state returns are its own, and valid until its next step, or until it is freed.
 
+mod buffers;
 mod error;
 mod input;
 mod output;

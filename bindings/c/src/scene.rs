@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Scene that is ready to run: objects, devices, obstacles and their parameters, with names.
 pub struct Scene(pub(crate) Arc<Loaded>);
 
-/// What scene and states share.
+/// Scene as read, shared by handle and states.
 pub(crate) struct Loaded {
     pub scene: palpate_scene::Scene,
     names: [Vec<CString>; 4],

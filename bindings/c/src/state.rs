@@ -1,7 +1,7 @@
 //! States: steps, surfaces, and points on them.
 
+use crate::buffers::Buffers;
 use crate::error::{Error, Failure, Status, checked};
-use crate::output::Outputs;
 use crate::scene::{Loaded, Scene, no_part};
 use crate::types::{SurfacePoint, Vector};
 use glam::DVec3;
@@ -17,7 +17,7 @@ pub struct State {
     pub(crate) input: Input,
     /// Input in the scene's mode, for devices that take no part before their first position.
     pub(crate) waiting: Vec<Option<DeviceInput>>,
-    pub(crate) outputs: Outputs,
+    pub(crate) buffers: Buffers,
     /// Displacements of an object's nodes, and what they share from one surface to the next.
     displacements: Vec<DVec3>,
     residual_fields: Vec<ResidualFieldCache>,
@@ -34,10 +34,10 @@ impl State {
                 *waiting = Some(std::mem::replace(input, DeviceInput::inactive()));
             }
         }
-        let outputs = Outputs::of(state.output());
+        let buffers = Buffers::of(state.output());
         let residual_fields =
             scene.scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect();
-        Self { scene, state, input, waiting, outputs, displacements: Vec::new(), residual_fields }
+        Self { scene, state, input, waiting, buffers, displacements: Vec::new(), residual_fields }
     }
 
     fn copy(&self) -> Self {
@@ -46,7 +46,7 @@ impl State {
             state: self.state.clone(),
             input: self.input.clone(),
             waiting: self.waiting.clone(),
-            outputs: Outputs::of(self.state.output()),
+            buffers: Buffers::of(self.state.output()),
             displacements: Vec::new(),
             residual_fields: self.residual_fields.clone(),
         }
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
     checked(None, || {
         let state = state.ok_or_else(|| Failure::argument("state is null"))?;
         let output = step(state.scene.model(), &mut state.state, &state.input);
-        state.outputs.update(output);
+        state.buffers.update(output);
         Ok(())
     })
 }

@@ -207,7 +207,7 @@ pub struct ContactOutput {
     pub slip_speed: f64,
 }
 
-/// What a step could not do.
+/// Status of a step: what it could not do.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepStatus {

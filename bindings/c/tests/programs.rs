@@ -15,10 +15,10 @@ const SCENE: &str = include_str!("../examples/press.toml");
 const STEPS: usize = 400;
 const LONG: usize = 1_000_000;
 
-/// What the resident memory of two runs may differ by [kB].
+/// Difference of the resident memory of two runs that is noise [kB].
 const MEMORY_NOISE_KB: u64 = 1024;
 
-/// How a program is linked.
+/// Kind of library that a program is linked with.
 #[derive(Clone, Copy, PartialEq)]
 enum Linking {
     Shared,
@@ -80,7 +80,7 @@ fn library(name: &str) -> PathBuf {
     file
 }
 
-/// What `press.c` prints, by the Rust interface.
+/// Output of `press.c`, by the Rust interface.
 fn pressed(workplace: &Workplace, steps: usize, every: usize) -> String {
     let scene = read_scene(&workplace.path("scene.toml"), RunMode::RealTime).expect("a scene");
     let mut state = State::new(&scene.model);

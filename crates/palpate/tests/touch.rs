@@ -32,6 +32,12 @@ const BESIDE_THE_NODE: f64 = 1e-5;
 /// Slip speed of a contact that sticks [m/s]: round-off of a displacement over a step.
 const STICKS_M_S: f64 = 1e-9;
 
+/// Force of a tip that presses and does not merely graze [N]: half the block's weight.
+const PRESSES_N: f64 = 1.0;
+
+/// Depth of a tip in contact that presses with a few newtons [m]; one that lost its contact is millimetres inside.
+const PRESSED_GAP_M: f64 = 1e-5;
+
 /// Gap that the solver leaves at a contact [m].
 const SOLVER_GAP_M: f64 = 1e-6;
 
@@ -158,6 +164,37 @@ fn contact_forces_on_a_floor_are_the_change_of_momentum() {
         "by taking its energy: {}",
         output.energy.friction
     );
+}
+
+#[test]
+fn a_pressing_tip_keeps_its_contact_on_a_coarse_mesh() {
+    // Edges of 0.1 m under a patch of some millimetres: nodes and patch are displaced differently.
+    let plane = Obstacle { shape: Shape::Plane { normal: DVec3::Z }, ..floor(0.5) };
+    for (x, y) in [(0.0, 0.0), (0.03, 0.01), (-0.05, 0.0), (0.07, -0.03), (0.0, 0.03)] {
+        for patch_radius in [0.0, 0.002, 0.005, 0.02] {
+            let parameters = ModelParameters {
+                gravity: -DVec3::Z * GRAVITY_M_S2,
+                devices: vec![finger(0.005, patch_radius, 0.5)],
+                obstacles: vec![plane.clone()],
+                ..ModelParameters::default()
+            };
+            let body = free_block();
+            let top = 2.0 * half_extent(&body, 2);
+            let start = start_at(DVec3::Z * 0.5 * top);
+            let (model, mut state) = model_and_state(parameters, vec![ModelObject::new(body, start)]);
+            let mut strongest = 0.0_f64;
+            let mut deepest = 0.0_f64;
+            for number in 0..400 {
+                let depth = 0.01 * (f64::from(number) / 200.0).min(1.0);
+                let output = step(&model, &mut state, &touching(&[DVec3::new(x, y, top + 0.005 - depth)]));
+                strongest = strongest.max(output.devices[0].force_on_hand.z);
+                deepest = deepest.max(output.objects[0].penetration_m);
+            }
+            let case = format!("({x}, {y}), patch of {patch_radius} m");
+            assert!(strongest > PRESSES_N, "{case}: {strongest} N");
+            assert!(deepest < PRESSED_GAP_M, "{case}: {deepest} m inside");
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,45 @@
+//! Buffers of a state's output, in the interface's types.
+
+use crate::types::{ClampOutput, ContactOutput, DeviceOutput, Energy, ObjectOutput, StepStatus};
+use palpate::Output;
+
+/// Output in the interface's types; buffers are made once.
+pub(crate) struct Buffers {
+    pub devices: Vec<DeviceOutput>,
+    pub objects: Vec<ObjectOutput>,
+    pub clamps: Vec<ClampOutput>,
+    pub contacts: Vec<ContactOutput>,
+    pub energy: Energy,
+    pub status: StepStatus,
+}
+
+impl Buffers {
+    /// Output of a state, with room for all contacts that it can have.
+    pub fn of(output: &Output) -> Self {
+        let mut contacts = Vec::with_capacity(output.contacts.capacity());
+        contacts.extend(output.contacts.iter().map(ContactOutput::from));
+        Self {
+            devices: output.devices.iter().map(DeviceOutput::from).collect(),
+            objects: output.objects.iter().map(ObjectOutput::from).collect(),
+            clamps: output.clamps.iter().map(ClampOutput::from).collect(),
+            contacts,
+            energy: (&output.energy).into(),
+            status: (&output.status).into(),
+        }
+    }
+
+    /// Takes the output of a step. No allocation.
+    pub fn update(&mut self, output: &Output) {
+        refill(&mut self.devices, &output.devices);
+        refill(&mut self.objects, &output.objects);
+        refill(&mut self.clamps, &output.clamps);
+        refill(&mut self.contacts, &output.contacts);
+        self.energy = (&output.energy).into();
+        self.status = (&output.status).into();
+    }
+}
+
+fn refill<'a, T: From<&'a S>, S>(own: &mut Vec<T>, from: &'a [S]) {
+    own.clear();
+    own.extend(from.iter().map(T::from));
+}
