@@ -25,6 +25,7 @@ pub fn wait_until(patience: Duration, mut condition: impl FnMut() -> bool) -> bo
 pub struct Running {
     child: Child,
     printed: Arc<Mutex<String>>,
+    output: Arc<Mutex<String>>,
     readers: Vec<JoinHandle<()>>,
 }
 
@@ -32,7 +33,10 @@ pub struct Running {
 pub struct Ended {
     /// Exit status; `None` after a signal.
     pub code: Option<i32>,
+    /// Both outputs, as they came.
     pub printed: String,
+    /// Standard output alone.
+    pub output: String,
 }
 
 impl Running {
@@ -40,13 +44,12 @@ impl Running {
     pub fn start(command: &mut Command) -> Result<Self, String> {
         let command = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|error| format!("{command:?}: {error}"))?;
-        let printed = Arc::new(Mutex::new(String::new()));
-        let outputs: [Option<Box<dyn Read + Send>>; 2] = [
-            child.stdout.take().map(|pipe| Box::new(pipe) as Box<dyn Read + Send>),
-            child.stderr.take().map(|pipe| Box::new(pipe) as Box<dyn Read + Send>),
+        let (printed, output) = (Arc::<Mutex<String>>::default(), Arc::<Mutex<String>>::default());
+        let readers = [
+            child.stdout.take().map(|pipe| follow(pipe, vec![printed.clone(), output.clone()])),
+            child.stderr.take().map(|pipe| follow(pipe, vec![printed.clone()])),
         ];
-        let readers = outputs.into_iter().flatten().map(|pipe| follow(pipe, printed.clone())).collect();
-        Ok(Self { child, printed, readers })
+        Ok(Self { child, printed, output, readers: readers.into_iter().flatten().collect() })
     }
 
     pub fn id(&self) -> u32 {
@@ -86,8 +89,9 @@ impl Running {
             let _ = reader.join();
         }
         let printed = self.printed();
+        let output = self.output.lock().map(|text| text.clone()).unwrap_or_default();
         match ended {
-            true => Ok(Ended { code: status.code(), printed }),
+            true => Ok(Ended { code: status.code(), printed, output }),
             false => Err(format!("it did not end within {patience:?}; it printed {printed:?}")),
         }
     }
@@ -122,11 +126,11 @@ pub fn send_signal(id: u32, name: &str) {
     let _ = Command::new("kill").args([&format!("-{name}"), &id.to_string()]).stderr(Stdio::null()).status();
 }
 
-fn follow(mut pipe: Box<dyn Read + Send>, printed: Arc<Mutex<String>>) -> JoinHandle<()> {
+fn follow(mut pipe: impl Read + Send + 'static, texts: Vec<Arc<Mutex<String>>>) -> JoinHandle<()> {
     std::thread::spawn(move || {
         let mut buffer = [0; 4096];
         while let Ok(count @ 1..) = pipe.read(&mut buffer) {
-            if let Ok(mut text) = printed.lock() {
+            for mut text in texts.iter().filter_map(|text| text.lock().ok()) {
                 text.push_str(&String::from_utf8_lossy(&buffer[..count]));
             }
         }

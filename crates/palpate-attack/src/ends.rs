@@ -40,7 +40,7 @@ fn readable(workplace: &Workplace) -> Result<(u64, String), String> {
     let left = names.iter().find(|name| name.contains(".mcap")).ok_or("nothing is left")?.clone();
     require(!left.starts_with('.'), || format!("what is left is hidden: {left}"))?;
     let ended = workplace.run(&format!("replay {left} --json"))?;
-    let steps = json(&ended.printed)?["replayed"]["steps"].as_u64().unwrap_or(0);
+    let steps = json(&ended.output)?["replayed"]["steps"].as_u64().unwrap_or(0);
     workplace.succeed(&format!("recover {left} -o whole.mcap"))?;
     let whole = json(&workplace.succeed("replay whole.mcap --json")?)?["replayed"]["steps"].as_u64();
     require(whole == Some(steps), || {
@@ -84,7 +84,7 @@ fn signalled_run(workplace: &Workplace) -> Verdict {
         run.signal(signal);
         let ended = run.end_within(Duration::from_secs(10))?;
         require(ended.code == Some(0), || format!("{signal}: {:?} {}", ended.code, ended.printed))?;
-        let steps = json(&ended.printed)?["log"]["steps"].as_u64().unwrap_or(0);
+        let steps = json(&ended.output)?["log"]["steps"].as_u64().unwrap_or(0);
         let replayed =
             json(&workplace.succeed(&format!("replay {log} --json"))?)?["replayed"]["steps"].as_u64();
         require(Some(steps) == replayed, || {
@@ -121,7 +121,7 @@ fn full_disk(workplace: &Workplace) -> Verdict {
     let while_running = told && run.is_alive();
     let ended = run.end()?;
     require(while_running, || format!("it was told at the end only: {}", ended.printed))?;
-    let report = json(&ended.printed)?;
+    let report = json(&ended.output)?;
     require(report["steps"] == 6000, || format!("the run did not go on: {report}"))?;
     require(ended.code == Some(1), || format!("the status is {:?}", ended.code))?;
     let (steps, _) = readable(workplace)?;

@@ -28,7 +28,7 @@ const PANICKED: i32 = 101;
 /// Runs a command on a hostile file: it must end by itself, and not by a panic. Gives whether it was refused.
 fn survives(workplace: &Workplace, arguments: &str) -> Result<(bool, String), String> {
     let ended = workplace.start(arguments)?.end_within(BRIEF);
-    let Ended { code, printed } = ended.map_err(|what| format!("palpate {arguments}: {what}"))?;
+    let Ended { code, printed, .. } = ended.map_err(|what| format!("palpate {arguments}: {what}"))?;
     match code {
         Some(code) if code != PANICKED => Ok((code != 0, printed)),
         _ => Err(format!("palpate {arguments} ended with {code:?}: {printed}")),

@@ -34,7 +34,7 @@ fn scene(workplace: &Workplace, seconds: u32) -> Result<(Running, String), Strin
 fn report(run: Running, seconds: u64) -> Result<serde_json::Value, String> {
     let ended = run.end_within(Duration::from_secs(seconds + 30))?;
     require(ended.code == Some(0), || format!("it ended with {:?}: {}", ended.code, ended.printed))?;
-    json(&ended.printed)
+    json(&ended.output)
 }
 
 fn datagrams(workplace: &Workplace) -> Verdict {
@@ -176,7 +176,7 @@ fn through_relay(workplace: &Workplace, harm: impl Fn(&Relay, bool)) -> Result<s
     let ended = device.end()?;
     require(ended.code == Some(0), || format!("the device ended with {:?}: {}", ended.code, ended.printed))?;
     report(run, 14)?;
-    json(&ended.printed)
+    json(&ended.output)
 }
 
 /// Trips of a device's safety, as its report states them.

@@ -27,11 +27,11 @@ fn is_plausible(value: &Value) -> bool {
 
 /// Runs a scene: it must be refused with an error that names its file, or give numbers that are plausible or a warning.
 fn run(workplace: &Workplace, scene: &str) -> Result<bool, String> {
-    let Ended { code, printed } = workplace.run(&format!("run {scene} --duration 0.02 --json"))?;
+    let Ended { code, printed, output } = workplace.run(&format!("run {scene} --duration 0.02 --json"))?;
     match code {
         Some(1 | 2) => Ok(false),
         Some(0) => {
-            let report = json(&printed)?;
+            let report = json(&output)?;
             let warned = report["warnings"].as_array().is_some_and(|warnings| !warnings.is_empty());
             require(is_plausible(&report) || warned, || {
                 format!("{scene}: implausible without a word: {report}")
@@ -101,7 +101,7 @@ fn paths(workplace: &Workplace) -> Verdict {
         require(error.contains("hostile.csv"), || format!("{name}: {error}"))?;
     }
     workplace.write("hostile.csv", "0,-80,0,50\n0.5,-52,0,50\n1,-52,0,50\n")?;
-    let Ended { code, printed } = workplace.run("run of_path.toml --duration 1.2 --json")?;
+    let Ended { code, printed, .. } = workplace.run("run of_path.toml --duration 1.2 --json")?;
     require(code == Some(0) && printed.contains("millimetres"), || {
         format!("millimetres: {code:?} {printed}")
     })?;

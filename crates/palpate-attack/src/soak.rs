@@ -75,13 +75,13 @@ pub fn run(palpate: &Path, minutes: f64) -> Result<(), String> {
     require(device.code == Some(0) && run.code == Some(0), || {
         format!("device {:?}: {}\nrun {:?}: {}", device.code, device.printed, run.code, run.printed)
     })?;
-    let (device, run) = (json(&device.printed)?, json(&run.printed)?);
+    let (device, run) = (json(&device.output)?, json(&run.output)?);
     println!("device: {device:#}\nrun: {run:#}");
     for log in ["run.mcap", "served.mcap"] {
         let replayed = Running::start(&mut workplace.palpate(&format!("replay {log} --json")))?;
         let replayed = replayed.end_within(Duration::from_secs_f64(60.0 + seconds))?;
         require(replayed.code == Some(0), || format!("{log}: {}", replayed.printed))?;
-        let replayed = json(&replayed.printed)?;
+        let replayed = json(&replayed.output)?;
         println!("{log}: {}, energies [J] {}", replayed["replayed"], replayed["energy_j"]);
         require(replayed["replayed"]["identical"] == true, || format!("{log} does not repeat"))?;
         let energies = replayed["energy_j"].as_object().ok_or("no energies")?;

@@ -99,17 +99,17 @@ impl Workplace {
         self.start(arguments)?.end().map_err(|what| format!("palpate {arguments}: {what}"))
     }
 
-    /// Runs a command line that must succeed.
+    /// Runs a command line that must succeed; gives its standard output.
     pub fn succeed(&self, arguments: &str) -> Result<String, String> {
         match self.run(arguments)? {
-            Ended { code: Some(0), printed } => Ok(printed),
-            Ended { code, printed } => Err(format!("palpate {arguments} ended with {code:?}: {printed}")),
+            Ended { code: Some(0), output, .. } => Ok(output),
+            Ended { code, printed, .. } => Err(format!("palpate {arguments} ended with {code:?}: {printed}")),
         }
     }
 
     /// Runs a command line that must fail with status 1 and an error on one line; gives that line.
     pub fn fail(&self, arguments: &str) -> Result<String, String> {
-        let Ended { code, printed } = self.run(arguments)?;
+        let Ended { code, printed, .. } = self.run(arguments)?;
         let error = printed.lines().find(|line| line.starts_with("error: "));
         match (code, error) {
             (Some(1), Some(error)) => Ok(error.to_string()),
@@ -126,12 +126,9 @@ impl Workplace {
     }
 }
 
-/// JSON object that ends what a command has printed.
-pub fn json(printed: &str) -> Result<Value, String> {
-    let begin = printed.find("\n{\n").map(|at| at + 1).or_else(|| printed.starts_with('{').then_some(0));
-    let text = begin.map(|begin| &printed[begin..]).ok_or_else(|| format!("no JSON in {printed:?}"))?;
-    let mut values = serde_json::Deserializer::from_str(text).into_iter::<Value>();
-    values.next().and_then(Result::ok).ok_or_else(|| format!("no JSON in {printed:?}"))
+/// JSON object that a command has printed on standard output.
+pub fn json(output: &str) -> Result<Value, String> {
+    serde_json::from_str(output).map_err(|error| format!("no JSON ({error}): {output:?}"))
 }
 
 const BODY: &str = r#"step = 0.001
