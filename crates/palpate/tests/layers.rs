@@ -95,10 +95,17 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-render",
         ],
     ),
+    (
+        "palpate-python",
+        &["palpate", "palpate-export", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene"],
+    ),
     // Attacks see what strangers see.
     ("palpate-attack", &[]),
     ("xtask", &[]),
 ];
+
+/// Package that alone links Python, and the crates that do so.
+const PYTHON: (&str, [&str; 2]) = ("palpate-python", ["numpy", "pyo3"]);
 
 /// Fixtures that the tests of every crate may use. Its own dependencies may not name a version of it: they are published first.
 const FIXTURES: &str = "palpate-testkit";
@@ -152,6 +159,11 @@ fn our_crates_import_in_the_stated_directions_only() {
                 !ours || is_fixture || allowed.is_some_and(|a| a.contains(&used)),
                 "{name} may not import {used}"
             );
+            let (package_of_python, python) = PYTHON;
+            assert!(
+                !python.contains(&used) || name == package_of_python,
+                "{name} may not link Python by {used}"
+            );
             let without_version = dependency["req"] == "*";
             assert!(!is_fixture || without_version, "{name} names a version of {used}, expected a path only");
         }
@@ -190,7 +202,8 @@ fn the_runtime_has_no_standard_library_thread_clock_or_unsafe_code() {
 fn re_exports_are_in_lib_rs_and_mod_rs_only() {
     let mut files = Vec::new();
     for (name, _) in DIRECTIONS.iter().filter(|(name, _)| name.starts_with("palpate")) {
-        sources(&root().join("crates").join(name).join("src"), &mut files);
+        let folder = if *name == PYTHON.0 { "bindings/python".into() } else { format!("crates/{name}") };
+        sources(&root().join(folder).join("src"), &mut files);
     }
     for path in files {
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default().to_string();
