@@ -27,7 +27,28 @@ if TYPE_CHECKING:
 class Object:
     """Elastic body: `[[object]]` (docs/scene.md#hold-a-point).
 
-    `recording` is a :class:`Recording` or a file. Fields that are None are left to their defaults.
+    Fields that are None are left to the defaults of the scene file.
+
+    Parameters
+    ----------
+    name : str
+        Letters, digits, - and _.
+    recording : Recording, str or path
+        Recording, or its file.
+    position : (3,) array_like, optional
+        Centre of mass at the start [m, world].
+    orientation : (4,) array_like, optional
+        Quaternion w, x, y, z.
+    velocity, angular_velocity : (3,) array_like, optional
+        Motion at the start [m/s, rad/s, world].
+    friction : float, optional
+        Coulomb's coefficient against other objects [1], 0.5 without it.
+    start : {"undeformed", "equilibrium"}, optional
+        With fixed nodes: whether it sags at the start.
+    path : file, dict or array_like, optional
+        With fixed nodes: where its base goes, rows t [s], x, y, z [m].
+    response, table : optional
+        "fir" and a store, for direct convolution of a recorded table (docs/table.md).
     """
 
     name: str
@@ -47,7 +68,24 @@ class Object:
 class Device:
     """Hand that holds a point, touches with a tip, or exerts a force: `[[device]]` (docs/scene.md#touch).
 
-    `mode` is "touch", "held" or "force". Without a `path`, the caller of :meth:`Simulation.step` says where it is.
+    Parameters
+    ----------
+    name : str
+        Letters, digits, - and _.
+    mode : {"touch", "held", "force"}
+        Tip that touches, hand that has hold of a point, or prescribed force on a point.
+    attach : dict, optional
+        `{"object": name, "point": [x, y, z]}`: the point that is held, or that the force acts on [m, body frame].
+    path : file, dict or array_like, optional
+        Rows t [s], x, y, z [m], or t, fx, fy, fz [N]. Without it the caller of :meth:`Simulation.step` says where it is.
+    tip_radius : float, optional
+        Radius of the tip [m], 0 without it.
+    patch_radius : float, optional
+        Radius of the area that a force is spread over [m]; without it that of the tip.
+    friction : float, optional
+        Coulomb's coefficient of the tip [1], 0.5 without it.
+    coupling : dict or "auto", optional
+        `{"stiffness": k, "damping": d}` between hand and tip or point [N/m, N·s/m]. None: the hand is the tip.
     """
 
     name: str
@@ -62,7 +100,21 @@ class Device:
 
 @dataclass
 class Plane:
-    """Floor, wall or table: `[[plane]]` (docs/scene.md#planes-and-obstacles). `normal` points out of the solid side."""
+    """Floor, wall or table: `[[plane]]` (docs/scene.md#planes-and-obstacles).
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Normal out of the solid side, of any length.
+    point : (3,) array_like, optional
+        Point on it [m, world]; or a `path`.
+    name : str, optional
+        "plane" without it.
+    path : file, dict or array_like, optional
+        Rows t [s], x, y, z [m], optionally qw, qx, qy, qz.
+    friction : float, optional
+        Coulomb's coefficient [1], 0.5 without it.
+    """
 
     normal: ArrayLike
     point: ArrayLike | None = None
@@ -73,7 +125,29 @@ class Plane:
 
 @dataclass
 class Obstacle:
-    """Rigid body: `[[obstacle]]` (docs/scene.md#planes-and-obstacles), of one of the four shapes."""
+    """Rigid body: `[[obstacle]]` (docs/scene.md#planes-and-obstacles), of one of the four shapes.
+
+    Parameters
+    ----------
+    name : str, optional
+        "obstacle" without it.
+    sphere : dict, optional
+        `{"radius": r}` [m].
+    box : dict, optional
+        `{"half_extents": [x, y, z]}` [m].
+    capsule : dict, optional
+        `{"radius": r, "half_length": l}` about a piece of its y axis [m].
+    mesh : dict, optional
+        `{"file": file, "scale": metres per unit}`, a closed surface.
+    position : (3,) array_like, optional
+        Origin of the shape [m, world].
+    orientation : (4,) array_like, optional
+        Quaternion w, x, y, z.
+    path : file, dict or array_like, optional
+        Rows t [s], x, y, z [m], optionally qw, qx, qy, qz, instead of the position.
+    friction : float, optional
+        Coulomb's coefficient [1], 0.5 without it.
+    """
 
     name: str | None = None
     sphere: Mapping[str, float] | None = None
@@ -88,7 +162,21 @@ class Obstacle:
 
 @dataclass
 class Clamp:
-    """Face that a rigid frame holds: `[[clamp]]` (docs/scene.md#clamp-a-face)."""
+    """Face that a rigid frame holds: `[[clamp]]` (docs/scene.md#clamp-a-face).
+
+    Parameters
+    ----------
+    name, object : str
+        Names of the clamp and of its object.
+    face : dict, optional
+        `{"point": [x, y, z], "radius": r}`: the smooth face around a point, or the part of it within a radius [m, body frame].
+    box : dict, optional
+        `{"min": [x, y, z], "max": [x, y, z]}` instead: all triangles that lie in a box [m, body frame].
+    max_cells : int, optional
+        Upper limit of the cells whose mean displacement is held, 16 without it.
+    path : file, dict or array_like, optional
+        Rows t [s], x, y, z [m], optionally qw, qx, qy, qz; without it the face stays.
+    """
 
     name: str
     object: str
@@ -100,7 +188,15 @@ class Clamp:
 
 @dataclass
 class Probe:
-    """Point whose displacement is recorded: `[[probe]]` (docs/scene.md#probe-a-displacement)."""
+    """Point whose displacement is recorded: `[[probe]]` (docs/scene.md#probe-a-displacement).
+
+    Parameters
+    ----------
+    name, object : str
+        Names of the probe and of its object.
+    point : (3,) array_like
+        Point near the surface [m, body frame].
+    """
 
     name: str
     object: str

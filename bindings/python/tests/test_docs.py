@@ -52,7 +52,7 @@ def test_the_code_of_the_page_runs(reader, palpate_run, capsys):
         if number == 0:
             force = names["series"]["forces"][:, 0, 2]
             # A press of 1 cm on a ball of liver, which is felt and ends.
-            assert 0.1 < force.max() < 10 and force[0] == 0 and abs(force[-1]) < 0.1 * force.max()
+            assert 0.1 < force.max() < 10 and force[0] == 0 and abs(force[-1]) < 0.3 * force.max()
             assert (reader / "force.png").read_bytes()[:4] == b"\x89PNG"
     printed = capsys.readouterr().out
     weight = names["cube"].mass * 9.81
