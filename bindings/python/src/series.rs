@@ -48,6 +48,14 @@ impl Series {
         }
     }
 
+    /// Memory of a step [bytes], without contacts.
+    pub fn bytes_per_step(scene: &Scene) -> f64 {
+        let (devices, objects) = (scene.devices.len(), scene.object_names.len());
+        let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
+        let energies = 10;
+        8.0 * (2 + energies + 9 * devices + 14 * objects + 13 * clamps + 6 * probes) as f64
+    }
+
     /// Append the last step of a state.
     pub fn append(&mut self, scene: &Scene, layout: &ContactLayout, input: &Input, state: &State) {
         let output = state.output();

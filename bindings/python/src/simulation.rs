@@ -13,6 +13,7 @@ use crate::series::Series;
 use glam::DVec3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use palpate::{DeviceMode, Grasp, Output};
+use palpate_fem::check_memory;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
@@ -226,6 +227,8 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = SeriesMotion::read(py, &self.inner, &Arguments { positions, obstacles, clamps })?;
         let count = self.count_steps(py, &motion, steps, duration)?;
+        check_memory(count as f64 * Series::bytes_per_step(&self.inner))
+            .map_err(|error| input_error(py, format!("the series of {count} steps: {error}; run fewer at a time")))?;
         let mut guard = self.lock(py)?;
         let (run, scene, layout) = (&mut *guard, &*self.inner, &self.layout);
         let mut series = Series::new(scene, count, contacts);

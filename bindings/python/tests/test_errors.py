@@ -66,6 +66,14 @@ def test_series_of_other_lengths_are_refused(cube):
     assert len(fall.run(steps=0)["time"]) == 0
 
 
+def test_series_that_do_not_fit_into_memory_are_refused(cube):
+    # 5.7 kB a step.
+    many = [palpate.Object(f"cube{at}", cube, position=[at, 0, 0]) for at in range(50)]
+    simulation = palpate.Simulation(palpate.Scene(many))
+    text = refusal(palpate.InputError, lambda: simulation.run(steps=100_000_000))
+    assert text.startswith("the series of 100000000 steps: ") and text.endswith("; run fewer at a time")
+
+
 def test_a_hand_that_jumps_away_is_a_step_error(held):
     simulation = palpate.Simulation(held)
     text = refusal(palpate.StepError, lambda: simulation.step(simulation.held_points() + 1e3))
