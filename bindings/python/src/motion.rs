@@ -15,21 +15,44 @@ pub struct Arguments<'a, 'py> {
     pub clamps: Option<&'a Bound<'py, PyAny>>,
 }
 
-/// Name, argument and number of rows and columns of each kind of parts.
+/// Argument and number of rows of each kind of parts.
 fn parts<'a, 'py>(arguments: &Arguments<'a, 'py>, scene: &Scene) -> [Part<'a, 'py>; 3] {
     let Arguments { positions, obstacles, clamps } = *arguments;
     [
-        Part { name: "positions", given: positions, rows: scene.devices.len(), columns: 3 },
-        Part { name: "obstacles", given: obstacles, rows: scene.obstacles.len(), columns: 7 },
-        Part { name: "clamps", given: clamps, rows: scene.clamps.len(), columns: 7 },
+        Part { kind: Kind::Devices, given: positions, rows: scene.devices.len() },
+        Part { kind: Kind::Obstacles, given: obstacles, rows: scene.obstacles.len() },
+        Part { kind: Kind::Clamps, given: clamps, rows: scene.clamps.len() },
     ]
 }
 
+/// Kind of parts that move.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Devices,
+    Obstacles,
+    Clamps,
+}
+
+impl Kind {
+    /// Name of the argument.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Devices => "positions",
+            Self::Obstacles => "obstacles",
+            Self::Clamps => "clamps",
+        }
+    }
+
+    /// Numbers of a row: of a position, or of a pose.
+    fn columns(self) -> usize {
+        if self == Self::Devices { 3 } else { 7 }
+    }
+}
+
 struct Part<'a, 'py> {
-    name: &'static str,
+    kind: Kind,
     given: Option<&'a Bound<'py, PyAny>>,
     rows: usize,
-    columns: usize,
 }
 
 /// Check that no device needs what this process does not have.
@@ -72,20 +95,21 @@ pub fn write_step(
     if arguments.positions.is_none() {
         check_paths(py, scene)?;
     }
-    for Part { name, given, rows, columns } in parts(arguments, scene) {
+    for Part { kind, given, rows } in parts(arguments, scene) {
         let Some(given) = given else { continue };
+        let (name, columns) = (kind.name(), kind.columns());
         let numbers = Numbers::read(given, name, &[Some(rows), Some(columns)])?;
         let numbers = numbers.as_slice()?;
         check_finite(py, name, numbers, columns)?;
-        write(name, numbers, input).map_err(|error| input_error(py, error))?;
+        write(kind, numbers, input).map_err(|error| input_error(py, error))?;
     }
     Ok(())
 }
 
 /// Motions of a series of steps, copied: other threads may write to Python's arrays meanwhile.
 pub struct SeriesMotion {
-    /// Name, numbers and numbers per step of each kind that is given.
-    parts: Vec<(&'static str, Vec<f64>, usize)>,
+    /// Numbers, and numbers per step, of each kind that is given.
+    parts: Vec<(Kind, Vec<f64>, usize)>,
     /// Number of steps, if something is given.
     pub steps: Option<usize>,
 }
@@ -97,16 +121,17 @@ impl SeriesMotion {
             check_paths(py, scene)?;
         }
         let mut series = Self { parts: Vec::new(), steps: None };
-        for Part { name, given, rows, columns } in parts(arguments, scene) {
+        for Part { kind, given, rows } in parts(arguments, scene) {
             let Some(given) = given else { continue };
+            let (name, columns) = (kind.name(), kind.columns());
             let numbers = Numbers::read(given, name, &[series.steps, Some(rows), Some(columns)])?;
             series.steps = numbers.shape().first().copied();
             let numbers = numbers.as_slice()?;
             check_finite(py, name, numbers, columns)?;
-            if columns == 7 {
+            if kind != Kind::Devices {
                 check_poses(py, name, numbers)?;
             }
-            series.parts.push((name, numbers.to_vec(), rows * columns));
+            series.parts.push((kind, numbers.to_vec(), rows * columns));
         }
         Ok(series)
     }
@@ -116,8 +141,8 @@ impl SeriesMotion {
     /// # Errors
     /// As [`write_step`]; poses were checked.
     pub fn write(&self, step: usize, input: &mut Input) -> Result<(), String> {
-        for (name, numbers, width) in &self.parts {
-            write(name, &numbers[step * width..][..*width], input)?;
+        for (kind, numbers, width) in &self.parts {
+            write(*kind, &numbers[step * width..][..*width], input)?;
         }
         Ok(())
     }
@@ -131,17 +156,17 @@ fn check_poses(py: Python<'_>, name: &str, numbers: &[f64]) -> PyResult<()> {
 }
 
 /// Write rows of numbers of a kind of parts into an input.
-fn write(name: &str, numbers: &[f64], input: &mut Input) -> Result<(), String> {
+fn write(kind: Kind, numbers: &[f64], input: &mut Input) -> Result<(), String> {
     let poses = |into: &mut Vec<Pose>| {
         for (row, (pose, numbers)) in into.iter_mut().zip(numbers.chunks_exact(7)).enumerate() {
-            *pose = pose_of(numbers).map_err(|error| format!("row {row} of {name}: {error}"))?;
+            *pose = pose_of(numbers).map_err(|error| format!("row {row} of {}: {error}", kind.name()))?;
         }
         Ok(())
     };
-    match name {
-        "obstacles" => return poses(&mut input.obstacles),
-        "clamps" => return poses(&mut input.clamps),
-        _ => {}
+    match kind {
+        Kind::Obstacles => return poses(&mut input.obstacles),
+        Kind::Clamps => return poses(&mut input.clamps),
+        Kind::Devices => {}
     }
     for (device, numbers) in input.devices.iter_mut().zip(numbers.chunks_exact(3)) {
         *device = moved(device, DVec3::from_slice(numbers));

@@ -227,8 +227,9 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = SeriesMotion::read(py, &self.inner, &Arguments { positions, obstacles, clamps })?;
         let count = self.count_steps(py, &motion, steps, duration)?;
-        check_memory(count as f64 * Series::bytes_per_step(&self.inner))
-            .map_err(|error| input_error(py, format!("the series of {count} steps: {error}; run fewer at a time")))?;
+        check_memory(count as f64 * Series::bytes_per_step(&self.inner)).map_err(|error| {
+            input_error(py, format!("the series of {count} steps: {error}; run fewer at a time"))
+        })?;
         let mut guard = self.lock(py)?;
         let (run, scene, layout) = (&mut *guard, &*self.inner, &self.layout);
         let mut series = Series::new(scene, count, contacts);
