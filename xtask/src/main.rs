@@ -13,6 +13,7 @@ mod standard_library;
 mod systems;
 mod tests;
 mod viewer;
+mod wheel;
 
 use process::{palpate, root, run};
 use std::process::{Command, ExitCode};
@@ -52,6 +53,12 @@ const CHORES: &[Chore] = &[
         summary: "build the page that palpate serves (viewer/, with Node.js), which builds of palpate embed",
         flags: &[],
         run: |_| viewer::build(),
+    },
+    Chore {
+        name: "wheel",
+        summary: "build the Python package's wheel into target/wheels (bindings/python, docs/python.md)",
+        flags: &[],
+        run: |_| wheel::build().map(|_| ()),
     },
     Chore {
         name: "dependencies",

@@ -1,7 +1,7 @@
 //! Tests, by part: Rust, doc comments, Python, C, and the page in a browser. One release build serves them all.
 
 use crate::process::{cargo, program, run};
-use crate::{c_library, machine, viewer};
+use crate::{c_library, machine, viewer, wheel};
 use std::process::Command;
 
 /// Parts of the tests in the order in which they run: the last lines are those of the Rust tests' runner.
@@ -48,10 +48,12 @@ fn rust() -> Result<(), String> {
     cargo(&[&["test"], WORKSPACE, &["--no-fail-fast", "--lib", "--bins", "--tests", "--examples"]].concat())
 }
 
-/// Stores as Python reads them, and the recording on Dask and Slurm.
+/// Stores as Python reads them, the recording on Dask and Slurm, and the Python package in its wheel.
 fn python() -> Result<(), String> {
     let python = machine::need_python()?;
     build()?;
-    let tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "python/tests"];
+    wheel::install()?;
+    let folders = ["python/tests", "bindings/python/tests"];
+    let tests = [&["-m", "pytest", "-q", "-p", "no:cacheprovider"], &folders[..]].concat();
     run(Command::new(python).args(tests).env("PALPATE", program()).env("PYTHONDONTWRITEBYTECODE", "1"))
 }

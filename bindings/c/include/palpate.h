@@ -306,7 +306,7 @@ PalpateStatus palpate_state_set_clamp(PalpateState *state, size_t clamp, Palpate
 PalpateStatus palpate_state_set_gravity(PalpateState *state, PalpateVector gravity);
 
 // Set the input of the next step from the scene's paths, of devices, obstacles, clamps, bases and gravity. What has no path stays as it
-// was set. It allocates: not for real time.
+// was set.
 //
 // state is a state or null.
 PalpateStatus palpate_state_follow_paths(PalpateState *state);
@@ -346,8 +346,8 @@ const PalpateEnergy *palpate_state_energy(const PalpateState *state);
 // state is a state or null.
 const PalpateStepStatus *palpate_state_status(const PalpateState *state);
 
-// Read a scene file with its recordings, meshes and paths (docs/scene.md). purpose is a PalpatePurpose. An object that the file gives
-// as a mesh must have been recorded before. *scene is null unless it succeeds; free it with palpate_scene_free.
+// Read a scene file with its recordings, meshes and paths (docs/scene.md). purpose is a PalpatePurpose. A device without a
+// path is moved by the program. *scene is null unless it succeeds; free it with palpate_scene_free.
 //
 // path is a string in UTF-8 that ends with 0; scene can be written; error can be, or is null.
 PalpateStatus palpate_scene_load(const char *path,

@@ -145,7 +145,7 @@ pub unsafe extern "C" fn palpate_state_set_gravity(state: *mut State, gravity: V
 }
 
 /// Set the input of the next step from the scene's paths, of devices, obstacles, clamps, bases and gravity. What has no path stays as it
-/// was set. It allocates: not for real time.
+/// was set.
 ///
 /// # Safety
 /// `state` is a state or null.
@@ -154,21 +154,21 @@ pub unsafe extern "C" fn palpate_state_follow_paths(state: *mut State) -> Status
     // SAFETY: as promised by the caller.
     unsafe {
         change(state, std::ptr::null_mut(), |state| {
-            let scene = &state.scene.scene;
-            let next = scene.input_at(state.state.output().time_s + scene.model.parameters().step_s);
-            let input = &mut state.input;
-            for ((own, next), device) in input.devices.iter_mut().zip(next.devices).zip(&scene.devices) {
-                *own = if device.path.is_some() { next } else { *own };
+            let State { scene, state, input, next, .. } = state;
+            let scene = &scene.scene;
+            scene.write_input_at(state.output().time_s + scene.model.parameters().step_s, next);
+            for ((own, next), device) in input.devices.iter_mut().zip(&next.devices).zip(&scene.devices) {
+                *own = if device.path.is_some() { *next } else { *own };
             }
             for ((own, next), obstacle) in
-                input.obstacles.iter_mut().zip(next.obstacles).zip(&scene.obstacles)
+                input.obstacles.iter_mut().zip(&next.obstacles).zip(&scene.obstacles)
             {
-                *own = if obstacle.path.is_some() { next } else { *own };
+                *own = if obstacle.path.is_some() { *next } else { *own };
             }
-            for ((own, next), clamp) in input.clamps.iter_mut().zip(next.clamps).zip(&scene.clamps) {
-                *own = if clamp.path.is_some() { next } else { *own };
+            for ((own, next), clamp) in input.clamps.iter_mut().zip(&next.clamps).zip(&scene.clamps) {
+                *own = if clamp.path.is_some() { *next } else { *own };
             }
-            input.bases = next.bases;
+            input.bases.clone_from(&next.bases);
             input.gravity = next.gravity.or(input.gravity);
             Ok(())
         })

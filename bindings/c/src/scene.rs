@@ -3,7 +3,7 @@
 use crate::error::{Error, Failure, Status, checked};
 use crate::types::{Part, Purpose};
 use palpate::Model;
-use palpate_scene::{SceneError, read_scene};
+use palpate_scene::{SceneError, read_driven_scene};
 use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 use std::ptr;
@@ -49,15 +49,15 @@ fn texts(texts: impl IntoIterator<Item = String>) -> Vec<CString> {
 
 fn load(path: &Path, purpose: u32) -> Result<Scene, Failure> {
     let mode = Purpose::of(purpose)?;
-    let scene = read_scene(path, mode).map_err(|error: SceneError| Failure::from(error))?;
+    let scene = read_driven_scene(path, mode).map_err(|error: SceneError| Failure::from(error))?;
     let names = scene.names();
     let names = [names.objects, names.devices, names.obstacles, names.clamps].map(texts);
     let warnings = texts(scene.warnings.iter().map(ToString::to_string));
     Ok(Scene(Arc::new(Loaded { scene, names, warnings })))
 }
 
-/// Read a scene file with its recordings, meshes and paths (docs/scene.md). `purpose` is a `PalpatePurpose`. An object that the file gives
-/// as a mesh must have been recorded before. `*scene` is null unless it succeeds; free it with [`palpate_scene_free`].
+/// Read a scene file with its recordings, meshes and paths (docs/scene.md). `purpose` is a `PalpatePurpose`. A device without a
+/// path is moved by the program. `*scene` is null unless it succeeds; free it with [`palpate_scene_free`].
 ///
 /// # Safety
 /// `path` is a string in UTF-8 that ends with 0; `scene` can be written; `error` can be, or is null.

@@ -15,6 +15,8 @@ pub struct State {
     pub(crate) state: palpate::State,
     /// Input of the next step.
     pub(crate) input: Input,
+    /// Input by the paths of the scene.
+    pub(crate) next: Input,
     /// Input in the scene's mode, for devices that take no part before their first position.
     pub(crate) waiting: Vec<Option<DeviceInput>>,
     pub(crate) buffers: Buffers,
@@ -37,7 +39,8 @@ impl State {
         let buffers = Buffers::of(state.output());
         let residual_fields =
             scene.scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect();
-        Self { scene, state, input, waiting, buffers, displacements: Vec::new(), residual_fields }
+        let next = input.clone();
+        Self { scene, state, input, next, waiting, buffers, displacements: Vec::new(), residual_fields }
     }
 
     fn copy(&self) -> Self {
@@ -45,6 +48,7 @@ impl State {
             scene: self.scene.clone(),
             state: self.state.clone(),
             input: self.input.clone(),
+            next: self.next.clone(),
             waiting: self.waiting.clone(),
             buffers: Buffers::of(self.state.output()),
             displacements: Vec::new(),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate::{DeviceInput, State, step};
-use palpate_scene::{RunMode, read_scene};
+use palpate_scene::{RunMode, read_driven_scene};
 use palpate_testkit::free_block;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -82,7 +82,7 @@ fn library(name: &str) -> PathBuf {
 
 /// Output of `press.c`, by the Rust interface.
 fn pressed(workplace: &Workplace, steps: usize, every: usize) -> String {
-    let scene = read_scene(&workplace.path("scene.toml"), RunMode::RealTime).expect("a scene");
+    let scene = read_driven_scene(&workplace.path("scene.toml"), RunMode::RealTime).expect("a scene");
     let mut state = State::new(&scene.model);
     let mut input = scene.input_at(0.0);
     let step_s = scene.model.parameters().step_s;
@@ -138,7 +138,7 @@ fn a_surface_in_cpp_is_that_of_rust() {
     let workplace = Workplace::new();
     let surface = workplace.compile("examples/surface.cpp", Linking::Shared, &[]);
     let printed = workplace.run(&mut Command::new(surface), &["scene.toml", "300"]);
-    let scene = read_scene(&workplace.path("scene.toml"), RunMode::Offline).expect("a scene");
+    let scene = read_driven_scene(&workplace.path("scene.toml"), RunMode::Offline).expect("a scene");
     let mut state = State::new(&scene.model);
     let mut input = scene.input_at(0.0);
     input.devices[0] = DeviceInput::inactive();

@@ -151,18 +151,36 @@ impl Scene {
 
     /// Input at a time of all paths [s].
     pub fn input_at(&self, time_s: f64) -> Input {
+        let mut input = Input::default();
+        self.write_input_at(time_s, &mut input);
+        input
+    }
+
+    /// Write the input at a time of all paths [s] into an input of this scene, which may be empty.
+    ///
+    /// # Real time
+    /// No allocation, where the input has room for all parts.
+    pub fn write_input_at(&self, time_s: f64, input: &mut Input) {
         let step_s = self.model.parameters().step_s;
-        Input {
-            devices: self.devices.iter().map(|device| device.input_at(time_s, step_s)).collect(),
-            obstacles: self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)).collect(),
-            clamps: self.clamps.iter().map(|clamp| clamp.frame_at(time_s)).collect(),
-            bases: self
-                .bases
-                .iter()
-                .map(|path| path.as_ref().map(|path| path.of_base(time_s, step_s)))
-                .collect(),
-            gravity: self.gravity_at(time_s),
-        }
+        input.devices.clear();
+        input.devices.extend(self.devices.iter().map(|device| device.input_at(time_s, step_s)));
+        input.obstacles.clear();
+        input.obstacles.extend(self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)));
+        input.clamps.clear();
+        input.clamps.extend(self.clamps.iter().map(|clamp| clamp.frame_at(time_s)));
+        input.bases.clear();
+        let base = |path: &Option<MotionPath>| path.as_ref().map(|path| path.of_base(time_s, step_s));
+        input.bases.extend(self.bases.iter().map(base));
+        input.gravity = self.gravity_at(time_s);
+    }
+
+    /// Time of the last row of all paths [s]; 0 without paths.
+    pub fn end_s(&self) -> f64 {
+        let devices = self.devices.iter().filter_map(|device| device.path.as_ref());
+        let paths = devices.chain(self.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
+        let paths = paths.chain(self.clamps.iter().filter_map(|clamp| clamp.path.as_ref()));
+        let paths = paths.chain(self.bases.iter().flatten()).chain(&self.gravity);
+        paths.map(MotionPath::end).fold(0.0, f64::max)
     }
 
     /// Gravity over the step that ends at a time [s]; none if it does not change [m/s², world].

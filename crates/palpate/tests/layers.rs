@@ -96,10 +96,17 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
         ],
     ),
     ("palpate-c", &["palpate", "palpate-scene"]),
+    (
+        "palpate-python",
+        &["palpate", "palpate-export", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene"],
+    ),
     // Attacks see what strangers see.
     ("palpate-attack", &[]),
     ("xtask", &[]),
 ];
+
+/// Package that alone links Python, and the crates that do so.
+const PYTHON: (&str, [&str; 2]) = ("palpate-python", ["numpy", "pyo3"]);
 
 /// Fixtures that the tests of every crate may use. Its own dependencies may not name a version of it: they are published first.
 const FIXTURES: &str = "palpate-testkit";
@@ -152,6 +159,11 @@ fn our_crates_import_in_the_stated_directions_only() {
             assert!(
                 !ours || is_fixture || allowed.is_some_and(|a| a.contains(&used)),
                 "{name} may not import {used}"
+            );
+            let (package_of_python, python) = PYTHON;
+            assert!(
+                !python.contains(&used) || name == package_of_python,
+                "{name} may not link Python by {used}"
             );
             let without_version = dependency["req"] == "*";
             assert!(!is_fixture || without_version, "{name} names a version of {used}, expected a path only");

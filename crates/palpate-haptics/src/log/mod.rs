@@ -25,7 +25,7 @@ mod summary;
 mod writer;
 
 pub use messages::SceneNames;
-pub use reader::{LogReader, LoggedStep};
+pub use reader::{LogReader, LoggedDevice, LoggedStep};
 pub use records::{FrameRecord, StepRecord};
 pub use recovery::{Recovered, recover};
 pub use writer::{LogSender, LogSummary, LogWriter, WrittenLog};

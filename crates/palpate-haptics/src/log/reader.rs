@@ -1,6 +1,6 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
-use super::messages::{EnergyMessage, SceneNames, StartMessage, StepMessage};
+use super::messages::{DeviceMessage, EnergyMessage, SceneNames, StartMessage, StepMessage};
 use super::record_layout;
 use super::record_reader::RecordReader;
 use super::scan::{Scan, unreadable};
@@ -10,7 +10,7 @@ use crate::error::{Error, LogError};
 use glam::DVec3;
 use mcap::records::{AttachmentIndex, MetadataIndex, Record, op::MESSAGE};
 use mcap::{McapError, Summary};
-use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose};
+use palpate::{DeviceInput, DeviceMode, EnergyLedger, Input, ObjectSnapshot, Output, Pose, Twist};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -29,6 +29,17 @@ pub struct LoggedStep {
     /// Number of the step, from 1.
     pub step: u64,
     message: StepMessage,
+}
+
+/// Device in a logged step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoggedDevice {
+    /// Interface point [m, world].
+    pub position: DVec3,
+    /// Reaction force on the hand [N, world].
+    pub force_on_hand: DVec3,
+    /// Proxy [m, world].
+    pub proxy: DVec3,
 }
 
 impl<'a> LogReader<'a> {
@@ -158,6 +169,29 @@ impl LoggedStep {
     /// Compute time of the cycle [µs].
     pub fn compute_us(&self) -> f64 {
         self.message.timing.compute_us
+    }
+
+    /// Devices by name, in no order.
+    pub fn devices(&self) -> impl Iterator<Item = (&str, LoggedDevice)> {
+        let device = |own: &DeviceMessage| LoggedDevice {
+            position: own.position.into(),
+            force_on_hand: own.force.into(),
+            proxy: own.proxy.into(),
+        };
+        self.message.devices.iter().map(move |(name, own)| (name.as_str(), device(own)))
+    }
+
+    /// Objects by name, in no order: placement and velocity at the end of the step.
+    pub fn objects(&self) -> impl Iterator<Item = (&str, Pose, Twist)> {
+        self.message.objects.iter().map(|(name, own)| {
+            let twist = Twist { linear: own.velocity.into(), angular: own.angular_velocity.into() };
+            (name.as_str(), own.pose.into(), twist)
+        })
+    }
+
+    /// Energy ledger of the scene; its defect is not logged.
+    pub fn energy(&self) -> EnergyLedger {
+        (&self.message.energy).into()
     }
 
     /// Input of the step. `modes` are the modes of active devices that hold nothing.

@@ -4,10 +4,11 @@ use super::coupling;
 use super::drivers::{read_motion_limits, read_real, read_simulated};
 use super::keys::{AttachEntry, DeviceEntry};
 use super::places::surface_point;
-use super::source::{Quantity, Source};
+use super::source::{DeviceMover, Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::SceneDevice;
 use crate::warning::{Warning, WarningKind};
+use glam::DVec3;
 use palpate::{
     AppliedForce, Coupling, DeviceMode, DeviceParameters, Grasp, ModelObject, ResponseForm, Surface,
 };
@@ -97,7 +98,7 @@ pub(super) fn read_device(
     }
     let real = read_real(source, device)?;
     let path = match (&device.path, linked.or(pointer)) {
-        (None, None) if real.is_none() => {
+        (None, None) if real.is_none() && source.mover == DeviceMover::Nobody => {
             return source.fail(
                 device.name.span(),
                 SceneErrorKind::Missing,
@@ -126,21 +127,22 @@ fn read_force(
     object_names: &[String],
     warnings: &mut Vec<Warning>,
 ) -> Result<SceneDevice, SceneError> {
-    let Some(entry) = &device.path else {
+    if device.path.is_none() && source.mover == DeviceMover::Nobody {
         return source.fail(
             device.name.span(),
             SceneErrorKind::Missing,
             "path",
             "mode = \"force\" needs path = { file = \"…\" } with the columns t,fx,fy,fz: the force on the object in world axes [N]",
         );
-    };
-    let path = source.motion_path(entry, Columns::Force)?;
-    let applied = AppliedForce { grasp, force: path.at(0.0).position };
+    }
+    let path = device.path.as_ref().map(|entry| source.motion_path(entry, Columns::Force)).transpose()?;
+    let force = path.as_ref().map_or(DVec3::ZERO, |path| path.at(0.0).position);
+    let applied = AppliedForce { grasp, force };
     let device = SceneDevice {
         name: device.name.get_ref().clone(),
         mode: DeviceMode::Force(applied),
         parameters,
-        path: Some(path),
+        path,
         simulated: None,
         real: None,
         motion_limits: MotionLimits::default(),

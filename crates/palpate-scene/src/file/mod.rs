@@ -17,8 +17,8 @@ use glam::DVec3;
 use keys::{Gravity, RETIRED_KEYS, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, ResponseForm, RigidCompliance, RigidIntegrator, Support};
 use palpate_haptics::{Columns, MotionPath};
-use source::Source;
-pub use source::{Relocated, read_path};
+use source::{DeviceMover, Source};
+pub use source::{PartsInMemory, Relocated, read_path};
 use std::collections::HashSet;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
@@ -58,10 +58,38 @@ pub fn read_scene(path: &Path, mode: RunMode) -> Result<Scene, SceneError> {
 pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -> Result<Scene, SceneError> {
     let stored = relocated.get(path).map_or(path, PathBuf::as_path);
     let text = read_text(path, stored)?;
-    let source = Source { path, text: &text, relocated };
-    let file = parse(&source)?;
-    let objects = read_objects(&source, &file)?;
-    assemble(&source, &file, objects, mode)
+    let parts = PartsInMemory::default();
+    let source = Source { path, text: &text, relocated, parts: &parts, mover: DeviceMover::Nobody };
+    read_source(&source, mode)
+}
+
+/// Reads a scene from a text, for a program that may move its devices: one without a path is where the program says in every step, or
+/// exerts the force that it says. Files are looked for beside `path`, which errors name, unless they are in memory.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_scene_text(
+    path: &Path,
+    text: &str,
+    parts: &PartsInMemory,
+    mode: RunMode,
+) -> Result<Scene, SceneError> {
+    let relocated = Relocated::new();
+    read_source(&Source { path, text, relocated: &relocated, parts, mover: DeviceMover::Caller }, mode)
+}
+
+/// Reads a scene file for a program that may move its devices, as [`read_scene_text`] does a text.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_driven_scene(path: &Path, mode: RunMode) -> Result<Scene, SceneError> {
+    read_scene_text(path, &read_text(path, path)?, &PartsInMemory::default(), mode)
+}
+
+fn read_source(source: &Source, mode: RunMode) -> Result<Scene, SceneError> {
+    let file = parse(source)?;
+    let objects = read_objects(source, &file)?;
+    assemble(source, &file, objects, mode)
 }
 
 /// Reads the text of a scene file that is stored at `stored`.
@@ -83,8 +111,9 @@ pub(crate) fn read_edited_scene(
     mode: RunMode,
     change: impl FnOnce(&str, &[ModelObject]) -> Option<String>,
 ) -> Result<(Scene, String), SceneError> {
-    let relocated = Relocated::new();
-    let source = Source { path, text: &text, relocated: &relocated };
+    let (relocated, parts) = (Relocated::new(), PartsInMemory::default());
+    let source =
+        Source { path, text: &text, relocated: &relocated, parts: &parts, mover: DeviceMover::Nobody };
     let file = parse(&source)?;
     let objects = read_objects(&source, &file)?;
     let Some(changed) = change(&text, &objects) else {

@@ -99,10 +99,14 @@ fn read_responses(
         let message = "a table is used with response = \"fir\" only";
         return source.fail(table.span(), SceneErrorKind::Conflict, "table", message);
     }
+    let read_recording = || match source.parts.recordings.get(object.recording.get_ref()) {
+        Some(recording) => Ok(Arc::clone(recording)),
+        None => read_recording(&path)
+            .map(Arc::new)
+            .or_else(|error| source.fail(span.clone(), SceneErrorKind::Recording, "recording", error)),
+    };
     if !fir {
-        let recording = read_recording(&path)
-            .or_else(|error| source.fail(span, SceneErrorKind::Recording, "recording", error))?;
-        return Ok((Arc::new(recording), ResponseForm::Modal));
+        return Ok((read_recording()?, ResponseForm::Modal));
     }
     let (table, table_span) = match &object.table {
         Some(table) => (table_location(source, table.get_ref()), table.span()),
@@ -125,10 +129,9 @@ fn read_responses(
     let (body, table) =
         loaded.or_else(|error| source.fail(table_span.clone(), SceneErrorKind::Table, "table", error))?;
     let recording = if path.is_dir() {
-        body
+        Arc::new(body)
     } else {
-        let recording = read_recording(&path)
-            .or_else(|error| source.fail(span, SceneErrorKind::Recording, "recording", error))?;
+        let recording = read_recording()?;
         if recording.metadata.provenance.mesh_hash != body.metadata.provenance.mesh_hash {
             return source.fail(
                 table_span,
@@ -142,7 +145,7 @@ fn read_responses(
         }
         recording
     };
-    Ok((Arc::new(recording), ResponseForm::Fir(Arc::new(table))))
+    Ok((recording, ResponseForm::Fir(Arc::new(table))))
 }
 
 /// Location of a table as the scene names it: a folder, relative to the scene file, or an address.

@@ -2,21 +2,44 @@
 
 use super::keys::{LARGEST, PathEntry};
 use crate::error::{SceneError, SceneErrorKind};
+use palpate::Recording;
 use palpate_haptics::{Columns, MotionPath};
 use std::collections::HashMap;
 use std::fmt::Display;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use toml::Spanned;
 
 /// Paths of files that are not where the scene says, by the path in the scene: those unpacked from a log.
 pub type Relocated = HashMap<PathBuf, PathBuf>;
 
+/// Parts of a scene that are in memory, by the name that its text gives their files.
+#[derive(Debug, Clone, Default)]
+pub struct PartsInMemory {
+    /// Recordings of objects.
+    pub recordings: HashMap<PathBuf, Arc<Recording>>,
+    /// Motion paths as CSV text.
+    pub paths: HashMap<PathBuf, String>,
+}
+
+/// Mover of the devices that have no path, driver, link or pointer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DeviceMover {
+    /// Nobody: such a device is an error.
+    Nobody,
+    /// Program that runs the scene and gives the input of every step.
+    Caller,
+}
+
 /// Text of a scene file.
+#[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub text: &'a str,
     pub relocated: &'a Relocated,
+    pub parts: &'a PartsInMemory,
+    pub mover: DeviceMover,
 }
 
 /// Quantity of a scene file.
@@ -74,7 +97,11 @@ impl Source<'_> {
     /// Motion path of an entry.
     pub fn motion_path(&self, entry: &PathEntry, columns: Columns) -> Result<MotionPath, SceneError> {
         let PathEntry { file, repeat } = entry;
-        let path = read_path(&self.stored_path(file.get_ref()), columns);
+        let path = match self.parts.paths.get(file.get_ref()) {
+            Some(text) => MotionPath::parse(text, columns)
+                .map_err(|what| SceneError::new(SceneErrorKind::Path, format!("path: {what}"))),
+            None => read_path(&self.stored_path(file.get_ref()), columns),
+        };
         let path = path.or_else(|error| self.fail(file.span(), SceneErrorKind::Path, "path", error))?;
         Ok(if *repeat { path.repeating() } else { path })
     }

@@ -2,8 +2,6 @@
 
 mod dry_run;
 mod material_choice;
-mod node_selection;
-mod support_options;
 mod table;
 
 use crate::commands::inspect;
@@ -17,9 +15,8 @@ use palpate_fem::{
     ResidualChoice,
 };
 use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Repair};
-use palpate_scene::{read_body, source_name};
+use palpate_scene::{read_body, read_supports, source_name};
 use std::path::{Path, PathBuf};
-use support_options::supports;
 use table::{TableArguments, TableCommand};
 
 /// Record the impulse responses of an elastic body by finite elements
@@ -242,7 +239,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
 fn parameters(arguments: &Arguments, extent: RecordExtent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
     let (materials, named_damping) = materials(arguments, mesh)?;
     let damping = damping(arguments, named_damping)?;
-    let (fixed_nodes, supports) = supports(mesh, &arguments.fix, &arguments.spring)?;
+    let (fixed_nodes, supports) = read_supports(mesh, &arguments.fix, &arguments.spring)?;
     Ok(RecordParameters {
         materials,
         order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },

@@ -1,6 +1,5 @@
 //! `palpate record --dense`: the paper's table R[s] of a body, written shard by shard.
 
-use super::node_selection::{Selection, select, union};
 use crate::failure::Failure;
 use crate::progress::Bars;
 use clap::{Args, ValueEnum};
@@ -9,6 +8,7 @@ use palpate::{Metadata, Sampling};
 use palpate_fem::table::{COLUMN_BLOCK, TableMethod, TableParameters, TableRecorder};
 use palpate_fem::{Progress, RecordExtent, RecordedBody};
 use palpate_mesh::Mesh;
+use palpate_scene::{NodeSelection, select_nodes, union_of_nodes};
 use palpate_store::{Compression, Location, Number, Part, TableAttributes, TableContent, TableStore};
 use rayon::prelude::*;
 
@@ -131,8 +131,8 @@ pub struct TableCommand<'a> {
     arguments: &'a TableArguments,
     location: Location,
     samples: usize,
-    touchable: Vec<Selection>,
-    observed: Vec<Selection>,
+    touchable: Vec<NodeSelection>,
+    observed: Vec<NodeSelection>,
 }
 
 impl<'a> TableCommand<'a> {
@@ -153,8 +153,8 @@ impl<'a> TableCommand<'a> {
         if location.folder().is_some_and(|folder| folder.is_file()) {
             return Err(Failure(format!("cannot write {location}: it is a file, and a store is a folder")));
         }
-        let chosen = |option: &str, texts: &[String]| -> Result<Vec<Selection>, Failure> {
-            texts.iter().map(|text| select(mesh, option, text)).collect()
+        let chosen = |option: &str, texts: &[String]| -> Result<Vec<NodeSelection>, Failure> {
+            Ok(texts.iter().map(|text| select_nodes(mesh, option, text)).collect::<Result<_, _>>()?)
         };
         Ok(Some(Self {
             arguments,
@@ -188,8 +188,8 @@ impl<'a> TableCommand<'a> {
                 MethodOption::ClosedForm => TableMethod::ClosedForm,
                 MethodOption::Transient => TableMethod::Transient { substeps: arguments.substeps },
             },
-            touchable_nodes: union(recorded, &self.touchable),
-            observed_nodes: union(recorded, &self.observed),
+            touchable_nodes: union_of_nodes(recorded, &self.touchable),
+            observed_nodes: union_of_nodes(recorded, &self.observed),
         };
         let failed = |e: palpate_fem::table::TableError| Failure(e.to_string());
         let recorder = TableRecorder::new(recorded, &parameters).map_err(failed)?;

@@ -9,10 +9,9 @@ mod warnings;
 use crate::failure::Failure;
 use crate::terminal::{notify, print, print_json};
 use clap::Args;
-use glam::DVec3;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
-use palpate::{DeviceInput, DeviceMode, Grasp, Input, State, step};
+use palpate::{State, step};
 use palpate_scene::{RunMode, Scene, SceneDevice, read_scene};
 pub use realtime::{RealtimeArguments, read_secret};
 pub use realtime_report::{device_line, percentiles, safety, timing};
@@ -132,7 +131,7 @@ pub fn simulate(scene: &Scene, arguments: &Arguments) -> Result<Summary, Failure
         let before = Instant::now();
         step(&scene.model, &mut state, &input);
         let took = before.elapsed();
-        check_status(scene, &input, &state)?;
+        scene.check_step(&input, &state).map_err(Failure)?;
         outputs.take(scene, &input, &state, took)?;
     }
     bar.finish_and_clear();
@@ -147,12 +146,7 @@ fn pointer_without_page(name: &str) -> Failure {
 /// Number of steps: for the given duration, or to the end of the longest path.
 fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
     let step_s = scene.model.parameters().step_s;
-    let devices = scene.devices.iter().filter_map(|device| device.path.as_ref());
-    let paths = devices.chain(scene.obstacles.iter().filter_map(|obstacle| obstacle.path.as_ref()));
-    let paths = paths.chain(scene.clamps.iter().filter_map(|clamp| clamp.path.as_ref()));
-    let paths = paths.chain(scene.bases.iter().flatten());
-    let paths = paths.chain(&scene.gravity);
-    let longest = paths.map(|path| path.end()).fold(0.0, f64::max);
+    let longest = scene.end_s();
     let duration = arguments.duration.unwrap_or(if longest > 0.0 { longest } else { DEFAULT_DURATION_S });
     let steps = (duration / step_s).round();
     if !(duration.is_finite() && duration > 0.0 && steps >= 1.0) {
@@ -166,51 +160,4 @@ fn count_steps(scene: &Scene, arguments: &Arguments) -> Result<usize, Failure> {
         )));
     }
     Ok(steps as usize)
-}
-
-/// Ends the run of a scene of held points at an unsolved step, in which the object would be released. In scenes with contacts
-/// unsolved steps are counted instead, since the next may be solved.
-fn check_status(scene: &Scene, input: &Input, state: &State) -> Result<(), Failure> {
-    let output = state.output();
-    let moves = output.objects.iter().all(|o| o.energy.stored().is_finite() && o.pose.position.is_finite());
-    let finite = moves && output.devices.iter().all(|d| d.force_on_hand.is_finite() && d.proxy.is_finite());
-    let solved = output.status.unsolved_islands == 0 || scene.can_touch();
-    if solved && output.status.rejected_inputs == 0 && finite {
-        return Ok(());
-    }
-    if scene.can_touch() {
-        return Err(Failure(format!(
-            "at {:.6} s the numbers are not finite any more, or a device or an obstacle is where it can't be. Use a \
-             shorter step than {} s, and check that paths are in metres",
-            output.time_s,
-            scene.model.parameters().step_s
-        )));
-    }
-    let hint = farthest_hand(scene, input, state).map_or(String::new(), |(distance, name)| {
-        format!("; the hand of {name:?} is {distance:.3e} m from the point that it holds")
-    });
-    Err(Failure(format!(
-        "at {:.6} s the held points can't be met: a hand moves, or a body turns, too far in one step of {} s{hint}. Use a \
-         shorter step, and check that paths are in metres",
-        output.time_s,
-        scene.model.parameters().step_s
-    )))
-}
-
-/// Device without a coupling that is farthest from its held point, with the distance [m].
-fn farthest_hand<'s>(scene: &'s Scene, input: &Input, state: &State) -> Option<(f64, &'s str)> {
-    let apart = |(device, hand): (&'s SceneDevice, &DeviceInput)| {
-        let DeviceMode::Held(Grasp { object, point }) = device.mode else { return None };
-        let surface = &scene.model.recordings().nth(object)?.surface;
-        let mut displacement = vec![DVec3::ZERO; surface.positions.len()];
-        state.surface_displacement(&scene.model, object, &mut displacement);
-        let moved: DVec3 =
-            surface.corners(&point).iter().map(|&(node, weight)| displacement[node] * weight).sum();
-        let pose = state.output().objects[object].pose;
-        let held = pose.world_from_body(surface.rest_position(&point) + moved);
-        let stiff = device.parameters.coupling.is_none();
-        stiff.then(|| ((hand.position - held).length(), device.name.as_str()))
-    };
-    let hands = scene.devices.iter().zip(&input.devices).filter_map(apart);
-    hands.filter(|(distance, _)| *distance > 0.0).max_by(|a, b| a.0.total_cmp(&b.0))
 }

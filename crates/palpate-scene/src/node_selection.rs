@@ -4,24 +4,27 @@
 //! condition such as `x<0.001` on coordinates in metres; parts joined by `&` must all hold. Mid-edge nodes are nodes of the mesh as any
 //! other ([`Mesh::add_mid_edge_nodes`]).
 
-use crate::failure::Failure;
+use crate::error::{SceneError, SceneErrorKind};
 use palpate_fem::RecordedBody;
 use palpate_mesh::{Mesh, Region};
 
 /// Nodes of a mesh, selected by a text.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Selection {
-    /// Ascending.
+pub struct NodeSelection {
+    /// Numbers in the mesh, ascending.
     pub mesh_nodes: Vec<u32>,
 }
 
 /// Nodes that a text selects; `option` names it in errors.
-pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failure> {
+///
+/// # Errors
+/// When the text is not understood, or selects no node.
+pub fn select_nodes(mesh: &Mesh, option: &str, text: &str) -> Result<NodeSelection, SceneError> {
     let mut chosen = vec![true; mesh.nodes.len()];
     let parts: Vec<&str> = text.split('&').map(str::trim).collect();
     for part in &parts {
         let Some(holds) = part_of(mesh, part)? else {
-            return Err(Failure(format!(
+            return Err(refused(format!(
                 "{option} {part:?} is neither a group of the mesh nor a condition such as 'x<0.001' or 'y>=0.1 & z<0', \
                  nor all, surface, region:NAME or nodes:1,5-9; {}",
                 known_groups(mesh)
@@ -31,13 +34,13 @@ pub fn select(mesh: &Mesh, option: &str, text: &str) -> Result<Selection, Failur
     }
     let mesh_nodes: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|&node| chosen[node as usize]).collect();
     if mesh_nodes.is_empty() {
-        return Err(Failure(format!("{option} {text:?} selects no node; {}", extent(mesh))));
+        return Err(refused(format!("{option} {text:?} selects no node; {}", extent(mesh))));
     }
-    Ok(Selection { mesh_nodes })
+    Ok(NodeSelection { mesh_nodes })
 }
 
 /// Nodes of a discretisation in the union of selections, ascending.
-pub fn union(body: &RecordedBody, selections: &[Selection]) -> Vec<u32> {
+pub fn union_of_nodes(body: &RecordedBody, selections: &[NodeSelection]) -> Vec<u32> {
     let mut chosen = vec![false; body.nodes().len()];
     for selection in selections {
         let among = body.nodes_in_set(&selection.mesh_nodes);
@@ -46,8 +49,12 @@ pub fn union(body: &RecordedBody, selections: &[Selection]) -> Vec<u32> {
     (0..chosen.len() as u32).filter(|&node| chosen[node as usize]).collect()
 }
 
+fn refused(message: String) -> SceneError {
+    SceneError::new(SceneErrorKind::Mesh, message)
+}
+
 /// Membership by node for one condition; `None` when it is not understood.
-fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
+fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, SceneError> {
     let mut holds = vec![false; mesh.nodes.len()];
     if let Some(group) = mesh.groups.iter().find(|group| group.name == part) {
         group.nodes.iter().for_each(|&node| holds[node as usize] = true);
@@ -64,7 +71,7 @@ fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
         mark(mesh, tets.map(|(tet, _)| &tet[..]), &mut holds);
         if !holds.contains(&true) {
             let regions: Vec<String> = mesh.regions.iter().map(Region::label).collect();
-            return Err(Failure(format!("the mesh has no region {name:?}; it has {}", regions.join(", "))));
+            return Err(refused(format!("the mesh has no region {name:?}; it has {}", regions.join(", "))));
         }
     } else if let Some(list) = part.strip_prefix("nodes:") {
         for range in list.split(',') {
@@ -73,7 +80,7 @@ fn part_of(mesh: &Mesh, part: &str) -> Result<Option<Vec<bool>>, Failure> {
                 return Ok(None);
             };
             if last >= holds.len() || first > last {
-                return Err(Failure(format!(
+                return Err(refused(format!(
                     "nodes {range}: the mesh has the nodes 0 to {}",
                     holds.len().saturating_sub(1)
                 )));
@@ -150,11 +157,11 @@ mod tests {
     use palpate_mesh::{NodeGroup, box_mesh};
 
     fn chosen(mesh: &Mesh, text: &str) -> usize {
-        select(mesh, "--fix", text).map_or(0, |selection| selection.mesh_nodes.len())
+        select_nodes(mesh, "--fix", text).map_or(0, |selection| selection.mesh_nodes.len())
     }
 
     fn refusal(mesh: &Mesh, text: &str) -> String {
-        select(mesh, "--fix", text).err().map(|failure| failure.0).unwrap_or_default()
+        select_nodes(mesh, "--fix", text).err().map(|error| error.message).unwrap_or_default()
     }
 
     #[test]
@@ -206,7 +213,7 @@ mod tests {
             ..RecordParameters::new(vec![soft], ElementOrder::Quadratic, 1, Damping::Ratio(0.0))
         };
         let body = RecordedBody::new(mesh.clone(), &parameters, &mut SilentProgress).expect("a body");
-        let selection = select(&mesh, "--touchable", "surface").expect("a surface");
-        assert_eq!(union(&body, &[selection]), body.surface_nodes());
+        let selection = select_nodes(&mesh, "--touchable", "surface").expect("a surface");
+        assert_eq!(union_of_nodes(&body, &[selection]), body.surface_nodes());
     }
 }

@@ -1,20 +1,27 @@
 //! Supports by text: `NODES`, `AXES: NODES` and `STIFFNESS [AXES]: NODES`.
 
-use super::node_selection::select;
-use crate::failure::Failure;
+use crate::error::{SceneError, SceneErrorKind};
+use crate::node_selection::select_nodes;
 use palpate_fem::{GroundSprings, HeldNodes, Supports};
 use palpate_mesh::Mesh;
 
-/// Fixed nodes, and other supports, of `--fix` and `--spring`.
-pub fn supports(mesh: &Mesh, fix: &[String], spring: &[String]) -> Result<(Vec<u32>, Supports), Failure> {
+/// Fixed nodes, and other supports, by the texts of `--fix` and `--spring`.
+///
+/// # Errors
+/// When a text is not understood, or selects no node.
+pub fn read_supports(
+    mesh: &Mesh,
+    fix: &[String],
+    spring: &[String],
+) -> Result<(Vec<u32>, Supports), SceneError> {
     let (mut fixed, mut supports) = (Vec::new(), Supports::default());
     for text in fix {
         let is_group = mesh.groups.iter().any(|group| group.name == *text);
         match text.split_once(':').filter(|_| !is_group) {
             Some((prefix, nodes)) if let Some(axes) = axes(prefix) => {
-                supports.held.push(HeldNodes { nodes: select(mesh, "--fix", nodes)?.mesh_nodes, axes });
+                supports.held.push(HeldNodes { nodes: select_nodes(mesh, "--fix", nodes)?.mesh_nodes, axes });
             }
-            _ => fixed.extend(select(mesh, "--fix", text)?.mesh_nodes),
+            _ => fixed.extend(select_nodes(mesh, "--fix", text)?.mesh_nodes),
         }
     }
     for text in spring {
@@ -25,11 +32,12 @@ pub fn supports(mesh: &Mesh, fix: &[String], spring: &[String]) -> Result<(Vec<u
             words.next().is_none().then_some((stiffness, axes, nodes))
         });
         let Some((stiffness_n_per_m3, axes, nodes)) = parsed else {
-            return Err(Failure(format!(
+            let message = format!(
                 "--spring {text:?}: expected 'STIFFNESS: NODES' or 'STIFFNESS AXES: NODES', as in '1e6 z: z<-0.049', in N/m³"
-            )));
+            );
+            return Err(SceneError::new(SceneErrorKind::Mesh, message));
         };
-        let nodes = select(mesh, "--spring", nodes)?.mesh_nodes;
+        let nodes = select_nodes(mesh, "--spring", nodes)?.mesh_nodes;
         supports.springs.push(GroundSprings { nodes, axes, stiffness_n_per_m3 });
     }
     Ok((fixed, supports))
@@ -57,7 +65,7 @@ mod tests {
         let mut mesh = box_mesh([1.0; 3], [1; 3]).expect("a good box");
         mesh.groups.push(NodeGroup { name: "x: a".into(), nodes: vec![7] });
         let owned = |texts: &[&str]| texts.iter().map(ToString::to_string).collect::<Vec<_>>();
-        supports(&mesh, &owned(fix), &owned(spring)).map_err(|failure| failure.0)
+        read_supports(&mesh, &owned(fix), &owned(spring)).map_err(|error| error.message)
     }
 
     #[test]

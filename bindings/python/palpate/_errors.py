@@ -1,0 +1,81 @@
+"""Exceptions and warnings."""
+
+from __future__ import annotations
+
+__all__ = [
+    "FileError",
+    "InputError",
+    "LogError",
+    "MeshError",
+    "PalpateError",
+    "PalpateWarning",
+    "RecordingError",
+    "SceneError",
+    "StepError",
+]
+
+
+class PalpateError(Exception):
+    """Anything that palpate refuses, with a text that says what to do.
+
+    Attributes
+    ----------
+    kind : str or None
+        Kind, for programs: as `out_of_range`, `unknown_value`, `grasp`.
+    file : str or None
+        File that is at fault.
+    line : int or None
+        Line in the scene, from 1.
+    key : str or None
+        Key of the scene.
+    """
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        kind: str | None = None,
+        file: object = None,
+        line: int | None = None,
+        key: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.kind = kind
+        self.file = None if file is None else str(file)
+        self.line = line
+        self.key = key
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+class SceneError(PalpateError):
+    """Scene that cannot be used; `file`, `line` and `key` say where."""
+
+
+class RecordingError(PalpateError):
+    """Recording that is damaged, or body that cannot be recorded."""
+
+
+class MeshError(PalpateError):
+    """Mesh that cannot be read or used."""
+
+
+class LogError(PalpateError):
+    """Log that cannot be read."""
+
+
+class InputError(PalpateError, ValueError):
+    """Argument with a wrong shape, type or value."""
+
+
+class StepError(PalpateError):
+    """Step that could not be followed: hands or bodies move too far in it."""
+
+
+class FileError(PalpateError, OSError):
+    """File that cannot be read or written."""
+
+
+class PalpateWarning(UserWarning):
+    """What a scene or a recording can do, but its author hardly means."""

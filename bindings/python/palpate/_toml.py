@@ -1,0 +1,80 @@
+"""TOML of parts that are built in code, and the recordings and paths that it names."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from palpate import _palpate
+from palpate._errors import InputError
+
+
+class Texts:
+    """Recordings and paths in memory, by the names that the text gives them."""
+
+    def __init__(self) -> None:
+        self.recordings: dict[str, _palpate.Recording] = {}
+        self.paths: dict[str, str] = {}
+
+    def recording(self, recording: _palpate.Recording, part: str) -> str:
+        """Name of a recording."""
+        name = f"<recording of {part}>"
+        self.recordings[name] = recording
+        return name
+
+    def path(self, path: Any, part: str) -> Mapping[str, Any]:
+        """Entry of a path: a file, `{"file": …, "repeat": …}`, or rows of numbers."""
+        entry = dict(path) if isinstance(path, Mapping) else {"file": path}
+        rows = entry.get("file")
+        if rows is not None and not isinstance(rows, (str, os.PathLike)):
+            entry["file"] = f"<path of {part}>"
+            self.paths[entry["file"]] = _csv(rows, part)
+        return entry
+
+
+def _csv(rows: Any, part: str) -> str:
+    """Rows of numbers as CSV, to the bit."""
+    import numpy as np
+
+    try:
+        numbers = np.asarray(rows, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the path of {part} is no file and no array of numbers: {error}") from None
+    if numbers.ndim != 2:
+        raise InputError(f"the path of {part} has the shape {numbers.shape}, expected (rows, 4): t, x, y, z")
+    return "".join(",".join(map(repr, row)) + "\n" for row in numbers.tolist())
+
+
+def table(keys: Mapping[str, Any]) -> list[str]:
+    """Lines of a table; keys without a value are left out."""
+    return [f"{_key(key)} = {_value(value, key)}" for key, value in keys.items() if value is not None]
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else _text(key)
+
+
+def _text(text: str) -> str:
+    # Strings of JSON are strings of TOML, but for one character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: Any, key: str) -> str:
+    if isinstance(value, (str, os.PathLike)):
+        return _text(os.fspath(value))
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(name)} = {_value(own, name)}" for name, own in value.items() if own is not None)
+        return "{ " + inner + " }"
+    if hasattr(value, "tolist"):  # arrays and scalars of NumPy
+        value = value.tolist()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_value(own, key) for own in value) + "]"
+    raise InputError(f"{key} is {value!r}, which a scene cannot hold: give a number, a text, a list, an array or a dict")

@@ -1,0 +1,30 @@
+//! Python package of palpate: recordings, scenes, simulations and logs with NumPy arrays.
+//!
+//! The classes here are thin: they convert arrays and errors, and call the same functions as the command line. Arguments are checked before
+//! a step; a simulation that another thread uses is an exception; panics become exceptions.
+
+mod arrays;
+mod contacts;
+mod errors;
+mod log;
+mod motion;
+mod progress;
+mod record;
+mod recording;
+mod run_state;
+mod scene;
+mod series;
+mod simulation;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<recording::Recording>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add_class::<run_state::Snapshot>()?;
+    module.add_class::<log::Log>()?;
+    module.add_function(wrap_pyfunction!(record::record, module)?)
+}

@@ -1,0 +1,183 @@
+//! Motion of devices, obstacles and clamps that the caller gives, for one step or a series of steps.
+
+use crate::arrays::{Numbers, check_finite, pose_of};
+use crate::errors::input_error;
+use glam::DVec3;
+use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Pose};
+use palpate_scene::{Scene, SceneDevice};
+use pyo3::prelude::*;
+
+/// Arguments `positions`, `obstacles` and `clamps` of a call.
+#[derive(Clone, Copy)]
+pub struct Arguments<'a, 'py> {
+    pub positions: Option<&'a Bound<'py, PyAny>>,
+    pub obstacles: Option<&'a Bound<'py, PyAny>>,
+    pub clamps: Option<&'a Bound<'py, PyAny>>,
+}
+
+/// Argument and number of rows of each kind of parts.
+fn parts<'a, 'py>(arguments: &Arguments<'a, 'py>, scene: &Scene) -> [Part<'a, 'py>; 3] {
+    let Arguments { positions, obstacles, clamps } = *arguments;
+    [
+        Part { kind: Kind::Devices, given: positions, rows: scene.devices.len() },
+        Part { kind: Kind::Obstacles, given: obstacles, rows: scene.obstacles.len() },
+        Part { kind: Kind::Clamps, given: clamps, rows: scene.clamps.len() },
+    ]
+}
+
+/// Kind of parts that move.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Devices,
+    Obstacles,
+    Clamps,
+}
+
+impl Kind {
+    /// Name of the argument.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Devices => "positions",
+            Self::Obstacles => "obstacles",
+            Self::Clamps => "clamps",
+        }
+    }
+
+    /// Numbers of a row: of a position, or of a pose.
+    fn columns(self) -> usize {
+        if self == Self::Devices { 3 } else { 7 }
+    }
+}
+
+struct Part<'a, 'py> {
+    kind: Kind,
+    given: Option<&'a Bound<'py, PyAny>>,
+    rows: usize,
+}
+
+/// Check that no device needs what this process does not have.
+pub fn check_devices(py: Python<'_>, scene: &Scene) -> PyResult<()> {
+    let lives_elsewhere = |device: &&SceneDevice| device.real.is_some() || device.simulated.is_some();
+    match scene.devices.iter().find(lives_elsewhere) {
+        None => Ok(()),
+        Some(device) => Err(input_error(
+            py,
+            format!(
+                "device {:?} has a driver or a simulated hand, which palpate run --realtime moves: leave them out, and give its positions",
+                device.name
+            ),
+        )),
+    }
+}
+
+/// Check that every device has a path, since no positions are given.
+fn check_paths(py: Python<'_>, scene: &Scene) -> PyResult<()> {
+    match scene.devices.iter().find(|device| device.path.is_none()) {
+        None => Ok(()),
+        Some(device) => Err(input_error(
+            py,
+            format!(
+                "device {:?} has no path in the scene: give positions, an array of shape ({}, 3) with a row per device",
+                device.name,
+                scene.devices.len()
+            ),
+        )),
+    }
+}
+
+/// Write the arguments of one step over the input of the scene's paths.
+pub fn write_step(
+    py: Python<'_>,
+    scene: &Scene,
+    arguments: &Arguments<'_, '_>,
+    input: &mut Input,
+) -> PyResult<()> {
+    if arguments.positions.is_none() {
+        check_paths(py, scene)?;
+    }
+    for Part { kind, given, rows } in parts(arguments, scene) {
+        let Some(given) = given else { continue };
+        let (name, columns) = (kind.name(), kind.columns());
+        let numbers = Numbers::read(given, name, &[Some(rows), Some(columns)])?;
+        let numbers = numbers.as_slice()?;
+        check_finite(py, name, numbers, columns)?;
+        write(kind, numbers, input).map_err(|error| input_error(py, error))?;
+    }
+    Ok(())
+}
+
+/// Motions of a series of steps, copied: other threads may write to Python's arrays meanwhile.
+pub struct SeriesMotion {
+    /// Numbers, and numbers per step, of each kind that is given.
+    parts: Vec<(Kind, Vec<f64>, usize)>,
+    /// Number of steps, if something is given.
+    pub steps: Option<usize>,
+}
+
+impl SeriesMotion {
+    /// Motions of the arguments, whose first extents are the same number of steps.
+    pub fn read(py: Python<'_>, scene: &Scene, arguments: &Arguments<'_, '_>) -> PyResult<Self> {
+        if arguments.positions.is_none() {
+            check_paths(py, scene)?;
+        }
+        let mut series = Self { parts: Vec::new(), steps: None };
+        for Part { kind, given, rows } in parts(arguments, scene) {
+            let Some(given) = given else { continue };
+            let (name, columns) = (kind.name(), kind.columns());
+            let numbers = Numbers::read(given, name, &[series.steps, Some(rows), Some(columns)])?;
+            series.steps = numbers.shape().first().copied();
+            let numbers = numbers.as_slice()?;
+            check_finite(py, name, numbers, columns)?;
+            if kind != Kind::Devices {
+                check_poses(py, name, numbers)?;
+            }
+            series.parts.push((kind, numbers.to_vec(), rows * columns));
+        }
+        Ok(series)
+    }
+
+    /// Write the motion of a step, from 0, over the input of the scene's paths.
+    ///
+    /// # Errors
+    /// As [`write_step`]; poses were checked.
+    pub fn write(&self, step: usize, input: &mut Input) -> Result<(), String> {
+        for (kind, numbers, width) in &self.parts {
+            write(*kind, &numbers[step * width..][..*width], input)?;
+        }
+        Ok(())
+    }
+}
+
+fn check_poses(py: Python<'_>, name: &str, numbers: &[f64]) -> PyResult<()> {
+    for (row, pose) in numbers.chunks_exact(7).enumerate() {
+        pose_of(pose).map_err(|error| input_error(py, format!("row {row} of {name}: {error}")))?;
+    }
+    Ok(())
+}
+
+/// Write rows of numbers of a kind of parts into an input.
+fn write(kind: Kind, numbers: &[f64], input: &mut Input) -> Result<(), String> {
+    let poses = |into: &mut Vec<Pose>| {
+        for (row, (pose, numbers)) in into.iter_mut().zip(numbers.chunks_exact(7)).enumerate() {
+            *pose = pose_of(numbers).map_err(|error| format!("row {row} of {}: {error}", kind.name()))?;
+        }
+        Ok(())
+    };
+    match kind {
+        Kind::Obstacles => return poses(&mut input.obstacles),
+        Kind::Clamps => return poses(&mut input.clamps),
+        Kind::Devices => {}
+    }
+    for (device, numbers) in input.devices.iter_mut().zip(numbers.chunks_exact(3)) {
+        *device = moved(device, DVec3::from_slice(numbers));
+    }
+    Ok(())
+}
+
+/// Device with a given position [m], or with a given force [N] where it prescribes one.
+fn moved(device: &DeviceInput, given: DVec3) -> DeviceInput {
+    match device.mode {
+        DeviceMode::Force(applied) => DeviceInput::exerting(AppliedForce { force: given, ..applied }),
+        mode => DeviceInput { position: given, mode },
+    }
+}

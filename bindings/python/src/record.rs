@@ -1,0 +1,297 @@
+//! `palpate.record`: from a mesh to a recording, with the options of `palpate record`.
+
+use crate::arrays::{Numbers, check_finite, read_integers};
+use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
+use crate::progress::PythonProgress;
+use crate::recording::Recording;
+use glam::DVec3;
+use palpate::{Damping, Material};
+use palpate_fem::{
+    ElementOrder, ErrorTarget, Precision, Progress, RecordParameters, RecordedBody, ResidualChoice,
+    library_material,
+};
+use palpate_mesh::{Mesh, MeshingParameters, Region, Repair};
+use palpate_scene::{SceneError, SceneErrorKind, read_body, read_supports, source_name};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// Mesh of an argument.
+enum Source {
+    /// Primitive or file.
+    Text(String),
+    /// Nodes and tetrahedra.
+    Arrays(Mesh),
+}
+
+/// Options of a recording, as the command line has them.
+struct Options {
+    material: Option<Material>,
+    damping: Damping,
+    modes: usize,
+    target: ErrorTarget,
+    order: ElementOrder,
+    scale: f64,
+    cell_size: Option<f64>,
+    fix: Vec<String>,
+    spring: Vec<String>,
+    residual: ResidualChoice,
+    precision: Precision,
+}
+
+/// Recording of a mesh by finite elements, with the options of `palpate record` (docs/recording.md).
+///
+/// Parameters
+/// ----------
+/// mesh : str, path, or (nodes, tetrahedra)
+///     Mesh file of any format that palpate reads, a surface to be filled, a primitive as `"box:0.1x0.1x0.1/6x6x6"` or `"sphere:0.05/4"`, or
+///     arrays: positions of shape (n, 3), integers of shape (m, 4).
+/// young, poisson, density : float, optional
+///     Young's modulus [Pa], Poisson's ratio [1] and density [kg/m³] of the whole body.
+/// material : str, optional
+///     Material by name instead, as `palpate materials` lists them. Without either the materials of the mesh file.
+/// rayleigh : (float, float), optional
+///     Rayleigh damping α [1/s], β [s].
+/// damping_ratio : float, optional
+///     Damping ratio of all modes instead [1]. Without either nothing is damped, unless a named material says so.
+/// modes : int
+///     Number of elastic modes to keep.
+/// force_error, bandwidth : float, optional
+///     Instead of `modes`: the fewest whose certificate keeps this peak force error [1] and this bandwidth [Hz].
+/// order : {2, 1}
+///     Order of the elements.
+/// scale : float
+///     Metres per unit of the mesh.
+/// cell_size : float, optional
+///     Side of the cells that a surface is filled with [m].
+/// fix, spring : str or list of str, optional
+///     Nodes that are fixed, and faces on springs, as on the command line: `fix="x<-0.049"`.
+/// residual : {"auto", "whole", "none"} or float, optional
+///     Part of the residual compliance to keep, or a cut-off radius [m].
+/// precision : {"compact", "full"}
+///     Precision of the numbers that are kept.
+/// progress : callable, optional
+///     Called as `progress(stage, share)`, at most a hundred times a stage; `share` is from 0 to 1, or None.
+///
+/// Returns
+/// -------
+/// Recording
+///
+/// Raises
+/// ------
+/// MeshError, RecordingError, FileError, InputError
+///     If the mesh, the material or an argument cannot be used.
+/// KeyboardInterrupt
+///     If Ctrl-C is pressed meanwhile. Other threads run meanwhile, too.
+#[pyfunction]
+#[pyo3(signature = (mesh, *, young=None, poisson=None, density=None, material=None, rayleigh=None, damping_ratio=None,
+    modes=200, force_error=None, bandwidth=None, order=2, scale=1.0, cell_size=None, fix=None, spring=None, residual=None,
+    precision="compact", progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+pub fn record(
+    py: Python<'_>,
+    mesh: &Bound<'_, PyAny>,
+    young: Option<f64>,
+    poisson: Option<f64>,
+    density: Option<f64>,
+    material: Option<&str>,
+    rayleigh: Option<[f64; 2]>,
+    damping_ratio: Option<f64>,
+    modes: i64,
+    force_error: Option<f64>,
+    bandwidth: Option<f64>,
+    order: i64,
+    scale: f64,
+    cell_size: Option<f64>,
+    fix: Option<&Bound<'_, PyAny>>,
+    spring: Option<&Bound<'_, PyAny>>,
+    residual: Option<&Bound<'_, PyAny>>,
+    precision: &str,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Recording> {
+    let refused = |message: String| input_error(py, message);
+    let (material, named) = read_material((young, poisson, density), material).map_err(refused)?;
+    let damping = match (rayleigh, damping_ratio) {
+        (Some(_), Some(_)) => return Err(refused("give rayleigh or damping_ratio, not both".into())),
+        (Some([alpha, beta]), None) => Damping::Rayleigh { alpha, beta },
+        (None, Some(ratio)) => Damping::Ratio(ratio),
+        (None, None) => named.unwrap_or(Damping::Ratio(0.0)),
+    };
+    let options = Options {
+        material,
+        damping,
+        modes: usize::try_from(modes)
+            .map_err(|_| refused(format!("modes is {modes}, expected at least 1")))?,
+        target: ErrorTarget { force_error, bandwidth_hz: bandwidth },
+        order: match order {
+            1 => ElementOrder::Linear,
+            2 => ElementOrder::Quadratic,
+            other => return Err(refused(format!("order is {other}, expected 1 or 2"))),
+        },
+        scale,
+        cell_size,
+        fix: texts(fix, "fix")?,
+        spring: texts(spring, "spring")?,
+        residual: residual.map_or(Ok(ResidualChoice::Automatic), read_residual)?,
+        precision: match precision {
+            "compact" => Precision::Compact,
+            "full" => Precision::Full,
+            other => {
+                return Err(refused(format!("precision is {other:?}, expected \"compact\" or \"full\"")));
+            }
+        },
+    };
+    let source = read_source(mesh)?;
+    let mut progress = PythonProgress::new(progress);
+    let recorded = py.detach(|| catch_panic(|| options.record(source, &mut progress)));
+    // An exception of the callback, or a signal, is the cause of whatever came after it.
+    if let Some(error) = progress.failure() {
+        return Err(error);
+    }
+    let recorded = recorded.map_err(|text| internal_error(py, &text))?;
+    recorded.map(Recording::new).map_err(|error| scene_error(py, &error))
+}
+
+impl Options {
+    fn record(&self, source: Source, progress: &mut dyn Progress) -> Result<palpate::Recording, SceneError> {
+        let (mut mesh, name) = match source {
+            Source::Text(text) => {
+                let meshing = MeshingParameters { cell_size: self.cell_size };
+                (read_body(&text, self.scale, &meshing, progress)?, source_name(&text))
+            }
+            Source::Arrays(mut mesh) => {
+                mesh.scale(self.scale).map_err(|error| SceneError::new(SceneErrorKind::Mesh, error))?;
+                (mesh, "arrays".to_string())
+            }
+        };
+        let refused = |kind| {
+            let name = name.clone();
+            move |error: String| SceneError::new(kind, format!("{name}: {error}"))
+        };
+        let mesh_error = refused(SceneErrorKind::Mesh);
+        mesh.repair(&Repair::default()).map_err(|error| mesh_error(error.to_string()))?;
+        if self.order == ElementOrder::Quadratic {
+            mesh.add_mid_edge_nodes();
+        }
+        let materials =
+            mesh.regions.iter().map(|region| self.material_of(region)).collect::<Result<_, _>>()?;
+        let (fixed_nodes, supports) = read_supports(&mesh, &self.fix, &self.spring)?;
+        let parameters = RecordParameters {
+            residual: self.residual,
+            precision: self.precision,
+            fixed_nodes,
+            supports,
+            source: name.clone(),
+            ..RecordParameters::new(materials, self.order, self.modes, self.damping)
+        };
+        let recorded = if self.target == ErrorTarget::default() {
+            RecordedBody::new(mesh, &parameters, progress)
+        } else {
+            RecordedBody::within(&mesh, &parameters, &self.target, progress)
+        };
+        let record_error = refused(SceneErrorKind::Record);
+        recorded.map(|body| body.recording).map_err(|error| record_error(error.to_string()))
+    }
+
+    /// Material of a region: the given one, or that of the mesh file.
+    fn material_of(&self, region: &Region) -> Result<Material, SceneError> {
+        if let Some(material) = &self.material {
+            return Ok(material.clone());
+        }
+        let Some(found) = &region.material else {
+            let message = format!(
+                "region '{}' has no material in the mesh: give young, poisson and density, or material",
+                region.label()
+            );
+            return Err(SceneError::new(SceneErrorKind::Mesh, message));
+        };
+        let material = Material::isotropic(found.young_pa, found.poisson, found.density_kg_m3);
+        Ok(Material { region: region.label(), ..material })
+    }
+}
+
+/// Material by numbers or by name, with the damping of the name; none for that of the mesh file.
+fn read_material(
+    numbers: (Option<f64>, Option<f64>, Option<f64>),
+    name: Option<&str>,
+) -> Result<(Option<Material>, Option<Damping>), String> {
+    match (numbers, name) {
+        ((None, None, None), None) => Ok((None, None)),
+        ((None, None, None), Some(name)) => {
+            let found = library_material(name).map_err(|error| format!("material: {error}"))?;
+            Ok((Some(found.material()), found.damping))
+        }
+        ((Some(young), Some(poisson), Some(density)), None) => {
+            Ok((Some(Material::isotropic(young, poisson, density)), None))
+        }
+        _ => Err("give young, poisson and density together, or material alone".into()),
+    }
+}
+
+/// Part of the residual compliance: "auto", "whole", "none", or a radius in metres.
+fn read_residual(given: &Bound<'_, PyAny>) -> PyResult<ResidualChoice> {
+    if let Ok(radius) = given.extract::<f64>() {
+        return Ok(ResidualChoice::NearField(radius));
+    }
+    match given.extract::<String>().as_deref() {
+        Ok("auto") => Ok(ResidualChoice::Automatic),
+        Ok("whole") => Ok(ResidualChoice::Whole),
+        Ok("none") => Ok(ResidualChoice::None),
+        _ => {
+            let message = format!(
+                "residual is {}, expected \"auto\", \"whole\", \"none\" or a radius in metres",
+                given.repr()?
+            );
+            Err(input_error(given.py(), message))
+        }
+    }
+}
+
+/// One text, or several.
+fn texts(given: Option<&Bound<'_, PyAny>>, name: &str) -> PyResult<Vec<String>> {
+    let Some(given) = given else { return Ok(Vec::new()) };
+    if let Ok(text) = given.extract::<String>() {
+        return Ok(vec![text]);
+    }
+    given.extract().map_err(|_| {
+        input_error(
+            given.py(),
+            format!("{name} is no text, and no list of texts: write as on the command line, 'x<0.001'"),
+        )
+    })
+}
+
+/// Mesh of an argument: a path or a primitive, or a pair of arrays.
+fn read_source(mesh: &Bound<'_, PyAny>) -> PyResult<Source> {
+    let py = mesh.py();
+    if let Ok(text) = mesh.extract::<String>() {
+        return Ok(Source::Text(text));
+    }
+    if let Ok(path) = mesh.extract::<PathBuf>() {
+        let text = path.into_os_string().into_string();
+        return text.map(Source::Text).map_err(|path| {
+            exception(py, Class::Mesh, format!("the path {} is not UTF-8: rename the file", path.display()))
+        });
+    }
+    let Ok((nodes, tets)) = mesh.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() else {
+        let message = "mesh is no path, no primitive as 'box:0.1x0.1x0.1/6x6x6', and no pair of arrays (nodes, tetrahedra)";
+        return Err(input_error(py, message));
+    };
+    let nodes = Numbers::read(&nodes, "nodes", &[None, Some(3)])?;
+    check_finite(py, "nodes", nodes.as_slice()?, 3)?;
+    let nodes: Vec<DVec3> = nodes.as_slice()?.chunks_exact(3).map(DVec3::from_slice).collect();
+    let corners = read_integers(&tets, "tetrahedra", 4)?;
+    let known = |node: i64| u32::try_from(node).ok().filter(|node| (*node as usize) < nodes.len());
+    if let Some(at) = corners.iter().position(|corner| known(*corner).is_none()) {
+        let message = format!(
+            "tetrahedron {} has the node {}, expected 0 to {}",
+            at / 4,
+            corners[at],
+            nodes.len().saturating_sub(1)
+        );
+        return Err(exception(py, Class::Mesh, message));
+    }
+    let corners: Vec<u32> = corners.into_iter().filter_map(known).collect();
+    let tets: Vec<[u32; 4]> = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
+    let tet_regions = vec![0; tets.len()];
+    Ok(Source::Arrays(Mesh { nodes, tets, tet_regions, regions: vec![Region::default()], ..Mesh::default() }))
+}

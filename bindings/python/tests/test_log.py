@@ -1,0 +1,63 @@
+"""Logs as arrays, against the columns that `palpate export` writes of the same log."""
+
+import numpy as np
+import palpate
+import pytest
+
+SCENE = """gravity = [0.0, 0.0, -9.81]
+[[object]]
+name = "cube"
+recording = "cube.palp"
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, -0.05]
+normal = [0.0, 0.0, 1.0]
+[[device]]
+name = "finger"
+mode = "touch"
+tip_radius = 0.005
+patch_radius = 0.04
+coupling = { stiffness = 500.0, damping = 1.0 }
+path = { file = "finger.csv" }
+"""
+
+
+@pytest.fixture
+def log(folder, palpate_run):
+    """Folder with the log of a run in real time, and its columns."""
+    (folder / "scene.toml").write_text(SCENE)
+    (folder / "finger.csv").write_text("0,0,0,0.06\n0.2,0,0,0.052\n0.4,0,0,0.06\n")
+    palpate_run("run", folder / "scene.toml", "--realtime", "--log", folder / "run.mcap")
+    palpate_run("replay", folder / "run.mcap", "--csv", folder / "out.csv")
+    return folder
+
+
+def test_a_log_has_the_columns_of_its_replay(log):
+    table = np.genfromtxt(log / "out.csv", delimiter=",", names=True, deletechars="")
+    read = palpate.Log(log / "run.mcap")
+    assert len(read) == len(table) == 400 and not read.is_cut
+    assert read.device_names == ["finger"] and read.object_names == ["cube"]
+    assert np.allclose(read.time, table["t"], atol=1e-12) and list(read.steps[:2]) == [1, 2]
+
+    def columns(name, parts):
+        return np.column_stack([table[f"{name}.{part}"] for part in parts])
+
+    assert np.array_equal(read.positions["finger"], columns("finger", ["x", "y", "z"]))
+    assert np.array_equal(read.forces["finger"], columns("finger", ["fx", "fy", "fz"]))
+    assert np.array_equal(read.proxies["finger"], columns("finger", ["proxy_x", "proxy_y", "proxy_z"]))
+    assert np.array_equal(read.poses["cube"], columns("cube", ["px", "py", "pz", "qw", "qx", "qy", "qz"]))
+    assert np.array_equal(read.velocities["cube"], columns("cube", ["vx", "vy", "vz", "wx", "wy", "wz"]))
+    for name in ["kinetic", "elastic", "dissipated"]:
+        assert np.array_equal(read.energy[name], table[f"energy.{name}"])
+    assert read.forces["finger"][:, 2].max() > 0.1
+    assert read.lateness.shape == read.compute_time.shape == (400,) and (read.compute_time > 0).all()
+    assert read.metadata["step_s"] == "0.001"
+
+
+def test_a_log_without_its_end_is_read(log):
+    whole = (log / "run.mcap").read_bytes()
+    read = palpate.Log(log / "run.mcap")
+    (log / "cut.mcap").write_bytes(whole[:-1])
+    cut = palpate.Log(log / "cut.mcap")
+    assert cut.is_cut and len(cut) == len(read)
+    assert np.array_equal(cut.forces["finger"], read.forces["finger"])

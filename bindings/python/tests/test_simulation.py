@@ -1,0 +1,254 @@
+"""Numbers of a simulation: those of `palpate run`, and those of mechanics."""
+
+import copy
+
+import numpy as np
+import palpate
+import pytest
+
+GRAVITY = 9.81  # m/s²
+SCENE = """gravity = [0.0, 0.0, -9.81]
+[[object]]
+name = "cube"
+recording = "cube.palp"
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, -0.05]
+normal = [0.0, 0.0, 1.0]
+[[probe]]
+name = "top"
+object = "cube"
+point = [0.0, 0.0, 0.05]
+[[device]]
+name = "finger"
+mode = "touch"
+tip_radius = 0.005
+patch_radius = 0.04
+coupling = { stiffness = 2000.0, damping = 2.0 }
+"""
+FINGER = palpate.Device(
+    "finger", tip_radius=0.005, patch_radius=0.04, coupling={"stiffness": 2000.0, "damping": 2.0}
+)
+
+
+def scene_with_finger(cube, **more):
+    return palpate.Scene(
+        [palpate.Object("cube", cube)],
+        planes=[palpate.Plane(name="floor", point=[0, 0, -0.05], normal=[0, 0, 1])],
+        probes=[palpate.Probe("top", "cube", [0, 0, 0.05])],
+        devices=[FINGER],
+        gravity=[0, 0, -GRAVITY],
+        **more,
+    )
+
+
+@pytest.fixture
+def command_line(folder, press, palpate_run):
+    """Folder of a run by the command line: scene.toml, finger.csv, out.csv, contacts.csv."""
+    # A row before the first step, then one at the end of each step: the path meets every row exactly.
+    times = np.arange(0, len(press) + 1) * 1e-3
+    rows = np.column_stack([times, np.concatenate([press[:1, 0], press[:, 0]])])
+    (folder / "finger.csv").write_text("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+    (folder / "scene.toml").write_text(SCENE + 'path = { file = "finger.csv" }\n')
+    palpate_run("run", folder / "scene.toml", "--csv", folder / "out.csv", "--contacts", folder / "contacts.csv")
+    return folder
+
+
+def columns(file, names):
+    table = np.genfromtxt(file, delimiter=",", names=True, deletechars="", dtype=None, encoding="utf-8")
+    return np.column_stack([table[name] for name in names])
+
+
+def test_a_press_has_the_numbers_of_palpate_run_to_the_bit(command_line):
+    series = palpate.Simulation(palpate.Scene.load(command_line / "scene.toml")).run(contacts=True)
+    out = command_line / "out.csv"
+    axes = ["x", "y", "z"]
+    compared = {
+        "positions": [f"finger.{axis}" for axis in axes],
+        "forces": [f"finger.f{axis}" for axis in axes],
+        "proxies": [f"finger.proxy_{axis}" for axis in axes],
+        "poses": [f"cube.{name}" for name in ["px", "py", "pz", "qw", "qx", "qy", "qz"]],
+        "velocities": [f"cube.{name}" for name in ["vx", "vy", "vz", "wx", "wy", "wz"]],
+        "probe_positions": [f"top.{axis}" for axis in axes],
+        "probe_displacements": [f"top.u{axis}" for axis in axes],
+    }
+    assert np.array_equal(series["time"], columns(out, ["t"])[:, 0])
+    for name, headers in compared.items():
+        assert np.array_equal(series[name][:, 0], columns(out, headers)), name
+    for name, values in series["energy"].items():
+        assert np.array_equal(values, columns(out, [f"energy.{name}"])[:, 0]), name
+    # The press is felt, and ends.
+    force = series["forces"][:, 0, 2]
+    assert force.max() > 1 and force[-1] == 0
+
+    contacts = series["contacts"]
+    file = command_line / "contacts.csv"
+    for name in ["point", "normal", "force"]:
+        assert np.array_equal(contacts[name], columns(file, [name[0] + axis for axis in axes])), name
+    for name, header in [("time", "t"), ("gap", "gap"), ("slip_speed", "slip_speed"), ("against", "against")]:
+        assert np.array_equal(contacts[name], columns(file, [header])[:, 0]), name
+    assert set(contacts["against"]) == {"floor", "finger"} and set(contacts["object"]) == {"cube"}
+    assert np.array_equal(contacts["device"] == 0, contacts["against"] == "finger")
+
+
+def test_positions_of_the_caller_and_steps_one_by_one_give_the_same_bits(command_line, cube, press):
+    by_path = palpate.Simulation(palpate.Scene.load(command_line / "scene.toml")).run(contacts=True)
+    scene = scene_with_finger(cube)
+    whole = palpate.Simulation(scene).run(press, contacts=True)
+    for name in ["time", "positions", "forces", "proxies", "poses", "velocities", "contacts"]:
+        assert np.array_equal(whole[name], by_path[name]), name
+
+    simulation = palpate.Simulation(scene)
+    for number, hand in enumerate(press):
+        forces = simulation.step(hand)
+        assert np.array_equal(forces, whole["forces"][number])
+    assert simulation.time == whole["time"][-1]
+    assert np.array_equal(simulation.poses, whole["poses"][-1])
+    now = whole["contacts"][whole["contacts"]["time"] == simulation.time]
+    assert np.array_equal(simulation.contacts, now)
+    assert simulation.energy == {name: values[-1] for name, values in whole["energy"].items()}
+
+
+def test_rows_in_code_are_the_path_of_a_file(command_line, cube, press):
+    times = np.arange(0, len(press) + 1) * 1e-3
+    rows = np.column_stack([times, np.concatenate([press[:1, 0], press[:, 0]])])
+    scene = scene_with_finger(cube)
+    finger = palpate.Device(**{**vars(FINGER), "path": rows})
+    scene = palpate.Scene(
+        [palpate.Object("cube", cube)],
+        planes=[palpate.Plane(name="floor", point=[0, 0, -0.05], normal=[0, 0, 1])],
+        devices=[finger],
+        gravity=[0, 0, -GRAVITY],
+    )
+    series = palpate.Simulation(scene).run()
+    expected = columns(command_line / "out.csv", ["finger.fx", "finger.fy", "finger.fz"])
+    assert np.array_equal(series["forces"][:, 0], expected)
+
+
+def test_a_floor_carries_the_weight(on_floor, cube):
+    simulation = palpate.Simulation(on_floor)
+    series = simulation.run(duration=4.0, contacts=True)
+    contacts = series["contacts"]
+    floor = contacts[contacts["against"] == "floor"]["force"].sum(axis=0)
+    # Impulses of floor and weight are the change of momentum: an identity of every step, so that only their sums round.
+    impulse = floor * on_floor.step
+    weight = cube.mass * on_floor.gravity * simulation.time
+    momentum = cube.mass * simulation.velocities[0, :3]
+    assert np.allclose(impulse + weight, momentum, atol=1e-9)
+    # It rests: what swings still is some per cent of the weight.
+    assert np.allclose(floor / len(series["time"]), -cube.mass * on_floor.gravity, atol=1e-3)
+
+
+def test_forces_on_a_free_cube_are_its_change_of_momentum(held, cube):
+    simulation = palpate.Simulation(held)
+    start = simulation.held_points()
+    time = np.arange(1, 301)[:, None, None] * 1e-3
+    series = simulation.run(start + 0.01 * np.sin(20 * time) * np.array([0.6, 0.8, 0]))
+    # On the hand acts the opposite of what acts on the cube.
+    impulse = -series["forces"][:, 0].cumsum(axis=0) * held.step
+    momentum = cube.mass * series["velocities"][:, 0, :3]
+    assert np.abs(momentum).max() > 0.1
+    assert np.allclose(impulse, momentum, atol=1e-12)
+
+
+def test_a_prescribed_force_accelerates_a_cube(cube):
+    load = palpate.Device("load", mode="force", attach={"object": "cube", "point": [0.05, 0, 0]})
+    simulation = palpate.Simulation(palpate.Scene([palpate.Object("cube", cube)], devices=[load]))
+    for _ in range(100):
+        forces = simulation.step([[0.5, 0, 0]])
+    assert np.array_equal(forces, [[-0.5, 0, 0]])
+    assert np.isclose(simulation.velocities[0, 0], 0.5 / cube.mass * 0.1, rtol=1e-9)
+
+
+def test_obstacles_that_the_caller_moves_push(cube):
+    scene = palpate.Scene(
+        [palpate.Object("cube", cube)],
+        obstacles=[palpate.Obstacle(name="tool", box={"half_extents": [0.01, 0.2, 0.2]}, position=[-0.065, 0, 0])],
+    )
+    simulation = palpate.Simulation(scene)
+    time = np.arange(1, 301) * 1e-3
+    poses = np.tile([0.0, 0, 0, 1, 0, 0, 0], (300, 1, 1))
+    poses[:, 0, 0] = -0.065 + 0.1 * time
+    series = simulation.run(obstacles=poses, contacts=True)
+    assert set(series["contacts"]["against"]) == {"tool"} and simulation.velocities[0, 0] > 0.05
+    before = simulation.poses
+    simulation.step(obstacles=poses[-1])
+    assert simulation.poses[0, 0] > before[0, 0]
+
+
+def test_a_clamped_face_goes_with_its_frame(cube):
+    jaw = palpate.Clamp("jaw", object="cube", face={"point": [0.05, 0, 0]}, max_cells=4)
+    scene = palpate.Scene([palpate.Object("cube", cube)], clamps=[jaw], gravity=[0, 0, -GRAVITY])
+    simulation = palpate.Simulation(scene)
+    series = simulation.run(duration=4.0)
+    assert scene.clamp_names == ["jaw"] and series["clamp_frames"].shape == (4000, 1, 7)
+    # A jaw that stays carries the weight, but for the change of momentum.
+    impulse = -series["clamp_forces"][:, 0].sum(axis=0) * scene.step
+    weight = cube.mass * scene.gravity * simulation.time
+    assert np.allclose(impulse + weight, cube.mass * simulation.velocities[0, :3], atol=1e-9)
+    assert np.array_equal(simulation.clamp_loads[0, :3], series["clamp_forces"][-1, 0])
+    frame = series["clamp_frames"][-1].copy()
+    frame[0, 2] += 1e-3
+    still = simulation.copy()
+    still.step()
+    simulation.step(clamps=frame)
+    # A jump of 1 mm upwards within a step is a blow on the cube, and its opposite on the jaw.
+    assert simulation.clamp_loads[0, 2] < still.clamp_loads[0, 2] - cube.mass * GRAVITY
+
+
+def test_the_surface_at_the_start_is_the_recordings(cube):
+    at = np.array([0.3, -0.2, 0.1])
+    half = np.sqrt(0.5)
+    turned = palpate.Object("cube", cube, position=at, orientation=[half, 0, 0, half])  # 90° about z
+    scene = palpate.Scene([turned])
+    simulation = palpate.Simulation(scene)
+    rest = scene.rest_positions("cube")
+    assert np.array_equal(rest, cube.positions) and np.array_equal(scene.triangles(0), cube.triangles)
+    expected = at + np.column_stack([-rest[:, 1], rest[:, 0], rest[:, 2]])
+    assert np.allclose(simulation.surface("cube"), expected, atol=1e-15)
+
+
+def test_snapshots_copies_and_resets_come_again_to_the_bit(cube, press):
+    simulation = palpate.Simulation(scene_with_finger(cube))
+    first = simulation.run(press[:150])
+    before = simulation.snapshot()
+    assert before.time == simulation.time == first["time"][-1]
+    twin = simulation.copy()
+    after = simulation.run(press[150:])["forces"]
+    assert np.array_equal(twin.forces, first["forces"][-1])
+    assert np.array_equal(twin.run(press[150:])["forces"], after)
+    simulation.restore(before)
+    assert np.array_equal(simulation.forces, first["forces"][-1])
+    assert np.array_equal(copy.deepcopy(simulation).run(press[150:])["forces"], after)
+    simulation.reset()
+    assert simulation.time == 0 and not simulation.forces.any()
+    assert np.array_equal(simulation.run(press[:150])["forces"], first["forces"])
+
+
+def test_what_rests_falls_asleep(cube):
+    scene = palpate.Scene(
+        [palpate.Object("cube", cube)],
+        planes=[palpate.Plane(name="floor", point=[0, 0, -0.05], normal=[0, 0, 1])],
+        gravity=[0, 0, -GRAVITY],
+        sleep_after=0.1,
+    )
+    simulation = palpate.Simulation(scene)
+    assert simulation.is_asleep.dtype == bool and not simulation.is_asleep[0]
+    for _ in range(30):
+        simulation.run(duration=1.0)
+        if simulation.is_asleep[0]:
+            break
+    assert simulation.is_asleep[0]
+
+
+def test_step_returns_one_array_that_it_writes_over(held):
+    simulation = palpate.Simulation(held)
+    hand = simulation.held_points()
+    first = simulation.step(hand)
+    kept = first.copy()
+    second = simulation.step(hand + [1e-4, 0, 0])
+    assert second is first and simulation.forces is first and not np.array_equal(first, kept)
+    # Other numbers are converted: lists, single precision, every second row.
+    simulation.step((hand + [1e-4, 0, 0]).tolist())
+    simulation.step(hand.astype(np.float32))
+    simulation.step(np.repeat(hand, 2, axis=0)[::2])

@@ -1,0 +1,83 @@
+//! Scenes of texts, for programs that move the devices: parts in memory, and devices without a path.
+
+use glam::DVec3;
+use palpate::{AppliedForce, DeviceMode, Input, Recording};
+use palpate_scene::{PartsInMemory, RunMode, Scene, SceneError, SceneErrorKind, read_scene, read_scene_text};
+use palpate_testkit::FREE_BLOCK_FILE;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const TEXT: &str = r#"
+[[object]]
+name = "cube"
+recording = "<cube>"
+[[device]]
+name = "finger"
+mode = "touch"
+[[device]]
+name = "load"
+mode = "force"
+attach = { object = "cube", point = [0.1, 0.05, 0.05] }
+[[device]]
+name = "guided"
+mode = "touch"
+path = { file = "<path>" }
+"#;
+
+fn read(text: &str, path: &str) -> Result<Scene, SceneError> {
+    let recording = Arc::new(Recording::from_bytes(FREE_BLOCK_FILE).expect("a recording"));
+    let parts = PartsInMemory {
+        recordings: [(PathBuf::from("<cube>"), recording)].into(),
+        paths: [(PathBuf::from("<path>"), path.to_string())].into(),
+    };
+    read_scene_text(Path::new("nowhere/scene.toml"), text, &parts, RunMode::Offline)
+}
+
+#[test]
+fn parts_in_memory_take_the_place_of_files() {
+    let scene = read(TEXT, "0,0,0,3\n2,0,0,1\n").expect("a scene");
+    assert_eq!(scene.end_s(), 2.0);
+    let input = scene.input_at(1.0);
+    assert_eq!(input.devices[2].position, DVec3::new(0.0, 0.0, 2.0));
+    // Without a path: at the origin, and without force, until the program says otherwise.
+    assert_eq!((input.devices[0].position, input.devices[0].mode), (DVec3::ZERO, DeviceMode::Touch));
+    assert!(matches!(input.devices[1].mode, DeviceMode::Force(AppliedForce { force: DVec3::ZERO, .. })));
+}
+
+#[test]
+fn inputs_are_written_over_as_they_are_made() {
+    let scene = read(TEXT, "0,0,0,3\n2,0,0,1\n").expect("a scene");
+    let mut input = Input::default();
+    for time_s in [0.0, 0.5, 3.0] {
+        scene.write_input_at(time_s, &mut input);
+        assert_eq!(input, scene.input_at(time_s));
+    }
+}
+
+#[test]
+fn mistakes_have_their_line() {
+    let error = read(TEXT, "0,0,0\n").err().expect("a path of three columns");
+    assert_eq!(
+        (error.kind, error.line, error.key.as_deref()),
+        (SceneErrorKind::Path, Some(15), Some("path"))
+    );
+    assert!(error.message.starts_with("path: line 1"), "{}", error.message);
+    let error = read(&TEXT.replace("<cube>", "cube.palp"), "0,0,0,3\n").err().expect("no file");
+    assert_eq!((error.kind, error.line), (SceneErrorKind::Recording, Some(4)));
+}
+
+#[test]
+fn a_scene_file_needs_a_mover_for_every_device() {
+    let folder = tempfile::TempDir::new().expect("a folder");
+    std::fs::write(folder.path().join("cube.palp"), FREE_BLOCK_FILE).expect("a file");
+    let file = folder.path().join("scene.toml");
+    let whole = TEXT.replace("<cube>", "cube.palp");
+    for (device, needs) in [("finger", "the device needs path"), ("load", "mode = \"force\" needs path")] {
+        let (objects, devices) = whole.split_once("[[device]]").expect("devices");
+        let own = devices.split("[[device]]").find(|text| text.contains(device)).expect("the device");
+        std::fs::write(&file, format!("{objects}[[device]]{own}")).expect("a file");
+        let error = read_scene(&file, RunMode::Offline).err().expect("nobody moves it");
+        assert_eq!((error.kind, error.key.as_deref()), (SceneErrorKind::Missing, Some("path")));
+        assert!(error.message.starts_with(needs), "{}", error.message);
+    }
+}
