@@ -81,15 +81,17 @@ impl CollisionContext<'_> {
         }
         // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
         let is_fast = motion > COLLISION.max_depth * tip.max(0.5 * body.edge);
-        let mut needed =
-            if is_fast { (1.0 + COLLISION.tip_margin) * tip } else { tip + COLLISION.motion_factor * motion };
-        // A contact that presses is found again, though between nodes of a coarse mesh its patch stands higher than this surface.
-        let known = contacts_between(self.contacts, Collider::Device(number), at);
-        for contact in known.iter().filter(|contact| contact.force != DVec3::ZERO) {
-            let SurfacePoint { triangle, weights } = own.points.of(contact.slot).location.point;
-            let distance = (start - at_weights(surface.corners(triangle), weights)).length();
-            needed = needed.max(distance + COLLISION.motion_factor * motion);
-        }
+        let needed = if is_fast {
+            (1.0 + COLLISION.tip_margin) * tip
+        } else {
+            // A contact that presses is found again, though between nodes of a coarse mesh its patch stands higher than this surface.
+            let known = contacts_between(self.contacts, Collider::Device(number), at);
+            let pressing = known.iter().filter(|contact| contact.force != DVec3::ZERO).map(|contact| {
+                let SurfacePoint { triangle, weights } = own.points.of(contact.slot).location.point;
+                (start - at_weights(surface.corners(triangle), weights)).length()
+            });
+            pressing.fold(tip, f64::max) + COLLISION.motion_factor * motion
+        };
         if needed > reach {
             triangles.find(query, &mut surface, start, needed);
         }
