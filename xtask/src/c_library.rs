@@ -55,7 +55,11 @@ fn lay_out(libraries: &str, to: &str) -> Result<PathBuf, String> {
         ("@STATIC_FLAGS@", flags.join(" ")),
         ("@STATIC_LIBRARIES@", STATIC_LIBRARIES.join(";")),
     ];
-    for (name, folder) in [("palpate.pc", "lib/pkgconfig"), ("palpateConfig.cmake", "lib/cmake/palpate")] {
+    for (name, folder) in [
+        ("palpate.pc", "lib/pkgconfig"),
+        ("palpateConfig.cmake", "lib/cmake/palpate"),
+        ("palpateConfigVersion.cmake", "lib/cmake/palpate"),
+    ] {
         let file = from.join("packaging").join(name);
         let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
         let text = values.iter().fold(text, |text, (key, value)| text.replace(key, value));

@@ -52,19 +52,20 @@ namespace Palpate
             public byte[] Message;
         }
 
-        [DllImport(Name)] public static extern uint palpate_abi_version();
-        [DllImport(Name)] public static extern int palpate_scene_load(byte[] path, uint purpose, out IntPtr scene, out Error error);
-        [DllImport(Name)] public static extern void palpate_scene_free(IntPtr scene);
-        [DllImport(Name)] public static extern double palpate_scene_step_s(IntPtr scene);
-        [DllImport(Name)] public static extern IntPtr palpate_scene_find(IntPtr scene, uint part, byte[] name);
-        [DllImport(Name)] public static extern UIntPtr palpate_scene_node_count(IntPtr scene, UIntPtr thing);
-        [DllImport(Name)] public static extern int palpate_state_new(IntPtr scene, out IntPtr state, out Error error);
-        [DllImport(Name)] public static extern void palpate_state_free(IntPtr state);
-        [DllImport(Name)] public static extern int palpate_state_set_position(IntPtr state, UIntPtr device, Vector position);
-        [DllImport(Name)] public static extern int palpate_state_step(IntPtr state);
-        [DllImport(Name)] public static extern IntPtr palpate_state_devices(IntPtr state, out UIntPtr count);
-        [DllImport(Name)] public static extern IntPtr palpate_state_contacts(IntPtr state, out UIntPtr count);
-        [DllImport(Name)] public static extern int palpate_state_surface(IntPtr state, UIntPtr thing, double[] positions, UIntPtr count);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern uint palpate_abi_version();
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_scene_load(byte[] path, uint purpose, out IntPtr scene, out Error error);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern void palpate_scene_free(IntPtr scene);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern double palpate_scene_step_s(IntPtr scene);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_scene_find(IntPtr scene, uint part, byte[] name);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern UIntPtr palpate_scene_node_count(IntPtr scene, UIntPtr body);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_scene_triangles(IntPtr scene, UIntPtr body, out UIntPtr count);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_new(IntPtr scene, out IntPtr state, out Error error);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern void palpate_state_free(IntPtr state);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_set_position(IntPtr state, UIntPtr device, Vector position);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_step(IntPtr state);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_devices(IntPtr state, out UIntPtr count);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_contacts(IntPtr state, out UIntPtr count);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_surface(IntPtr state, UIntPtr body, double[] positions, UIntPtr count);
 
         public static byte[] Text(string text)
         {
@@ -84,11 +85,12 @@ namespace Palpate
         }
     }
 
-    /// <summary>Scene and its state. Not for several threads at once.</summary>
+    /// <summary>Scene and its state. Its methods may be called by several threads: each waits for the other's call to end.</summary>
     public sealed class Simulation : IDisposable
     {
         const uint RealTime = 0, Device = 1;
 
+        readonly object turn = new object();
         IntPtr scene, state;
 
         public Simulation(string sceneFile)
@@ -96,11 +98,13 @@ namespace Palpate
             if (Library.palpate_abi_version() != Library.AbiVersion) throw new PalpateException(0, "the library is of another version");
             Library.Error error;
             Library.Check(Library.palpate_scene_load(Library.Text(sceneFile), RealTime, out scene, out error), error);
-            Library.Check(Library.palpate_state_new(scene, out state, out error), error);
+            int status = Library.palpate_state_new(scene, out state, out error);
+            if (status != 0) Dispose();
+            Library.Check(status, error);
         }
 
         /// <summary>Duration of a step [s].</summary>
-        public double Step
+        public double StepSeconds
         {
             get { return Library.palpate_scene_step_s(scene); }
         }
@@ -114,23 +118,26 @@ namespace Palpate
         /// <summary>Sets the position of a device at the end of the next step [m].</summary>
         public void SetPosition(int device, Vector position)
         {
-            Library.Check(Library.palpate_state_set_position(state, (UIntPtr)device, position));
+            lock (turn) Library.Check(Library.palpate_state_set_position(state, (UIntPtr)(uint)device, position));
         }
 
         /// <summary>Advances by one step.</summary>
-        public void Advance()
+        public void Step()
         {
-            Library.Check(Library.palpate_state_step(state));
+            lock (turn) Library.Check(Library.palpate_state_step(state));
         }
 
         /// <summary>Device after the last step.</summary>
         public DeviceOutput Output(int device)
         {
-            UIntPtr count;
-            IntPtr first = Library.palpate_state_devices(state, out count);
-            if (device < 0 || device >= (int)count) throw new ArgumentOutOfRangeException("device");
-            IntPtr own = IntPtr.Add(first, device * Marshal.SizeOf(typeof(DeviceOutput)));
-            return (DeviceOutput)Marshal.PtrToStructure(own, typeof(DeviceOutput));
+            lock (turn)
+            {
+                UIntPtr count;
+                IntPtr first = Library.palpate_state_devices(state, out count);
+                if (device < 0 || device >= (int)count) throw new ArgumentOutOfRangeException("device");
+                IntPtr own = IntPtr.Add(first, device * Marshal.SizeOf(typeof(DeviceOutput)));
+                return (DeviceOutput)Marshal.PtrToStructure(own, typeof(DeviceOutput));
+            }
         }
 
         /// <summary>Number of contacts that carry force.</summary>
@@ -138,25 +145,41 @@ namespace Palpate
         {
             get
             {
-                UIntPtr count;
-                Library.palpate_state_contacts(state, out count);
-                return (int)count;
+                lock (turn)
+                {
+                    UIntPtr count;
+                    Library.palpate_state_contacts(state, out count);
+                    return (int)count;
+                }
             }
         }
 
-        /// <summary>Positions of an object's surface nodes [m], x, y, z in turn.</summary>
-        public double[] Surface(int thing)
+        /// <summary>Triangles of an object's surface, three node numbers each, outward by the right-hand rule.</summary>
+        public int[] Triangles(int body)
         {
-            double[] positions = new double[3 * (int)Library.palpate_scene_node_count(scene, (UIntPtr)thing)];
-            Library.Check(Library.palpate_state_surface(state, (UIntPtr)thing, positions, (UIntPtr)positions.Length));
+            UIntPtr count;
+            IntPtr first = Library.palpate_scene_triangles(scene, (UIntPtr)(uint)body, out count);
+            int[] triangles = new int[3 * (int)count];
+            if (triangles.Length > 0) Marshal.Copy(first, triangles, 0, triangles.Length);
+            return triangles;
+        }
+
+        /// <summary>Positions of an object's surface nodes [m], x, y, z in turn.</summary>
+        public double[] Surface(int body)
+        {
+            double[] positions = new double[3 * (int)Library.palpate_scene_node_count(scene, (UIntPtr)(uint)body)];
+            lock (turn) Library.Check(Library.palpate_state_surface(state, (UIntPtr)(uint)body, positions, (UIntPtr)(uint)positions.Length));
             return positions;
         }
 
         public void Dispose()
         {
-            Library.palpate_state_free(state);
-            Library.palpate_scene_free(scene);
-            state = scene = IntPtr.Zero;
+            lock (turn)
+            {
+                Library.palpate_state_free(state);
+                Library.palpate_scene_free(scene);
+                state = scene = IntPtr.Zero;
+            }
         }
     }
 }

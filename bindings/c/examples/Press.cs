@@ -16,14 +16,15 @@ static class Press
         using (Simulation simulation = new Simulation(arguments[0]))
         {
             int finger = simulation.FindDevice("finger");
+            if (finger < 0) throw new ArgumentException("the scene has no device \"finger\"");
             int steps = int.Parse(arguments[1]), every = int.Parse(arguments[2]);
             for (int i = 1; i <= steps; i++)
             {
                 // From 10 mm above the cube down to 4 mm inside in 0.1 s, back, and again.
-                double t = (i % 200) * simulation.Step;
+                double t = (i % 200) * simulation.StepSeconds;
                 double depth = 0.14 * (t < 0.1 ? t : 0.2 - t);
                 simulation.SetPosition(finger, new Vector(0.0, 0.0, 0.065 - depth));
-                simulation.Advance();
+                simulation.Step();
                 if (i % every != 0) continue;
                 Vector force = simulation.Output(finger).ForceOnHand;
                 Console.WriteLine(string.Format(CultureInfo.InvariantCulture, "{0} {1:R} {2:R} {3:R} {4}", i, force.X, force.Y, force.Z, simulation.Contacts));

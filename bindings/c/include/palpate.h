@@ -247,7 +247,8 @@ typedef struct {
   double solver_residual_m;
   // Largest number of solver iterations of an island.
   uint32_t iterations;
-  // Inputs that are not finite: such a device is inactive, such an obstacle stays.
+  // Inputs that are not finite, orientations that are no unit quaternions, points that do not exist: such a device is inactive, such an
+  // obstacle stays.
   uint32_t rejected_inputs;
   // Held directions that depend linearly on others and got no force.
   uint32_t dependent_rows;
@@ -277,6 +278,11 @@ PalpateStatus palpate_state_set_position(PalpateState *state,
                                          size_t device,
                                          PalpateVector position);
 
+// Set the force of a device of mode force on its object in the next step and after [N].
+//
+// state is a state or null.
+PalpateStatus palpate_state_set_force(PalpateState *state, size_t device, PalpateVector force);
+
 // Set mode, position, point and force of a device.
 //
 // state is a state or null; input can be read; error can be written, or is null.
@@ -285,10 +291,13 @@ PalpateStatus palpate_state_set_device(PalpateState *state,
                                        const PalpateDeviceInput *input,
                                        PalpateError *error);
 
-// Input of a device in the next step.
+// Input of a device in the next step; of one that has not begun yet, that in which it will, so that the point that it holds or pushes is known:
+// a held device begins without a blow at palpate_state_point_position of its point.
 //
 // state is a state or null; input can be written.
-PalpateStatus palpate_state_device_input(const PalpateState *state, size_t device, PalpateDeviceInput *input);
+PalpateStatus palpate_state_device_input(const PalpateState *state,
+                                         size_t device,
+                                         PalpateDeviceInput *input);
 
 // Set the pose of a plane or obstacle at the end of the next step.
 //
@@ -393,7 +402,7 @@ size_t palpate_scene_node_count(const PalpateScene *scene, size_t object);
 // Triangles of an object's surface, three node numbers each, outward by the right-hand rule; *count is the number of triangles. Lives as
 // long as the scene; null where there is no such object.
 //
-// scene is a scene or null; count can be written.
+// scene is a scene or null; count can be written, or is null.
 const uint32_t *palpate_scene_triangles(const PalpateScene *scene,
                                         size_t object,
                                         size_t *count);
@@ -416,7 +425,8 @@ PalpateStatus palpate_state_copy(const PalpateState *state,
 void palpate_state_free(PalpateState *state);
 
 // Advance by one step with the input that was set. It allocates nothing, takes no lock and makes no system call;
-// palpate_state_status tells what it could not do.
+// palpate_state_status tells what it could not do. After a bug (PALPATE_STATUS_PANIC) all forces are zero,
+// and the state takes no more steps.
 //
 // state is a state or null.
 PalpateStatus palpate_state_step(PalpateState *state);

@@ -39,6 +39,16 @@ impl Buffers {
     }
 }
 
+impl Buffers {
+    /// Takes the forces away.
+    pub fn release(&mut self) {
+        let zero = glam::DVec3::ZERO.into();
+        self.devices.iter_mut().for_each(|device| device.force_on_hand = zero);
+        self.clamps.iter_mut().for_each(|clamp| (clamp.force, clamp.torque) = (zero, zero));
+        self.contacts.clear();
+    }
+}
+
 fn refill<'a, T: From<&'a S>, S>(own: &mut Vec<T>, from: &'a [S]) {
     own.clear();
     own.extend(from.iter().map(T::from));

@@ -73,6 +73,11 @@ impl Failure {
     pub fn argument(message: impl Into<String>) -> Self {
         Self { status: Status::InvalidArgument, line: 0, message: message.into() }
     }
+
+    /// Bug of palpate.
+    pub fn panic(text: &str) -> Self {
+        Self { status: Status::Panic, line: 0, message: format!("bug of palpate: {text}") }
+    }
 }
 
 impl From<palpate::Error> for Failure {
@@ -120,21 +125,38 @@ impl Error {
 }
 
 /// Runs the body of a function of the interface; a panic does not go through its caller.
-pub(crate) fn checked(error: Option<&mut Error>, body: impl FnOnce() -> Result<(), Failure>) -> Status {
+///
+/// # Safety
+/// `error` can be written, or is null. What it points to may be uninitialised.
+pub(crate) unsafe fn checked(error: *mut Error, body: impl FnOnce() -> Result<(), Failure>) -> Status {
     let result = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic without a text");
-        Err(Failure { status: Status::Panic, line: 0, message: format!("bug of palpate: {text}") })
+        Err(Failure::panic(text))
     });
     match result {
         Ok(()) => Status::Ok,
         Err(failure) => {
-            if let Some(error) = error {
-                *error = Error::of(&failure);
+            if !error.is_null() {
+                // SAFETY: as promised by the caller.
+                unsafe { error.write(Error::of(&failure)) };
             }
             failure.status
         }
     }
+}
+
+/// Writes a result.
+///
+/// # Safety
+/// `to` can be written, or is null. What it points to may be uninitialised.
+pub(crate) unsafe fn put<T>(to: *mut T, value: T) -> Result<(), Failure> {
+    if to.is_null() {
+        return Err(Failure::argument("the place for the result is null"));
+    }
+    // SAFETY: not null, and as promised by the caller.
+    unsafe { to.write(value) };
+    Ok(())
 }
 
 #[cfg(test)]
@@ -149,11 +171,15 @@ mod tests {
     #[test]
     fn a_panic_becomes_a_status_and_long_messages_are_cut_between_characters() {
         let mut error = Error::of(&Failure::argument(""));
-        assert_eq!(checked(Some(&mut error), || panic!("number {}", 7)), Status::Panic);
-        assert_eq!(text(&error), "bug of palpate: number 7");
-        let long = Failure::argument("µ".repeat(MESSAGE_LENGTH));
-        assert_eq!(checked(Some(&mut error), || Err(long)), Status::InvalidArgument);
-        assert_eq!(text(&error), "µ".repeat((MESSAGE_LENGTH - 1) / 2));
-        assert_eq!(checked(None, || Err(Failure::argument("unread"))), Status::InvalidArgument);
+        let mut checked = |body: fn() -> Result<(), Failure>| {
+            // SAFETY: an error of this function.
+            let status = unsafe { checked(&raw mut error, body) };
+            (status, text(&error))
+        };
+        let bug = "bug of palpate: number 7".to_string();
+        assert_eq!(checked(|| panic!("number {}", 7)), (Status::Panic, bug));
+        let long = || Err(Failure::argument("µ".repeat(MESSAGE_LENGTH)));
+        let cut = "µ".repeat((MESSAGE_LENGTH - 1) / 2);
+        assert_eq!(checked(long), (Status::InvalidArgument, cut));
     }
 }

@@ -1,10 +1,11 @@
 //! Input of the next step.
 
-use crate::error::{Error, Failure, Status, checked};
+use crate::error::{Error, Failure, Status, checked, put};
 use crate::scene::no_part;
-use crate::state::State;
+use crate::state::{State, no_state};
 use crate::types::{DeviceInput, Pose, Vector};
 use palpate::DeviceMode;
+use std::ptr;
 
 /// Runs a change of a state's input.
 ///
@@ -15,9 +16,12 @@ unsafe fn change(
     error: *mut Error,
     body: impl FnOnce(&mut State) -> Result<(), Failure>,
 ) -> Status {
+    let run = || {
+        // SAFETY: as promised by the caller.
+        body(unsafe { state.as_mut() }.ok_or_else(no_state)?)
+    };
     // SAFETY: as promised by the caller.
-    let (state, error) = unsafe { (state.as_mut(), error.as_mut()) };
-    checked(error, || body(state.ok_or_else(|| Failure::argument("state is null"))?))
+    unsafe { checked(error, run) }
 }
 
 /// Set the position of a device at the end of the next step [m]; its mode stays. A device without a path in the scene takes part from its
@@ -33,13 +37,33 @@ pub unsafe extern "C" fn palpate_state_set_position(
 ) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, std::ptr::null_mut(), |state| {
-            let input = state.input.devices.get_mut(device).ok_or_else(|| no_part("device", device))?;
-            if let Some(first) = state.waiting[device].take() {
-                *input = first;
+        change(state, ptr::null_mut(), |state| {
+            let input = state.begin(device)?;
+            if matches!(input.mode, DeviceMode::Force(_)) {
+                return Err(Failure::argument(
+                    "the device has a force, not a position: palpate_state_set_force",
+                ));
             }
             input.position = position.into();
             Ok(())
+        })
+    }
+}
+
+/// Set the force of a device of mode `force` on its object in the next step and after [N].
+///
+/// # Safety
+/// `state` is a state or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_set_force(state: *mut State, device: usize, force: Vector) -> Status {
+    // SAFETY: as promised by the caller.
+    unsafe {
+        change(state, ptr::null_mut(), |state| match &mut state.begin(device)?.mode {
+            DeviceMode::Force(applied) => {
+                applied.force = force.into();
+                Ok(())
+            }
+            _ => Err(Failure::argument("the device has a position, not a force: palpate_state_set_position")),
         })
     }
 }
@@ -74,7 +98,8 @@ pub unsafe extern "C" fn palpate_state_set_device(
     }
 }
 
-/// Input of a device in the next step.
+/// Input of a device in the next step; of one that has not begun yet, that in which it will, so that the point that it holds or pushes is known:
+/// a held device begins without a blow at [`palpate_state_point_position`](crate::palpate_state_point_position) of its point.
 ///
 /// # Safety
 /// `state` is a state or null; `input` can be written.
@@ -84,14 +109,26 @@ pub unsafe extern "C" fn palpate_state_device_input(
     device: usize,
     input: *mut DeviceInput,
 ) -> Status {
-    // SAFETY: as promised by the caller.
-    let (state, input) = unsafe { (state.as_ref(), input.as_mut()) };
-    checked(None, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+    let read = || {
+        // SAFETY: as promised by the caller.
+        let state = unsafe { state.as_ref() }.ok_or_else(no_state)?;
         let own = state.input.devices.get(device).ok_or_else(|| no_part("device", device))?;
-        *input.ok_or_else(|| Failure::argument("input is null"))? = (*own).into();
-        Ok(())
-    })
+        // SAFETY: as promised by the caller.
+        unsafe { put(input, state.waiting[device].unwrap_or(*own).into()) }
+    };
+    // SAFETY: no error is written.
+    unsafe { checked(ptr::null_mut(), read) }
+}
+
+impl State {
+    /// Input of a device, which takes part from now on.
+    fn begin(&mut self, device: usize) -> Result<&mut palpate::DeviceInput, Failure> {
+        let input = self.input.devices.get_mut(device).ok_or_else(|| no_part("device", device))?;
+        if let Some(first) = self.waiting[device].take() {
+            *input = first;
+        }
+        Ok(input)
+    }
 }
 
 /// Set the pose of a plane or obstacle at the end of the next step.
@@ -106,7 +143,7 @@ pub unsafe extern "C" fn palpate_state_set_obstacle(
 ) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, std::ptr::null_mut(), |state| {
+        change(state, ptr::null_mut(), |state| {
             let own = state.input.obstacles.get_mut(obstacle).ok_or_else(|| no_part("obstacle", obstacle))?;
             *own = pose.into();
             Ok(())
@@ -122,7 +159,7 @@ pub unsafe extern "C" fn palpate_state_set_obstacle(
 pub unsafe extern "C" fn palpate_state_set_clamp(state: *mut State, clamp: usize, frame: Pose) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, std::ptr::null_mut(), |state| {
+        change(state, ptr::null_mut(), |state| {
             *state.input.clamps.get_mut(clamp).ok_or_else(|| no_part("clamp", clamp))? = frame.into();
             Ok(())
         })
@@ -137,7 +174,7 @@ pub unsafe extern "C" fn palpate_state_set_clamp(state: *mut State, clamp: usize
 pub unsafe extern "C" fn palpate_state_set_gravity(state: *mut State, gravity: Vector) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, std::ptr::null_mut(), |state| {
+        change(state, ptr::null_mut(), |state| {
             state.input.gravity = Some(gravity.into());
             Ok(())
         })
@@ -153,23 +190,10 @@ pub unsafe extern "C" fn palpate_state_set_gravity(state: *mut State, gravity: V
 pub unsafe extern "C" fn palpate_state_follow_paths(state: *mut State) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, std::ptr::null_mut(), |state| {
-            let State { scene, state, input, next, .. } = state;
-            let scene = &scene.scene;
-            scene.write_input_at(state.output().time_s + scene.model.parameters().step_s, next);
-            for ((own, next), device) in input.devices.iter_mut().zip(&next.devices).zip(&scene.devices) {
-                *own = if device.path.is_some() { *next } else { *own };
-            }
-            for ((own, next), obstacle) in
-                input.obstacles.iter_mut().zip(&next.obstacles).zip(&scene.obstacles)
-            {
-                *own = if obstacle.path.is_some() { *next } else { *own };
-            }
-            for ((own, next), clamp) in input.clamps.iter_mut().zip(&next.clamps).zip(&scene.clamps) {
-                *own = if clamp.path.is_some() { *next } else { *own };
-            }
-            input.bases.clone_from(&next.bases);
-            input.gravity = next.gravity.or(input.gravity);
+        change(state, ptr::null_mut(), |state| {
+            let scene = &state.scene.scene;
+            let end_s = state.state.output().time_s + scene.model.parameters().step_s;
+            scene.follow_paths(end_s, &mut state.input);
             Ok(())
         })
     }

@@ -24,7 +24,7 @@ mod types;
 pub use error::{Error, Status};
 pub use input::{
     palpate_state_device_input, palpate_state_follow_paths, palpate_state_set_clamp,
-    palpate_state_set_device, palpate_state_set_gravity, palpate_state_set_obstacle,
+    palpate_state_set_device, palpate_state_set_force, palpate_state_set_gravity, palpate_state_set_obstacle,
     palpate_state_set_position,
 };
 pub use output::{

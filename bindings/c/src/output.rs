@@ -1,6 +1,7 @@
 //! Output of the last step.
 
 use crate::buffers::Buffers;
+use crate::error::put;
 use crate::state::State;
 use crate::types::{ClampOutput, ContactOutput, DeviceOutput, Energy, ObjectOutput, StepStatus};
 use std::ptr;
@@ -11,11 +12,9 @@ use std::ptr;
 /// `state` is a state or null; `count` can be written, or is null.
 unsafe fn array<T>(state: *const State, count: *mut usize, of: impl FnOnce(&Buffers) -> &[T]) -> *const T {
     // SAFETY: as promised by the caller.
-    let (state, count) = unsafe { (state.as_ref(), count.as_mut()) };
-    let array = state.map(|state| of(&state.buffers));
-    if let Some(count) = count {
-        *count = array.map_or(0, <[T]>::len);
-    }
+    let array = unsafe { state.as_ref() }.map(|state| of(&state.buffers));
+    // SAFETY: as promised by the caller; it may do without.
+    let _ = unsafe { put(count, array.map_or(0, <[T]>::len)) };
     array.map_or(ptr::null(), <[T]>::as_ptr)
 }
 

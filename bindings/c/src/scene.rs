@@ -1,6 +1,6 @@
 //! Scenes: loading, names, and surfaces at rest.
 
-use crate::error::{Error, Failure, Status, checked};
+use crate::error::{Error, Failure, Status, checked, put};
 use crate::types::{Part, Purpose};
 use palpate::Model;
 use palpate_scene::{SceneError, read_driven_scene};
@@ -68,20 +68,21 @@ pub unsafe extern "C" fn palpate_scene_load(
     scene: *mut *mut Scene,
     error: *mut Error,
 ) -> Status {
-    // SAFETY: as promised by the caller.
-    let (scene, error) = unsafe { (scene.as_mut(), error.as_mut()) };
-    checked(error, || {
-        let scene = scene.ok_or_else(|| Failure::argument("scene is null"))?;
-        *scene = ptr::null_mut();
+    let load = || {
+        // SAFETY: as promised by the caller.
+        unsafe { put(scene, ptr::null_mut()) }?;
         if path.is_null() {
             return Err(Failure::argument("path is null"));
         }
         // SAFETY: not null, and a string, as promised by the caller.
         let path = unsafe { CStr::from_ptr(path) };
         let path = path.to_str().map_err(|_| Failure::argument("path is not UTF-8"))?;
-        *scene = Box::into_raw(Box::new(load(Path::new(path), purpose)?));
-        Ok(())
-    })
+        let loaded = load(Path::new(path), purpose)?;
+        // SAFETY: as promised by the caller.
+        unsafe { put(scene, Box::into_raw(Box::new(loaded))) }
+    };
+    // SAFETY: as promised by the caller.
+    unsafe { checked(error, load) }
 }
 
 /// Free a scene; its states stay as they are. Null is left alone.
@@ -168,7 +169,7 @@ pub unsafe extern "C" fn palpate_scene_node_count(scene: *const Scene, object: u
 /// long as the scene; null where there is no such object.
 ///
 /// # Safety
-/// `scene` is a scene or null; `count` can be written.
+/// `scene` is a scene or null; `count` can be written, or is null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_scene_triangles(
     scene: *const Scene,
@@ -176,10 +177,9 @@ pub unsafe extern "C" fn palpate_scene_triangles(
     count: *mut usize,
 ) -> *const u32 {
     // SAFETY: as promised by the caller.
-    let (scene, count) = unsafe { (scene.as_ref(), count.as_mut()) };
+    let scene = unsafe { scene.as_ref() };
     let triangles = scene.and_then(|scene| scene.0.surface(object).ok()).map(|surface| &surface.triangles);
-    if let Some(count) = count {
-        *count = triangles.map_or(0, Vec::len);
-    }
+    // SAFETY: as promised by the caller; it may do without.
+    let _ = unsafe { put(count, triangles.map_or(0, Vec::len)) };
     triangles.map_or(ptr::null(), |triangles| triangles.as_ptr().cast())
 }

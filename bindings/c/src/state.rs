@@ -1,7 +1,7 @@
 //! States: steps, surfaces, and points on them.
 
 use crate::buffers::Buffers;
-use crate::error::{Error, Failure, Status, checked};
+use crate::error::{Error, Failure, Status, checked, put};
 use crate::scene::{Loaded, Scene, no_part};
 use crate::types::{SurfacePoint, Vector};
 use glam::DVec3;
@@ -15,11 +15,11 @@ pub struct State {
     pub(crate) state: palpate::State,
     /// Input of the next step.
     pub(crate) input: Input,
-    /// Input by the paths of the scene.
-    pub(crate) next: Input,
     /// Input in the scene's mode, for devices that take no part before their first position.
     pub(crate) waiting: Vec<Option<DeviceInput>>,
     pub(crate) buffers: Buffers,
+    /// Whether a step has failed, by a bug: what is left of the state is of no use.
+    has_failed: bool,
     /// Displacements of an object's nodes, and what they share from one surface to the next.
     displacements: Vec<DVec3>,
     residual_fields: Vec<ResidualFieldCache>,
@@ -39,8 +39,16 @@ impl State {
         let buffers = Buffers::of(state.output());
         let residual_fields =
             scene.scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect();
-        let next = input.clone();
-        Self { scene, state, input, next, waiting, buffers, displacements: Vec::new(), residual_fields }
+        Self {
+            scene,
+            state,
+            input,
+            waiting,
+            buffers,
+            displacements: Vec::new(),
+            residual_fields,
+            has_failed: false,
+        }
     }
 
     fn copy(&self) -> Self {
@@ -48,9 +56,9 @@ impl State {
             scene: self.scene.clone(),
             state: self.state.clone(),
             input: self.input.clone(),
-            next: self.next.clone(),
             waiting: self.waiting.clone(),
             buffers: Buffers::of(self.state.output()),
+            has_failed: self.has_failed,
             displacements: Vec::new(),
             residual_fields: self.residual_fields.clone(),
         }
@@ -86,15 +94,16 @@ pub unsafe extern "C" fn palpate_state_new(
     state: *mut *mut State,
     error: *mut Error,
 ) -> Status {
+    let new = || {
+        // SAFETY: as promised by the caller.
+        unsafe { put(state, ptr::null_mut()) }?;
+        // SAFETY: as promised by the caller.
+        let scene = unsafe { scene.as_ref() }.ok_or_else(|| Failure::argument("scene is null"))?;
+        // SAFETY: as promised by the caller.
+        unsafe { put(state, Box::into_raw(Box::new(State::new(scene.0.clone())))) }
+    };
     // SAFETY: as promised by the caller.
-    let (scene, state, error) = unsafe { (scene.as_ref(), state.as_mut(), error.as_mut()) };
-    checked(error, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
-        *state = ptr::null_mut();
-        let scene = scene.ok_or_else(|| Failure::argument("scene is null"))?;
-        *state = Box::into_raw(Box::new(State::new(scene.0.clone())));
-        Ok(())
-    })
+    unsafe { checked(error, new) }
 }
 
 /// Copy a state, which goes on as the original does. `*copy` is null unless it succeeds; free it with [`palpate_state_free`].
@@ -107,15 +116,16 @@ pub unsafe extern "C" fn palpate_state_copy(
     copy: *mut *mut State,
     error: *mut Error,
 ) -> Status {
+    let make = || {
+        // SAFETY: as promised by the caller.
+        unsafe { put(copy, ptr::null_mut()) }?;
+        // SAFETY: as promised by the caller.
+        let state = unsafe { state.as_ref() }.ok_or_else(no_state)?;
+        // SAFETY: as promised by the caller.
+        unsafe { put(copy, Box::into_raw(Box::new(state.copy()))) }
+    };
     // SAFETY: as promised by the caller.
-    let (state, copy, error) = unsafe { (state.as_ref(), copy.as_mut(), error.as_mut()) };
-    checked(error, || {
-        let copy = copy.ok_or_else(|| Failure::argument("copy is null"))?;
-        *copy = ptr::null_mut();
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
-        *copy = Box::into_raw(Box::new(state.copy()));
-        Ok(())
-    })
+    unsafe { checked(error, make) }
 }
 
 /// Free a state. Null is left alone.
@@ -131,20 +141,30 @@ pub unsafe extern "C" fn palpate_state_free(state: *mut State) {
 }
 
 /// Advance by one step with the input that was set. It allocates nothing, takes no lock and makes no system call;
-/// [`palpate_state_status`](crate::palpate_state_status) tells what it could not do.
+/// [`palpate_state_status`](crate::palpate_state_status) tells what it could not do. After a bug (`PALPATE_STATUS_PANIC`) all forces are zero,
+/// and the state takes no more steps.
 ///
 /// # Safety
 /// `state` is a state or null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
     // SAFETY: as promised by the caller.
-    let state = unsafe { state.as_mut() };
-    checked(None, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+    let Some(state) = (unsafe { state.as_mut() }) else { return Status::InvalidArgument };
+    let advance = || {
+        if state.has_failed {
+            return Err(Failure::panic("an earlier step has failed"));
+        }
         let output = step(state.scene.model(), &mut state.state, &state.input);
         state.buffers.update(output);
         Ok(())
-    })
+    };
+    // SAFETY: no error is written.
+    let status = unsafe { checked(ptr::null_mut(), advance) };
+    if status != Status::Ok {
+        state.has_failed = true;
+        state.buffers.release();
+    }
+    status
 }
 
 /// Positions of the nodes of an object's surface at the end of the last step [m]: `count` numbers, three for each of the
@@ -159,23 +179,24 @@ pub unsafe extern "C" fn palpate_state_surface(
     positions: *mut f64,
     count: usize,
 ) -> Status {
-    // SAFETY: as promised by the caller.
-    let state = unsafe { state.as_mut() };
-    checked(None, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
+    let write = || {
+        // SAFETY: as promised by the caller.
+        let state = unsafe { state.as_mut() }.ok_or_else(no_state)?;
         state.displace(object)?;
         if positions.is_null() || count != 3 * state.displacements.len() {
             return Err(Failure::argument("three numbers per node are asked"));
         }
-        // SAFETY: not null, and so many numbers, as promised by the caller.
-        let out = unsafe { std::slice::from_raw_parts_mut(positions, count) };
         let pose = state.state.output().objects[object].pose;
         let rest = &state.scene.surface(object)?.positions;
-        for ((out, rest), displacement) in out.chunks_exact_mut(3).zip(rest).zip(&state.displacements) {
-            out.copy_from_slice(&(pose.position + pose.orientation * (*rest + *displacement)).to_array());
+        for (node, (rest, displacement)) in rest.iter().zip(&state.displacements).enumerate() {
+            let position = pose.position + pose.orientation * (*rest + *displacement);
+            // SAFETY: three of so many numbers, as promised by the caller.
+            unsafe { positions.add(3 * node).cast::<[f64; 3]>().write(position.to_array()) };
         }
         Ok(())
-    })
+    };
+    // SAFETY: no error is written.
+    unsafe { checked(ptr::null_mut(), write) }
 }
 
 /// Point on an object's surface at rest that is nearest to a position [m], in the object's present placement: a point to hold.
@@ -189,18 +210,22 @@ pub unsafe extern "C" fn palpate_state_nearest_point(
     position: Vector,
     point: *mut SurfacePoint,
 ) -> Status {
-    // SAFETY: as promised by the caller.
-    let (state, point) = unsafe { (state.as_ref(), point.as_mut()) };
-    checked(None, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
-        let point = point.ok_or_else(|| Failure::argument("point is null"))?;
+    let find = || {
+        // SAFETY: as promised by the caller.
+        let state = unsafe { state.as_ref() }.ok_or_else(no_state)?;
         let surface = state.scene.surface(object)?;
+        let position = DVec3::from(position);
+        if !position.is_finite() {
+            return Err(Failure::argument("the position is not finite"));
+        }
         let pose = state.state.output().objects[object].pose;
-        let in_body = pose.orientation.inverse() * (DVec3::from(position) - pose.position);
+        let in_body = pose.orientation.inverse() * (position - pose.position);
         let (nearest, _) = surface.nearest(in_body).ok_or_else(|| no_part("surface of object", object))?;
-        *point = Grasp { object, point: nearest }.into();
-        Ok(())
-    })
+        // SAFETY: as promised by the caller.
+        unsafe { put(point, Grasp { object, point: nearest }.into()) }
+    };
+    // SAFETY: no error is written.
+    unsafe { checked(ptr::null_mut(), find) }
 }
 
 /// Position of a point of a surface at the end of the last step [m].
@@ -213,12 +238,17 @@ pub unsafe extern "C" fn palpate_state_point_position(
     point: SurfacePoint,
     position: *mut Vector,
 ) -> Status {
-    // SAFETY: as promised by the caller.
-    let (state, position) = unsafe { (state.as_ref(), position.as_mut()) };
-    checked(None, || {
-        let state = state.ok_or_else(|| Failure::argument("state is null"))?;
-        let position = position.ok_or_else(|| Failure::argument("position is null"))?;
-        *position = state.position(&point.into())?.into();
-        Ok(())
-    })
+    let read = || {
+        // SAFETY: as promised by the caller.
+        let state = unsafe { state.as_ref() }.ok_or_else(no_state)?;
+        // SAFETY: as promised by the caller.
+        unsafe { put(position, state.position(&point.into())?.into()) }
+    };
+    // SAFETY: no error is written.
+    unsafe { checked(ptr::null_mut(), read) }
+}
+
+/// Failure of a missing state.
+pub(crate) fn no_state() -> Failure {
+    Failure::argument("state is null")
 }

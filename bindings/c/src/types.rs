@@ -215,7 +215,8 @@ pub struct StepStatus {
     pub solver_residual_m: f64,
     /// Largest number of solver iterations of an island.
     pub iterations: u32,
-    /// Inputs that are not finite: such a device is inactive, such an obstacle stays.
+    /// Inputs that are not finite, orientations that are no unit quaternions, points that do not exist: such a device is inactive, such an
+    /// obstacle stays.
     pub rejected_inputs: u32,
     /// Held directions that depend linearly on others and got no force.
     pub dependent_rows: u32,
@@ -228,7 +229,9 @@ pub struct StepStatus {
 }
 
 impl From<DVec3> for Vector {
-    fn from(DVec3 { x, y, z }: DVec3) -> Self {
+    fn from(vector: DVec3) -> Self {
+        // No negative zeros, as in forces of nothing.
+        let DVec3 { x, y, z } = vector + DVec3::ZERO;
         Self { x, y, z }
     }
 }

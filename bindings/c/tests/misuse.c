@@ -44,6 +44,7 @@ int main(int argc, char **argv) {
   PalpateDeviceInput input;
   show("input", palpate_state_device_input(state, 0, &input));
   printf("begins in mode %u\n", (unsigned)input.mode);
+  show("force", palpate_state_set_force(state, 0, above));
   show("device 5", palpate_state_set_position(state, 5, above));
   input.mode = 77;
   show("mode 77", palpate_state_set_device(state, 0, &input, &error));
@@ -62,6 +63,7 @@ int main(int argc, char **argv) {
   show("surface", palpate_state_surface(state, 0, &number, 1));
   show("surface of 4", palpate_state_surface(state, 4, &number, 1));
 
+  show("nowhere", palpate_state_nearest_point(state, 0, nowhere, &input.point));
   show("nearest", palpate_state_nearest_point(state, 0, above, &input.point));
   input.mode = PALPATE_DEVICE_MODE_HELD;
   show("position", palpate_state_point_position(state, input.point, &input.position));

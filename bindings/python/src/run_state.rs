@@ -45,10 +45,10 @@ impl RunState {
         Self { state: State::new(&scene.model), input: scene.input_at(0.0), steps: 0 }
     }
 
-    /// Write the input of the next step from the paths of the scene.
-    pub fn write_paths(&mut self, scene: &palpate_scene::Scene) {
+    /// Move what has a path in the scene to its place at the end of the next step.
+    pub fn follow_paths(&mut self, scene: &palpate_scene::Scene) {
         let end_s = (self.steps + 1) as f64 * scene.model.parameters().step_s;
-        scene.write_input_at(end_s, &mut self.input);
+        scene.follow_paths(end_s, &mut self.input);
     }
 
     /// Step with the input.
@@ -75,7 +75,7 @@ pub fn run_part(
         if (number - steps.start).is_multiple_of(STEPS_PER_LOOK) && started.elapsed() > SIGNAL_INTERVAL {
             return Ok(number);
         }
-        run.write_paths(scene);
+        run.follow_paths(scene);
         motion.write(number, &mut run.input)?;
         run.step(scene)?;
         append(&run.input, &run.state);

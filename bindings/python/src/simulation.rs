@@ -154,7 +154,8 @@ impl Simulation {
     ///     Positions of the hands at the end of the step [m, world], shape (devices, 3); a row of a device with `mode = "force"` is its force on the
     ///     object [N]. Without it devices follow the paths of the scene. A float64 array is read as it is, anything else is converted.
     /// obstacles : array_like, optional
-    ///     Poses of planes and obstacles at the end of the step, shape (obstacles, 7): x, y, z [m], qw, qx, qy, qz. Without it they follow their paths.
+    ///     Poses of planes and obstacles at the end of the step, shape (obstacles, 7): x, y, z [m], qw, qx, qy, qz. Without it they follow their paths,
+    ///     and stay where they are where they have none.
     /// clamps : array_like, optional
     ///     Frames of the clamps, likewise.
     ///
@@ -178,7 +179,7 @@ impl Simulation {
         clamps: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Py<PyArray2<f64>>> {
         let mut run = self.lock(py)?;
-        run.write_paths(&self.inner);
+        run.follow_paths(&self.inner);
         write_step(py, &self.inner, &Arguments { positions, obstacles, clamps }, &mut run.input)?;
         let stepped = catch_panic(|| run.step(&self.inner)).map_err(|text| internal_error(py, &text))?;
         self.write_forces(py, run.state.output())?;

@@ -176,6 +176,22 @@ def test_obstacles_that_the_caller_moves_push(cube):
     assert simulation.poses[0, 0] > before[0, 0]
 
 
+def test_what_has_no_path_stays_where_it_was_put(cube):
+    scene = palpate.Scene(
+        [palpate.Object("cube", cube)],
+        planes=[palpate.Plane(name="floor", point=[0, 0, -0.05], normal=[0, 0, 1])],
+        gravity=[0, 0, -9.81],
+    )
+    simulation = palpate.Simulation(scene)
+    poses = np.tile([0.0, 0, -0.05, 1, 0, 0, 0], (500, 1, 1))
+    poses[:, 0, 2] += 0.01 * np.arange(1, 501) / 500
+    lifted = simulation.run(obstacles=poses)["poses"][-1, 0, 2]
+    assert 0.008 < lifted < 0.0101
+    # A floor that went back would let it fall by 1 cm in 45 ms.
+    simulation.run(duration=0.2)
+    assert abs(simulation.poses[0, 2] - lifted) < 0.001
+
+
 def test_a_clamped_face_goes_with_its_frame(cube):
     jaw = palpate.Clamp("jaw", object="cube", face={"point": [0.05, 0, 0]}, max_cells=4)
     scene = palpate.Scene([palpate.Object("cube", cube)], clamps=[jaw], gravity=[0, 0, -GRAVITY])

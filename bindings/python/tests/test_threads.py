@@ -10,6 +10,14 @@ import palpate
 import pytest
 
 
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C as at a terminal: a process in the background of a shell starts with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def interrupt_when(event):
     """Thread that presses Ctrl-C when an event has come."""
 
@@ -22,7 +30,7 @@ def interrupt_when(event):
     return thread
 
 
-def test_ctrl_c_ends_a_recording():
+def test_ctrl_c_ends_a_recording(ctrl_c):
     begun = threading.Event()
     # Some seconds of work, of which the progress tells as soon as it begins.
     interrupt_when(begun)
@@ -32,7 +40,7 @@ def test_ctrl_c_ends_a_recording():
         )
 
 
-def test_ctrl_c_ends_a_run_where_it_is(held):
+def test_ctrl_c_ends_a_run_where_it_is(held, ctrl_c):
     simulation = palpate.Simulation(held)
     hand = simulation.held_points()
     time = np.arange(0, 20, held.step)

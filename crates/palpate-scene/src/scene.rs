@@ -149,29 +149,41 @@ impl Scene {
         }
     }
 
-    /// Input at a time of all paths [s].
+    /// Input at a time of all paths [s]; parts without a path are where they start.
     pub fn input_at(&self, time_s: f64) -> Input {
-        let mut input = Input::default();
-        self.write_input_at(time_s, &mut input);
+        let at_start = |device: &SceneDevice| DeviceInput { position: DVec3::ZERO, mode: device.mode };
+        let mut input = Input {
+            devices: self.devices.iter().map(at_start).collect(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.start).collect(),
+            clamps: self.clamps.iter().map(|clamp| clamp.start).collect(),
+            bases: vec![None; self.bases.len()],
+            gravity: None,
+        };
+        self.follow_paths(time_s, &mut input);
         input
     }
 
-    /// Write the input at a time of all paths [s] into an input of this scene, which may be empty.
+    /// Move all parts that have a path to their place at a time [s], in an input of this scene; the others stay.
     ///
     /// # Real time
-    /// No allocation, where the input has room for all parts.
-    pub fn write_input_at(&self, time_s: f64, input: &mut Input) {
+    /// No allocation.
+    pub fn follow_paths(&self, time_s: f64, input: &mut Input) {
         let step_s = self.model.parameters().step_s;
-        input.devices.clear();
-        input.devices.extend(self.devices.iter().map(|device| device.input_at(time_s, step_s)));
-        input.obstacles.clear();
-        input.obstacles.extend(self.obstacles.iter().map(|obstacle| obstacle.pose_at(time_s)));
-        input.clamps.clear();
-        input.clamps.extend(self.clamps.iter().map(|clamp| clamp.frame_at(time_s)));
-        input.bases.clear();
-        let base = |path: &Option<MotionPath>| path.as_ref().map(|path| path.of_base(time_s, step_s));
-        input.bases.extend(self.bases.iter().map(base));
-        input.gravity = self.gravity_at(time_s);
+        for (own, device) in input.devices.iter_mut().zip(&self.devices).filter(|(_, of)| of.path.is_some()) {
+            *own = device.input_at(time_s, step_s);
+        }
+        for (own, obstacle) in
+            input.obstacles.iter_mut().zip(&self.obstacles).filter(|(_, of)| of.path.is_some())
+        {
+            *own = obstacle.pose_at(time_s);
+        }
+        for (own, clamp) in input.clamps.iter_mut().zip(&self.clamps).filter(|(_, of)| of.path.is_some()) {
+            *own = clamp.frame_at(time_s);
+        }
+        for (own, base) in input.bases.iter_mut().zip(&self.bases) {
+            *own = base.as_ref().map(|path| path.of_base(time_s, step_s));
+        }
+        input.gravity = self.gravity_at(time_s).or(input.gravity);
     }
 
     /// Time of the last row of all paths [s]; 0 without paths.

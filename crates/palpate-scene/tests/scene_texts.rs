@@ -45,12 +45,15 @@ fn parts_in_memory_take_the_place_of_files() {
 }
 
 #[test]
-fn inputs_are_written_over_as_they_are_made() {
+fn parts_without_a_path_stay_where_the_program_has_put_them() {
     let scene = read(TEXT, "0,0,0,3\n2,0,0,1\n").expect("a scene");
-    let mut input = Input::default();
-    for time_s in [0.0, 0.5, 3.0] {
-        scene.write_input_at(time_s, &mut input);
-        assert_eq!(input, scene.input_at(time_s));
+    let mut input = scene.input_at(0.0);
+    input.devices[0].position = DVec3::X;
+    input.gravity = Some(DVec3::Y);
+    for time_s in [0.5, 3.0] {
+        scene.follow_paths(time_s, &mut input);
+        assert_eq!((input.devices[0].position, input.gravity), (DVec3::X, Some(DVec3::Y)));
+        assert_eq!(input.devices[1..], scene.input_at(time_s).devices[1..]);
     }
 }
 
