@@ -1,7 +1,7 @@
 //! Scenes of texts, for programs that move the devices: parts in memory, and devices without a path.
 
 use glam::DVec3;
-use palpate::{AppliedForce, DeviceMode, Input, Recording};
+use palpate::{AppliedForce, DeviceMode, Recording};
 use palpate_scene::{PartsInMemory, RunMode, Scene, SceneError, SceneErrorKind, read_scene, read_scene_text};
 use palpate_testkit::FREE_BLOCK_FILE;
 use std::path::{Path, PathBuf};
