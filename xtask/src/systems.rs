@@ -22,7 +22,8 @@ pub fn check_all(only: Option<&str>) -> Result<(), String> {
     for (name, target) in NAMES.iter().zip(TARGETS).filter(|(name, _)| only.is_none_or(|only| only == **name))
     {
         let mut cargo = check(target, root().join("target/systems"));
-        cargo.args(["--package", "palpate-cli", "--package", "palpate-attack"]);
+        cargo
+            .args(["palpate-cli", "palpate-attack", "palpate-c"].iter().flat_map(|name| ["--package", name]));
         if *name == "windows" && !runs(compiler, &["--version"]) {
             install(&[package]);
         }
