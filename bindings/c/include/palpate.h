@@ -12,7 +12,7 @@
 
 // Kind of a failure.
 typedef enum {
-  // It succeeded.
+  // Success.
   PALPATE_STATUS_OK = 0,
   // A null pointer, a number that counts beyond the scene's parts, or text that is not UTF-8.
   PALPATE_STATUS_INVALID_ARGUMENT = 1,
@@ -62,15 +62,15 @@ typedef enum {
 
 // Mode of a device.
 typedef enum {
-  // It takes no part.
+  // No part in the step.
   PALPATE_DEVICE_MODE_INACTIVE = 0,
-  // It holds a point in all directions.
+  // Hold of a point in all directions.
   PALPATE_DEVICE_MODE_HELD = 1,
-  // Its tip touches surfaces.
+  // Tip that touches surfaces.
   PALPATE_DEVICE_MODE_TOUCH = 2,
-  // It exerts a prescribed force on a point.
+  // Prescribed force on a point.
   PALPATE_DEVICE_MODE_FORCE = 3,
-  // It is silent for now, and a tip that comes back inside the object which it touched begins on the surface where it was.
+  // Silence for now: a tip that comes back inside the object which it touched begins on the surface where it was.
   PALPATE_DEVICE_MODE_SUSPENDED = 4,
 } PalpateDeviceMode;
 

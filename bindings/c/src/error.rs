@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// It succeeded.
+    /// Success.
     Ok = 0,
     /// A null pointer, a number that counts beyond the scene's parts, or text that is not UTF-8.
     InvalidArgument = 1,

@@ -4,7 +4,7 @@ use crate::error::{Error, Failure, Status, checked, put};
 use crate::scene::no_part;
 use crate::state::{State, no_state};
 use crate::types::{DeviceInput, Pose, Vector};
-use palpate::DeviceMode;
+use palpate::{AppliedForce, DeviceMode};
 use std::ptr;
 
 /// Runs a change of a state's input.
@@ -38,14 +38,14 @@ pub unsafe extern "C" fn palpate_state_set_position(
     // SAFETY: as promised by the caller.
     unsafe {
         change(state, ptr::null_mut(), |state| {
-            let input = state.begin(device)?;
+            let mut input = state.device_input(device)?;
             if matches!(input.mode, DeviceMode::Force(_)) {
                 return Err(Failure::argument(
                     "the device has a force, not a position: palpate_state_set_force",
                 ));
             }
             input.position = position.into();
-            Ok(())
+            state.set_device_input(device, input)
         })
     }
 }
@@ -58,12 +58,15 @@ pub unsafe extern "C" fn palpate_state_set_position(
 pub unsafe extern "C" fn palpate_state_set_force(state: *mut State, device: usize, force: Vector) -> Status {
     // SAFETY: as promised by the caller.
     unsafe {
-        change(state, ptr::null_mut(), |state| match &mut state.begin(device)?.mode {
-            DeviceMode::Force(applied) => {
-                applied.force = force.into();
-                Ok(())
-            }
-            _ => Err(Failure::argument("the device has a position, not a force: palpate_state_set_position")),
+        change(state, ptr::null_mut(), |state| {
+            let input = state.device_input(device)?;
+            let DeviceMode::Force(applied) = input.mode else {
+                return Err(Failure::argument(
+                    "the device has a position, not a force: palpate_state_set_position",
+                ));
+            };
+            let mode = DeviceMode::Force(AppliedForce { force: force.into(), ..applied });
+            state.set_device_input(device, palpate::DeviceInput { mode, ..input })
         })
     }
 }
@@ -85,15 +88,12 @@ pub unsafe extern "C" fn palpate_state_set_device(
         change(state, error, |state| {
             let input = input.ok_or_else(|| Failure::argument("input is null"))?;
             let input = input.checked()?;
-            let own = state.input.devices.get_mut(device).ok_or_else(|| no_part("device", device))?;
             match input.mode {
                 DeviceMode::Held(grasp) => state.scene.model().check_grasp(&grasp)?,
                 DeviceMode::Force(applied) => state.scene.model().check_grasp(&applied.grasp)?,
                 DeviceMode::Inactive | DeviceMode::Touch | DeviceMode::Suspended => {}
             }
-            *own = input;
-            state.waiting[device] = None;
-            Ok(())
+            state.set_device_input(device, input)
         })
     }
 }
@@ -112,23 +112,11 @@ pub unsafe extern "C" fn palpate_state_device_input(
     let read = || {
         // SAFETY: as promised by the caller.
         let state = unsafe { state.as_ref() }.ok_or_else(no_state)?;
-        let own = state.input.devices.get(device).ok_or_else(|| no_part("device", device))?;
         // SAFETY: as promised by the caller.
-        unsafe { put(input, state.waiting[device].unwrap_or(*own).into()) }
+        unsafe { put(input, state.device_input(device)?.into()) }
     };
     // SAFETY: no error is written.
     unsafe { checked(ptr::null_mut(), read) }
-}
-
-impl State {
-    /// Input of a device, which takes part from now on.
-    fn begin(&mut self, device: usize) -> Result<&mut palpate::DeviceInput, Failure> {
-        let input = self.input.devices.get_mut(device).ok_or_else(|| no_part("device", device))?;
-        if let Some(first) = self.waiting[device].take() {
-            *input = first;
-        }
-        Ok(input)
-    }
 }
 
 /// Set the pose of a plane or obstacle at the end of the next step.

@@ -16,7 +16,7 @@ pub struct State {
     /// Input of the next step.
     pub(crate) input: Input,
     /// Input in the scene's mode, for devices that take no part before their first position.
-    pub(crate) waiting: Vec<Option<DeviceInput>>,
+    waiting: Vec<Option<DeviceInput>>,
     pub(crate) buffers: Buffers,
     /// Whether a step has failed, by a bug: what is left of the state is of no use.
     has_failed: bool,
@@ -52,16 +52,33 @@ impl State {
     }
 
     fn copy(&self) -> Self {
+        let mut buffers = Buffers::of(self.state.output());
+        if self.has_failed {
+            buffers.release();
+        }
         Self {
             scene: self.scene.clone(),
             state: self.state.clone(),
             input: self.input.clone(),
             waiting: self.waiting.clone(),
-            buffers: Buffers::of(self.state.output()),
+            buffers,
             has_failed: self.has_failed,
             displacements: Vec::new(),
             residual_fields: self.residual_fields.clone(),
         }
+    }
+
+    /// Input of a device in the next step; of one that waits for its first, that in which it begins.
+    pub(crate) fn device_input(&self, device: usize) -> Result<DeviceInput, Failure> {
+        let own = self.input.devices.get(device).ok_or_else(|| no_part("device", device))?;
+        Ok(self.waiting[device].unwrap_or(*own))
+    }
+
+    /// Sets the input of a device, which takes part from now on.
+    pub(crate) fn set_device_input(&mut self, device: usize, input: DeviceInput) -> Result<(), Failure> {
+        *self.input.devices.get_mut(device).ok_or_else(|| no_part("device", device))? = input;
+        self.waiting[device] = None;
+        Ok(())
     }
 
     /// Computes the displacements of an object's nodes [m, body].
@@ -80,7 +97,7 @@ impl State {
         self.scene.model().check_grasp(grasp)?;
         let pose = self.state.output().objects[grasp.object].pose;
         let displacement = self.state.point_displacement(self.scene.model(), grasp.object, &grasp.point);
-        Ok(pose.position + pose.orientation * (surface.rest_position(&grasp.point) + displacement))
+        Ok(pose.world_from_body(surface.rest_position(&grasp.point) + displacement))
     }
 }
 
@@ -189,7 +206,7 @@ pub unsafe extern "C" fn palpate_state_surface(
         let pose = state.state.output().objects[object].pose;
         let rest = &state.scene.surface(object)?.positions;
         for (node, (rest, displacement)) in rest.iter().zip(&state.displacements).enumerate() {
-            let position = pose.position + pose.orientation * (*rest + *displacement);
+            let position = pose.world_from_body(*rest + *displacement);
             // SAFETY: three of so many numbers, as promised by the caller.
             unsafe { positions.add(3 * node).cast::<[f64; 3]>().write(position.to_array()) };
         }
@@ -219,8 +236,8 @@ pub unsafe extern "C" fn palpate_state_nearest_point(
             return Err(Failure::argument("the position is not finite"));
         }
         let pose = state.state.output().objects[object].pose;
-        let in_body = pose.orientation.inverse() * (position - pose.position);
-        let (nearest, _) = surface.nearest(in_body).ok_or_else(|| no_part("surface of object", object))?;
+        let nearest = surface.nearest(pose.body_from_world(position));
+        let (nearest, _) = nearest.ok_or_else(|| no_part("surface of object", object))?;
         // SAFETY: as promised by the caller.
         unsafe { put(point, Grasp { object, point: nearest }.into()) }
     };

@@ -70,15 +70,15 @@ pub enum Part {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeviceMode {
-    /// It takes no part.
+    /// No part in the step.
     Inactive = 0,
-    /// It holds a point in all directions.
+    /// Hold of a point in all directions.
     Held = 1,
-    /// Its tip touches surfaces.
+    /// Tip that touches surfaces.
     Touch = 2,
-    /// It exerts a prescribed force on a point.
+    /// Prescribed force on a point.
     Force = 3,
-    /// It is silent for now, and a tip that comes back inside the object which it touched begins on the surface where it was.
+    /// Silence for now: a tip that comes back inside the object which it touched begins on the surface where it was.
     Suspended = 4,
 }
 

@@ -45,6 +45,11 @@ int main(int argc, char **argv) {
   show("input", palpate_state_device_input(state, 0, &input));
   printf("begins in mode %u\n", (unsigned)input.mode);
   show("force", palpate_state_set_force(state, 0, above));
+  /* A refused call does not let a device begin, which would touch at the origin, inside the cube. */
+  palpate_state_step(state);
+  size_t contacts = 0;
+  const PalpateContactOutput *contact = palpate_state_contacts(state, &contacts);
+  for (size_t i = 0; i < contacts; i++) printf("%s", contact[i].against == PALPATE_COLLIDER_DEVICE ? "the finger touches\n" : "");
   show("device 5", palpate_state_set_position(state, 5, above));
   input.mode = 77;
   show("mode 77", palpate_state_set_device(state, 0, &input, &error));
