@@ -31,12 +31,17 @@ pub fn run_in(folder: &Path, command: &mut Command) -> Result<(), String> {
 
 /// Run cargo.
 pub fn cargo(arguments: &[&str]) -> Result<(), String> {
-    run(Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())).args(arguments))
+    run(cargo_command().args(arguments))
+}
+
+/// The cargo that runs this chore.
+pub fn cargo_command() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
 /// `cargo check` for a target, with its outputs in a folder. Nothing of it runs but macros and build scripts, so nothing is optimised.
 pub fn check(target: &str, folder: PathBuf) -> Command {
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut cargo = cargo_command();
     cargo.args([
         "check",
         "--locked",

@@ -1,9 +1,8 @@
 //! Tests of threads and of calls of C under the sanitizers of LLVM.
 
 use crate::machine::runs;
-use crate::process::{root, run};
+use crate::process::{cargo_command, root, run};
 use crate::standard_library::{HINT, build_std};
-use std::process::Command;
 
 /// Sanitizers: unsynchronised access of threads; access beyond what was allocated.
 pub const SANITIZERS: &[&str] = &["thread", "address"];
@@ -21,7 +20,7 @@ pub fn run_tests(only: Option<&str>) -> Result<(), String> {
         return Ok(());
     }
     for sanitizer in SANITIZERS.iter().filter(|name| only.is_none_or(|only| only == **name)) {
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        let mut cargo = cargo_command();
         cargo.args([
             "test",
             "--locked",
