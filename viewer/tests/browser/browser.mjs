@@ -74,7 +74,7 @@ export async function screenshot(page, name) {
 
 /** Waits until the scene is loaded and a frame of it is shown. */
 export async function waitForScene(page) {
-  await page.waitForFunction(() => (window.palpate?.sceneView.graphs[0]?.frame ?? null) !== null, null, { timeout: 60_000 });
+  await latestFrame(page);
 }
 
 /** Summary of the newest frame; waits for the first one of a scene that the page is loading (again). */
