@@ -6,13 +6,14 @@ import { segmentedControl, element, icon, iconButton } from "./elements";
 
 export const SLOWDOWNS = [1, 2, 5, 10, 20, 50, 100] as const;
 
+/** Shows the server's state: a click sends a request, and the status that answers it changes what is shown. Otherwise a status sent before the request came in would undo the click for a moment. */
 export class LiveToolbar {
   readonly parts: HTMLElement[];
   private readonly modes;
   private readonly pause: HTMLButtonElement;
   private readonly step: HTMLButtonElement;
   private readonly speed = element("select", { title: "Speed of simulated time: slower with [, faster with ]", attributes: { "aria-label": "Speed of simulated time" } });
-  paused = false;
+  private paused = false;
   private slowdown = 1;
   mode: TouchMode;
 
@@ -62,7 +63,6 @@ export class LiveToolbar {
 
   togglePause(): void {
     this.send({ type: "pause", paused: !this.paused });
-    this.showPaused(!this.paused);
   }
 
   singleStep(): void {
@@ -75,8 +75,6 @@ export class LiveToolbar {
   }
 
   setSlowdown(slowdown: number): void {
-    this.slowdown = slowdown;
-    this.speed.value = String(slowdown);
     this.send({ type: "slow_motion", slowdown });
   }
 
@@ -89,9 +87,10 @@ export class LiveToolbar {
   update(status: Status): void {
     this.showPaused(status.paused);
     this.slowdown = status.slowdown;
-    if (document.activeElement === this.speed) return;
     const known = SLOWDOWNS.find((s) => s === status.slowdown);
-    this.speed.value = known === undefined ? "" : String(known);
+    const value = known === undefined ? "" : String(known);
+    // An assignment may close the list while somebody chooses.
+    if (this.speed.value !== value) this.speed.value = value;
   }
 
   private showPaused(paused: boolean): void {
