@@ -154,6 +154,7 @@ function start(): void {
       v: () => sceneView.resetView(),
       c: () => display.nextColour(),
       a: () => display.toggle("arrows"),
+      p: () => display.toggle("contactPoints"),
       w: () => display.toggle("wireframe"),
       t: () => display.toggle("dark"),
     };

@@ -11,12 +11,13 @@ export function prefersDark(): boolean {
 
 /** Stored display settings, completed with defaults; `themeChosen`: whether the user chose the theme. */
 export function loadPreferences(): DisplaySettings & { themeChosen: boolean } {
-  const defaults = { colour: "displacement" as const, arrows: true, wireframe: true, dark: prefersDark(), themeChosen: false };
+  const defaults = { colour: "plain" as const, arrows: true, contactPoints: false, wireframe: false, dark: prefersDark(), themeChosen: false };
   try {
     const stored = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "{}") as Partial<Record<string, unknown>>;
     return {
       colour: typeof stored.colour === "string" && isColourMode(stored.colour) ? stored.colour : defaults.colour,
       arrows: typeof stored.arrows === "boolean" ? stored.arrows : defaults.arrows,
+      contactPoints: typeof stored.contactPoints === "boolean" ? stored.contactPoints : defaults.contactPoints,
       wireframe: typeof stored.wireframe === "boolean" ? stored.wireframe : defaults.wireframe,
       dark: typeof stored.dark === "boolean" ? stored.dark : defaults.dark,
       themeChosen: typeof stored.dark === "boolean",
@@ -27,9 +28,9 @@ export function loadPreferences(): DisplaySettings & { themeChosen: boolean } {
 }
 
 export function savePreferences(settings: DisplaySettings, themeChosen: boolean): void {
-  const { colour, arrows, wireframe, dark } = settings;
+  const { dark, ...always } = settings;
   try {
-    localStorage.setItem(STORAGE_KEY, JSON.stringify(themeChosen ? { colour, arrows, wireframe, dark } : { colour, arrows, wireframe }));
+    localStorage.setItem(STORAGE_KEY, JSON.stringify(themeChosen ? settings : always));
   } catch {
     // Without storage the defaults apply next time.
   }

@@ -164,7 +164,7 @@ export class LiveMode implements PageMode {
         this.plots.reset(scene);
         this.frame = null;
         this.showLoading(null);
-        this.hint.show(scene.objects[0]?.name ?? "object", scene.devices.some((device) => device.pointer));
+        this.hint.show(scene.objects[0]?.name ?? "object", Math.round(1 / scene.step_s), scene.devices.some((device) => device.pointer));
       })
       .catch((error: unknown) => {
         if (loadAbort.signal.aborted) return;

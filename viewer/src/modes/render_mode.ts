@@ -49,7 +49,7 @@ export class RenderMode implements PageMode {
   private async draw(request: RenderRequest, scene: SceneMessage): Promise<void> {
     const { sceneView } = this;
     const { width, height, camera } = request;
-    sceneView.settings = { colour: isColourMode(request.colour) ? request.colour : "displacement", arrows: true, wireframe: sceneView.settings.wireframe, dark: request.dark };
+    sceneView.settings = { colour: isColourMode(request.colour) ? request.colour : "displacement", arrows: true, contactPoints: false, wireframe: false, dark: request.dark };
     sceneView.showsTime = true;
     document.body.append(sceneView.canvas, sceneView.overlay);
     const loaded = await loadScene(scene, sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);

@@ -1,4 +1,4 @@
-// Force arrows at the points of application: a thick arrow for the resultant of each pair, thin ones per contact.
+// Force vectors at the points of application: a thick arrow for the resultant of each pair; where contact points are shown, thin ones for each.
 
 import { Color, Vector3 } from "three";
 import { formatForce } from "../format";
@@ -69,15 +69,15 @@ const MIN_FRACTION = 0.004;
 /** Number of contacts with an arrow of their own, strongest first. */
 const MAX_CONTACT_ARROWS = 64;
 
-/** Arrows, dots and labels of a frame; an arrow of `range` [N] has the length `longest` [m]. */
-export function drawForces(frame: Frame, shown: readonly boolean[], range: number, longest: number, palette: Palette): ForceDrawing {
+/** Arrows, dots and labels of a frame, with its single contacts where `contactPoints`; an arrow of `range` [N] has the length `longest` [m]. */
+export function drawForces(frame: Frame, shown: readonly boolean[], contactPoints: boolean, range: number, longest: number, palette: Palette): ForceDrawing {
   const drawn: ForceDrawing = { arrows: [], dots: [], labels: [] };
   const onObject = new Color(palette.onObject);
   const onDevice = new Color(palette.onDevice);
   const shaftRadius = 0.024 * longest;
   const tip = (from: Vector3, force: Vector3) => from.clone().addScaledVector(force, longest / range);
   const all = resultants(frame);
-  for (const contact of frame.contacts) {
+  for (const contact of contactPoints ? frame.contacts : []) {
     drawn.dots.push({ at: new Vector3(...contact.point), colour: onObject, radius: 0.9 * shaftRadius });
   }
   for (const sum of all) {
@@ -87,7 +87,7 @@ export function drawForces(frame: Frame, shown: readonly boolean[], range: numbe
     // The device arrow shows this number.
     if (sum.collider !== "device") drawn.labels.push({ at: to, text: formatForce(sum.force.length()), colour: palette.onObject });
   }
-  if (frame.contacts.length > all.length) {
+  if (contactPoints && frame.contacts.length > all.length) {
     const strongest = frame.contacts
       .map(({ point, force }) => ({ from: new Vector3(...point), force: new Vector3(...force) }))
       .filter(({ force }) => force.length() >= 4 * MIN_FRACTION * range)

@@ -38,6 +38,7 @@ uniform sampler2D shadow;
 uniform mat4 shadowFromWorld;
 uniform float darkness;
 uniform float backFace;       // 1: back face
+uniform float tone;           // brightness: slopes are darker than level ground
 in vec3 worldPosition;
 in vec2 onPlane;
 out vec4 pixel;
@@ -52,8 +53,10 @@ void main() {
   float falloff = length(onPlane - middle) / reach;
   float fade = 1.0 - smoothstep(0.35, 1.0, falloff);
   if (fade < 0.004) discard;
-  float line = max(0.40 * lines(cell, 0.5), 0.85 * lines(5.0 * cell, 0.7));
-  vec3 colour = mix(ground, grid, line);
+  // Fine lines near the scene, to judge sizes by; coarse ones faint, to see the plane.
+  float near = 1.0 - smoothstep(0.08, 0.28, falloff);
+  float line = max(0.28 * near * lines(cell, 0.5), mix(0.28, 0.6, near) * lines(5.0 * cell, 0.6));
+  vec3 colour = tone * mix(ground, grid, line);
   vec4 s = shadowFromWorld * vec4(worldPosition, 1.0);
   vec2 inside = step(abs(s.xy), vec2(0.995));
   float dark = darkness * inside.x * inside.y * texture(shadow, 0.5 + 0.5 * s.xy).r;
@@ -73,6 +76,7 @@ export class GroundPlane {
   constructor(
     private readonly center: Vector3,
     private readonly radius: number,
+    private readonly up: Vector3,
     shaded: boolean,
   ) {
     this.shadow = shaded ? new ShadowMap() : null;
@@ -88,6 +92,7 @@ export class GroundPlane {
       shadow: { value: this.shadow?.result.texture ?? null },
       shadowFromWorld: { value: this.shadow?.fromWorld ?? new Matrix4().makeScale(0, 0, 0) },
       darkness: { value: 0 },
+      tone: { value: 1 },
     };
     for (const [side, backFace] of [
       [FrontSide, 0],
@@ -117,6 +122,7 @@ export class GroundPlane {
     this.group.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
     this.group.position.set(pose[0], pose[1], pose[2]);
     this.normal.set(0, 1, 0).applyQuaternion(this.group.quaternion);
+    this.uniforms.tone.value = 0.86 + 0.14 * Math.max(0, this.normal.dot(this.up));
     this.across.set(0, 0, 1).applyQuaternion(this.group.quaternion);
     const centerInPlane = this.center.clone().sub(this.group.position).applyQuaternion(this.group.quaternion.clone().invert());
     // Whole cells keep the grid lines fixed.

@@ -29,6 +29,7 @@ export interface LoadedScene {
 export interface DisplaySettings {
   colour: ColourMode;
   arrows: boolean;
+  contactPoints: boolean;
   wireframe: boolean;
   dark: boolean;
 }
@@ -61,7 +62,7 @@ export class SceneGraph {
     let shadows = 0;
     scene.obstacles.forEach((info, i) => {
       if ("plane" in info.shape) {
-        const ground = new GroundPlane(this.center, this.radius, shadows++ < MAX_SHADOWS);
+        const ground = new GroundPlane(this.center, this.radius, up, shadows++ < MAX_SHADOWS);
         ground.setPose(info.pose);
         this.groundPlanes.set(i, ground);
         this.scene.add(ground.group);
@@ -136,7 +137,7 @@ export class SceneGraph {
     if (frame === null) return;
     const shown = this.markers.map((marker) => marker.visible);
     if (settings.arrows) {
-      const drawn = drawForces(frame, shown, this.forceRange.value, this.maxArrowLength, palette);
+      const drawn = drawForces(frame, shown, settings.contactPoints, this.forceRange.value, this.maxArrowLength, palette);
       this.arrows.show(drawn.arrows, drawn.dots);
       this.labels = drawn.labels;
     }

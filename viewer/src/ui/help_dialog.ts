@@ -32,7 +32,8 @@ const LOG_KEYS: readonly [string, string][] = [
 const VIEW_KEYS: readonly [string, string][] = [
   ["V", "Reset the view"],
   ["C", "Next colour mode"],
-  ["A", "Force arrows"],
+  ["A", "Force vectors"],
+  ["P", "Contact points"],
   ["W", "Wireframe"],
   ["T", "Light or dark theme"],
   ["?", "This help"],

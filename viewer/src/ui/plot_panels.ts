@@ -68,7 +68,7 @@ export class PlotPanels {
 
   private showBalance(energies: Float32Array): void {
     const defect = sumEnergies(energies, ["defect"]);
-    this.balance.textContent = `Energy balance error: ${withUnit(Math.abs(defect), "J", 0, 2)}.`;
+    this.balance.textContent = `Energy error: ${withUnit(Math.abs(defect), "J", 0, 2)}.`;
     this.balance.title = "Input work minus stored and dissipated energy";
   }
 

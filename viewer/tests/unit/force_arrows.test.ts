@@ -51,13 +51,19 @@ test("contacts of a pair in both directions have one resultant, on the object wi
 });
 
 test("a pair has one label, and the strongest contacts have arrows of their own", () => {
-  const { labels, arrows } = drawForces(stack, [], 1, 0.1, LIGHT);
+  const { labels, arrows, dots } = drawForces(stack, [], true, 1, 0.1, LIGHT);
   expect(labels.map(({ text }) => text.replaceAll("\u202f", " "))).toEqual(["0.55 N", "2.00 N"]);
   expect(arrows.length).toBe(2 + 4);
+  expect(dots.length).toBe(4);
   const many = frame(Array.from({ length: 300 }, (_, i) => contact(0, "obstacle", 0, [i, 0, 0], [0, 1 + i, 0])));
-  const drawn = drawForces(many, [], 300, 0.1, LIGHT);
+  const drawn = drawForces(many, [], true, 300, 0.1, LIGHT);
   expect(drawn.arrows.length).toBe(1 + 64);
   // The resultant has all of them, the arrows of single contacts the last 64.
   expect(resultants(many)[0].force.y).toBe((300 * 301) / 2);
   expect(Math.min(...drawn.arrows.slice(1).map(({ from }) => from.x))).toBe(300 - 64);
+});
+
+test("without contact points a pair is one arrow", () => {
+  const { arrows, dots, labels } = drawForces(stack, [], false, 1, 0.1, LIGHT);
+  expect([arrows.length, dots.length, labels.length]).toEqual([2, 0, 2]);
 });

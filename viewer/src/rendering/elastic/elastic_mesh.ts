@@ -20,6 +20,7 @@ import type { ObjectFrame } from "../../protocol/frame";
 import type { SceneObject } from "../../protocol/messages";
 import type { ModeShapes, Surface } from "../../protocol/surface";
 import { rampNumbers, rgb, type ColourMode } from "../colours";
+import { lookOf, type Look } from "../looks";
 import { splitAtCreases, type SplitMesh } from "./split_mesh";
 import { gridFor, type TextureLimits, type TextureGrid } from "./texture_layout";
 import { dataTexture, GpuReconstruction, restTexture } from "./gpu_reconstruction";
@@ -57,6 +58,7 @@ export class ElasticMesh {
   private readonly vertexGrid: TextureGrid;
 
   private latest: ObjectFrame | null = null;
+  private readonly look: Look;
   private useGpu = false;
   private dirty = true;
   private cachedPositions: Float32Array | null = null;
@@ -74,6 +76,7 @@ export class ElasticMesh {
       throw new Error(`${info.name}: shapes of ${shapes.nodes} nodes for a surface of ${surface.nodes}`);
     }
     this.surface = surface;
+    this.look = lookOf(info.material ?? null);
     this.splitMesh = splitAtCreases(surface);
     this.nodeGrid = gridFor(surface.nodes, limits);
     this.vertexGrid = gridFor(this.splitMesh.vertices, limits);
@@ -100,6 +103,7 @@ export class ElasticMesh {
 
     this.uniforms = {
       positions: { value: this.rest },
+      restPositions: { value: this.rest },
       normals: { value: null },
       positionWidth: { value: this.nodeGrid.width },
       normalWidth: { value: this.vertexGrid.width },
@@ -108,16 +112,19 @@ export class ElasticMesh {
       ramp: { value: rampNumbers() },
       up: { value: up },
     };
-    const material = (fragmentShader: string, own: Record<string, { value: unknown }>, transparent = false) =>
+    const material = (fragmentShader: string, own: Record<string, { value: unknown }>, transparent = false, depthWrite = !transparent) =>
       new RawShaderMaterial({
         glslVersion: GLSL3,
         vertexShader: SURFACE_VERTEX,
         fragmentShader,
         uniforms: { plane: { value: new Vector4() }, shear: { value: new Vector3() }, ...this.uniforms, ...own },
         transparent,
-        depthWrite: !transparent,
+        depthWrite,
       });
-    this.surfaceMaterial = material(SURFACE_FRAGMENT, { colour: { value: rgb(colour) }, lift: { value: 0 }, glow: { value: 0 } });
+    const { translucency, gloss, metal, grain } = this.look;
+    const look = { translucency: { value: translucency }, gloss: { value: gloss }, metal: { value: metal }, grain: { value: grain } };
+    const own = { colour: { value: rgb(colour) }, size: { value: info.radius }, lift: { value: 0 }, glow: { value: 0 }, ...look };
+    this.surfaceMaterial = material(SURFACE_FRAGMENT, own, translucency > 0, true);
     this.wireMaterial = material(WIRE_FRAGMENT, { colour: { value: [0, 0, 0] }, opacity: { value: 0.11 }, lift: { value: 8e-4 } }, true);
     this.shadowMaterial = material(SHADOW_FRAGMENT, { plane: { value: new Vector4() }, shear: { value: new Vector3() }, reach: { value: 1 }, lift: { value: 0 } });
     this.solid = new Mesh(this.geometry, this.surfaceMaterial);
@@ -255,11 +262,12 @@ export class ElasticMesh {
     return largest;
   }
 
+  /** Sets the colours; `plain` is that of materials without their own. */
   setColours(mode: ColourMode, range: number, plain: string, wire: string): void {
     const u = this.surfaceMaterial.uniforms;
     u.colourMode.value = range > 0 ? COLOUR_MODE_INDEX[mode] : 0;
     u.range.value = range;
-    u.colour.value = rgb(plain);
+    u.colour.value = rgb(this.look.colour ?? plain);
     this.wireMaterial.uniforms.colour.value = rgb(wire);
   }
 

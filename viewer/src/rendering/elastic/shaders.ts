@@ -95,14 +95,17 @@ uniform float lift;           // offset towards the camera, as a fraction of the
 in vec2 element;              // node, vertex
 in vec3 restNormal;
 out vec3 worldPosition;
+out vec3 bodyPosition;
 out vec3 shadingNormal;
 out float value;
+uniform sampler2D restPositions;
 void main() {
   int node = int(element.x), vertex = int(element.y);
   vec4 position = texelFetch(positions, ivec2(node % positionWidth, node / positionWidth), 0);
   vec4 normal = texelFetch(normals, ivec2(vertex % normalWidth, vertex / normalWidth), 0);
   vec4 world = modelMatrix * vec4(position.xyz, 1.0);
   worldPosition = world.xyz;
+  bodyPosition = texelFetch(restPositions, ivec2(node % positionWidth, node / positionWidth), 0).xyz;
   // Exaggerates small changes of slope in the shading, so that an indentation of 1 % of the object is visible.
   vec3 slope = normal.xyz - restNormal;
   shadingNormal = mat3(modelMatrix) * (normal.xyz + 2.4 * exp(-14.0 * dot(slope, slope)) * slope);
@@ -133,6 +136,8 @@ vec3 lit(vec3 albedo, vec3 normal, vec3 toEye, vec3 right, vec3 up, float gloss)
   return albedo * shade + gloss * (0.085 * strip + 0.30 * spot) + 0.16 * rim * sky * vec3(0.9, 0.95, 1.0);
 }`;
 
+// Elastic surface. Translucent materials: light wraps around edges and shines through from behind, deep parts are more saturated than
+// those at grazing view, and what lies behind shows faintly.
 export const SURFACE_FRAGMENT = /* glsl */ `
 precision highp float;
 precision highp int;
@@ -143,11 +148,26 @@ uniform vec3 colour;
 uniform vec3 ramp[7];
 uniform int colourMode;
 uniform float glow;
+uniform float size;           // object radius
+uniform float translucency;
+uniform float gloss;
+uniform float metal;
+uniform float grain;
 in vec3 worldPosition;
+in vec3 bodyPosition;
 in vec3 shadingNormal;
 in float value;
 out vec4 pixel;
 ${LIGHTING}
+// Growth rings around an axis beside the object, and fibres along it.
+vec3 wood(vec3 base) {
+  vec3 p = bodyPosition / size;
+  vec2 across = p.zy + vec2(0.9, 1.7) + 0.03 * vec2(sin(5.0 * p.x), cos(4.0 * p.x + 2.0 * p.y));
+  float ring = fract(7.0 * length(across));
+  float fibre = 0.5 + 0.5 * sin(90.0 * p.y + 70.0 * p.z + 3.0 * sin(6.0 * p.x));
+  float dark = smoothstep(0.55, 0.95, ring) * (1.0 - smoothstep(0.95, 1.0, ring));
+  return base * (1.0 - grain * (0.42 * dark + 0.07 * fibre));
+}
 void main() {
   vec3 base = linear(colour);
   if (colourMode != 0) {
@@ -158,7 +178,35 @@ void main() {
   vec3 toEye = cameraPosition - worldPosition;
   vec3 right = vec3(viewMatrix[0][0], viewMatrix[1][0], viewMatrix[2][0]);
   vec3 level = normalize(right - up * dot(right, up));
-  pixel = vec4(screen(lit(base, shadingNormal, toEye, level, up, 1.0) + glow * base), 1.0);
+  if (colourMode != 0) {
+    pixel = vec4(screen(lit(base, shadingNormal, toEye, level, up, 1.0) + glow * base), 1.0);
+    return;
+  }
+  vec3 n = normalize(shadingNormal);
+  vec3 e = normalize(toEye);
+  vec3 back = normalize(cross(level, up));
+  vec3 key = normalize(-0.55 * level + 0.75 * up + 0.55 * back);
+  float facing = max(0.0, dot(n, e));
+  if (grain > 0.0) base = wood(base);
+  // Corners are thin: light passes.
+  float thin = smoothstep(0.5, 1.0, length(bodyPosition) / size);
+  vec3 deep = pow(base, vec3(1.0 + translucency * facing * mix(0.9, 0.1, thin)));
+  vec3 shaded = lit(deep, n, toEye, level, up, gloss);
+  // Scattered light: reaches beyond the terminator, and comes up from the ground.
+  float wrapped = max(0.0, (dot(n, key) + 0.7) / 1.7);
+  float through = pow(max(0.0, dot(-e, normalize(key + 0.5 * n))), 2.0);
+  float fromBelow = 0.5 - 0.5 * dot(n, up);
+  vec3 scattered = mix(deep, base, 0.5) * (0.34 + 0.55 * wrapped + 0.5 * through + 0.16 * fromBelow);
+  float grazing = pow(1.0 - facing, 3.0);
+  vec3 surface = mix(shaded, 0.42 * shaded + 0.62 * scattered + (0.22 * grazing + 0.07 * thin) * sqrt(base), translucency);
+  // Metal: its colour is that of what it mirrors, ground below and sky above.
+  vec3 r = reflect(-e, n);
+  float sky = smoothstep(-0.25, 0.35, dot(r, up));
+  float band = smoothstep(0.5, 0.62, dot(r, normalize(up + 0.3 * back))) * (1.0 - smoothstep(0.8, 0.92, dot(r, normalize(up + 0.3 * back))));
+  vec3 mirrored = base * (mix(0.22, 0.72, sky) + 0.5 * band + 0.9 * pow(max(0.0, dot(r, key)), 60.0));
+  surface = mix(surface, mirrored, metal);
+  float opacity = 1.0 - mix(0.1, 0.2, thin) * translucency * (1.0 - grazing);
+  pixel = vec4(screen(surface + glow * base), opacity);
 }`;
 
 export const WIRE_FRAGMENT = /* glsl */ `
