@@ -162,6 +162,11 @@ function start(): void {
     else if (mode?.handleKey(event) !== true) return;
     event.preventDefault();
   });
+  // A button that was clicked with a pointer keeps no focus: Space would press it again instead of pausing.
+  document.addEventListener("click", (event) => {
+    const button = (event.target as HTMLElement).closest("button");
+    if (event.detail > 0 && button !== null && button === document.activeElement) button.blur();
+  });
   // For tests and the browser's console.
   Object.assign(window, { palpate: { sceneView, connection, notifications } });
   connection.start();

@@ -21,7 +21,7 @@ export class LiveToolbar {
     private readonly send: (message: ClientMessage) => void,
     mode: TouchMode,
     private readonly onModeChange: (mode: TouchMode) => void,
-    resetView: () => void,
+    private readonly resetView: () => void,
   ) {
     this.mode = mode;
     this.modes = segmentedControl<TouchMode>(
@@ -72,6 +72,7 @@ export class LiveToolbar {
 
   reset(): void {
     this.send({ type: "reset" });
+    this.resetView();
   }
 
   setSlowdown(slowdown: number): void {

@@ -100,6 +100,13 @@ export const liveCases = [
       await page.keyboard.press("]");
       await page.waitForFunction(() => document.querySelector(".toolbar select").value === "1");
 
+      // Space pauses, also after a click on another button; a press of the mouse leaves the focus on none.
+      await page.click('[aria-label="Reset view (V)"]');
+      await page.keyboard.press("Space");
+      await page.waitForSelector('[aria-label="Resume (Space)"]');
+      await page.keyboard.press("Space");
+      await page.waitForSelector('[aria-label="Pause (Space)"]');
+
       const { generation } = await latestFrame(page);
       await page.keyboard.press("r");
       await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation);
