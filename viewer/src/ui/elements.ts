@@ -143,7 +143,7 @@ export function segmentedControl<T extends string>(
         "label",
         { title: option.title },
         input,
-        element("span", {}, option.icon === undefined ? null : icon(option.icon), option.text),
+        element("span", {}, ...(option.icon === undefined ? [option.text] : [icon(option.icon), element("span", { class: "choice", text: option.text })])),
       ),
     );
   }

@@ -19,7 +19,7 @@ async function waitForStop(page) {
 
 export const liveCases = [
   {
-    name: "loads and shows the hint without overlaps, at three window sizes, light and dark",
+    name: "loads and shows the hint without overlaps, at four window sizes, light and dark",
     async run(browser) {
       const server = browser.keep(await start());
       for (const [name, options] of [
@@ -27,6 +27,7 @@ export const liveCases = [
         ["desk-dark", { width: 1280, height: 720, dark: true }],
         ["phone", { width: 390, height: 844, touch: true, scale: 2 }],
         ["phone-dark", { width: 390, height: 844, touch: true, scale: 2, dark: true }],
+        ["narrow", { width: 320, height: 568, touch: true, scale: 2 }],
         ["large", { width: 2560, height: 1440 }],
         ["large-dark", { width: 2560, height: 1440, dark: true }],
       ]) {
@@ -37,6 +38,8 @@ export const liveCases = [
         assert(overlapping.length === 0, `${name}: ${overlapping.join("; ")}`);
         const scrolls = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
         assert(!scrolls, `${name}: the page is wider than its window`);
+        const rows = await page.evaluate(() => new Set([...document.querySelectorAll(".toolbar > .button")].filter((button) => button.offsetParent !== null).map((button) => button.offsetTop)).size);
+        assert(rows <= 1, `${name}: the toolbar has ${rows} rows`);
         await page.waitForTimeout(600);
         await screenshot(page, `live-${name}`);
         assertNoConsoleErrors(page);
