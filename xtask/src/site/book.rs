@@ -4,7 +4,7 @@ use super::links::{is_outside, resolve};
 use super::markdown::{links, outside_code, prose};
 use crate::words::citations::label;
 use regex::Regex;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -135,25 +135,53 @@ fn rewrite(
     Ok(text)
 }
 
-/// The theory with an anchor before each block of equations, for each of them.
+/// Cell of the theory's table with the files that compute an equation, for each equation.
+fn code_of(text: &str) -> BTreeMap<String, &str> {
+    let mut found = BTreeMap::new();
+    for line in text.lines().filter(|line| line.starts_with("| (C")) {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        let [_, equations, _, files, ..] = cells.as_slice() else { continue };
+        let numbers: Vec<(usize, u32)> = equations
+            .match_indices("(C")
+            .filter_map(|(at, _)| Some((at, equations[at + 2..].split(')').next()?.parse().ok()?)))
+            .collect();
+        for (index, &(at, number)) in numbers.iter().enumerate() {
+            // `(C9) – (C12)` is a range.
+            let is_range = equations[..at].trim_end().ends_with('–') && index > 0;
+            let first = if is_range { numbers[index - 1].1 + 1 } else { number };
+            found.extend((first..=number).map(|number| (format!("C{number}"), *files)));
+        }
+    }
+    found
+}
+
+/// The theory with an anchor before each block of equations, for each of them, and the files that compute them after it.
 fn with_anchors(text: &str) -> String {
-    let lines: Vec<&str> = text.lines().collect();
+    let code = code_of(text);
     let mut out = String::new();
-    let mut inside = false;
-    for (at, line) in lines.iter().enumerate() {
-        let is_code = line.starts_with("    ");
-        if is_code && !inside {
-            let block = lines[at..].iter().take_while(|line| line.starts_with("    "));
-            for number in block.filter_map(|line| label(line)) {
-                out += &format!("<div id=\"{number}\"></div>\n");
-            }
+    let mut block: Vec<&str> = Vec::new();
+    for line in text.lines().chain([""]) {
+        if line.starts_with("    ") {
+            block.push(line);
+            continue;
+        }
+        let numbers: Vec<&str> = block.iter().filter_map(|line| label(line)).collect();
+        for number in &numbers {
+            out += &format!("<div id=\"{number}\"></div>\n");
+        }
+        if !numbers.is_empty() {
             out.push('\n');
         }
-        inside = is_code;
-        out += line;
-        out.push('\n');
+        block.drain(..).for_each(|line| out += &format!("{line}\n"));
+        let mut files: Vec<&str> = numbers.iter().filter_map(|number| code.get(*number).copied()).collect();
+        files.dedup();
+        if !files.is_empty() {
+            out += &format!("\n<small>Code: {}</small>\n", files.join(", "));
+        }
+        out += &format!("{line}\n");
     }
-    out
+    out.truncate(out.trim_end().len());
+    out + "\n"
 }
 
 /// A page whose citations of equations, `(C7)`, lead to them.
@@ -205,14 +233,26 @@ mod tests {
 
     #[test]
     fn equations_have_anchors_and_citations_lead_to_them() {
-        let theory = "by\n\n    a = b        (C1)\n    c = d        (C2)\n\nand (C1), or [x (C2)](y).\n";
+        let theory = "by\n\n    a = b        (C1)\n    c = d        (C2)\n\nand (C1), or [x (C2)](y).\n\n| (C1) – (C2) (C9) | both | [`a.rs`](a) |\n";
         let known = BTreeSet::from(["C1".to_string(), "C2".to_string()]);
         let linked = link_equations(&with_anchors(theory), &known, true).expect("a page");
         let expected = "by\n\n<div id=\"C1\"></div>\n<div id=\"C2\"></div>\n\n    a = b        (C1)\n    c = d        (C2)\n\n\
-                        and ([C1](#C1)), or [x (C2)](y).\n";
+                        <small>Code: [`a.rs`](a)</small>\n\nand ([C1](#C1)), or [x (C2)](y).\n\n\
+                        | ([C1](#C1)) – ([C2](#C2)) (C9) | both | [`a.rs`](a) |\n";
         assert_eq!(linked, expected);
         let elsewhere = link_equations("([a](b), C2), C1, `(C1)` and (C9)", &known, false).expect("a page");
         assert_eq!(elsewhere, "([a](b), [C2](theory.md#C2)), C1, `(C1)` and (C9)");
+    }
+
+    #[test]
+    fn every_equation_leads_to_its_code() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a root");
+        let theory = fs::read_to_string(root.join(THEORY)).expect("the theory");
+        let code = code_of(&theory);
+        let equations: Vec<&str> = theory.lines().filter_map(label).collect();
+        assert!(equations.len() > 70, "{} equations", equations.len());
+        let missing: Vec<_> = equations.iter().filter(|number| !code.contains_key(**number)).collect();
+        assert!(missing.is_empty(), "{missing:?}");
     }
 
     #[test]
