@@ -110,7 +110,7 @@ fn every_block_is_run_by_a_test_or_says_why_not() {
         let names_page =
             |test: &&str| fs::read_to_string(root().join(test)).is_ok_and(|text| text.contains(&block.page));
         assert!(
-            tests.is_empty() || tests.iter().any(|test| names_page(&test)),
+            tests.is_empty() || tests.iter().any(names_page),
             "{}: none of {tests:?} names {}",
             block.place(),
             block.page

@@ -108,7 +108,7 @@ fn check_other(command: &[String], place: &str) {
             let chores = read("xtask/src/main.rs");
             assert!(chores.contains(&format!("name: \"{chore}\"")), "{place}: there is no chore {chore}");
             let known = |flag: &&str| !flag.starts_with("--") || chores.contains(&format!("\"{flag}\""));
-            assert!(flags.iter().all(|flag| known(flag)), "{place}: {flags:?}");
+            assert!(flags.iter().all(known), "{place}: {flags:?}");
         }
         ["cargo", "install", "--path", path] => exists(path),
         ["cargo", "add", "--path", path] => exists(path.trim_start_matches("../palpate/")),
