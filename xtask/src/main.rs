@@ -3,11 +3,14 @@
 //! Each does everything that a fresh machine with Rust needs, and says what is missing where it can't install it.
 
 mod bare;
+mod book;
 mod c_library;
 mod dependencies;
+mod files;
 mod fuzz;
 mod machine;
 mod process;
+mod release;
 mod sanitizers;
 mod standard_library;
 mod systems;
@@ -101,6 +104,18 @@ const CHORES: &[Chore] = &[
         summary: "build the C library with its header, pkg-config file and CMake package under target/palpate-c",
         flags: &[],
         run: |_| c_library::build(),
+    },
+    Chore {
+        name: "site",
+        summary: "build the documentation as a site into target/site (docs/SUMMARY.md), and check its links",
+        flags: &[("--links", &[], "check the links of all pages, and build nothing")],
+        run: |flags| if flags.has("--links") { book::check_links() } else { book::build() },
+    },
+    Chore {
+        name: "release",
+        summary: "build what one publishes into target/dist, with checksums and a bill of materials (docs/release.md)",
+        flags: &[],
+        run: |_| release::build(),
     },
     Chore {
         name: "systems",

@@ -4,6 +4,8 @@
 //! input is bad or a check failed; 2: the command line is wrong.
 
 mod commands;
+#[cfg(doctest)]
+mod documentation;
 mod failure;
 mod growing_log;
 mod interrupt;
@@ -50,6 +52,14 @@ enum Command {
     Reproduce(commands::reproduce::Arguments),
     Verify(commands::verify::Arguments),
     Bench(commands::bench::Arguments),
+}
+
+/// Checks a command line, and runs nothing.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check_command_line(arguments: impl IntoIterator<Item = OsString>) -> Result<(), String> {
+    Arguments::try_parse_from(arguments).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// Runs a command line, and prints its failure.

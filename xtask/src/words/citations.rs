@@ -37,7 +37,7 @@ fn is_number(text: &str) -> bool {
 }
 
 /// The number of the equation that a line of the theory states, at its end.
-fn label(line: &str) -> Option<&str> {
+pub(crate) fn label(line: &str) -> Option<&str> {
     let (formula, number) = line.strip_suffix(')')?.rsplit_once('(')?;
     (formula.starts_with("    ") && is_number(number)).then_some(number)
 }

@@ -2,7 +2,7 @@
 //!
 //! Identifiers are read as words: `most_places` and `MostPlaces` both are "most places".
 
-mod citations;
+pub(crate) mod citations;
 mod retired;
 
 use retired::Retired;
@@ -67,7 +67,8 @@ pub fn check(root: &Path) -> Result<Report, String> {
     Ok(report)
 }
 
-fn tracked_files(root: &Path) -> Result<Vec<String>, String> {
+/// Files that git tracks below a root.
+pub(crate) fn tracked_files(root: &Path) -> Result<Vec<String>, String> {
     let output = Command::new("git").arg("ls-files").current_dir(root).output();
     let output = output.map_err(|error| format!("git ls-files: {error}"))?;
     if !output.status.success() {

@@ -6,6 +6,7 @@ mod contacts;
 mod couplings;
 mod cut_logs;
 mod devices;
+mod documentation;
 mod experiments;
 mod exports;
 mod glb;

@@ -97,12 +97,27 @@ pub struct ObstacleDescription {
 /// Shape of an obstacle.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
-#[allow(missing_docs)]
 pub enum ShapeDescription {
+    /// Half-space below the y axis of its pose.
     Plane {},
-    Sphere { radius: f64 },
-    Box { half_extents: [f64; 3] },
-    Capsule { radius: f64, half_length: f64 },
+    /// Ball.
+    Sphere {
+        /// Radius [m].
+        radius: f64,
+    },
+    /// Box.
+    Box {
+        /// Half the side lengths [m].
+        half_extents: [f64; 3],
+    },
+    /// Capsule about the y axis.
+    Capsule {
+        /// Radius [m].
+        radius: f64,
+        /// Half the length of the axis between the centres of the caps [m].
+        half_length: f64,
+    },
+    /// Closed mesh, whose surface is fetched by itself.
     Mesh {},
 }
 
