@@ -1,12 +1,11 @@
 //! `palpate.Batch`: many states of one scene, stepped on all cores.
 //!
-//! Rows share the model and nothing else, and each is stepped by one thread as a simulation is: the numbers do not depend on the number of
-//! threads.
+//! Rows share the model only, and are stepped one by one as a simulation is: the numbers do not depend on the number of threads.
 
 use crate::arrays::array;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::{BatchOutputs, Part};
-use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, make_rows, no_threads};
+use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, fill_rows, make_rows, no_threads};
 use crate::batch_series::BatchSeries;
 use crate::contacts::ContactLayout;
 use crate::device_mode::ModeChange;
@@ -84,18 +83,18 @@ impl Batch {
         let mut guard = self.lock(py)?;
         let Rows { rows, outputs, workers, .. } = &mut *guard;
         let length = self.outputs.row_length();
+        let change_row = |row: usize, at: Option<usize>, own: &mut Row, outputs: &mut [f64]| {
+            let changed = catch_panic(|| change(at?, own).err());
+            own.fill(outputs);
+            match changed {
+                Ok(failure) => failure.map(|text| (row, Err(text))),
+                Err(panic) => Some((row, Ok(panic))),
+            }
+        };
         let changed = py.detach(|| {
-            let change_row = |(row, at, own, outputs): (usize, Option<usize>, &mut Row, &mut [f64])| {
-                let changed = catch_panic(|| change(at?, own).err());
-                own.fill(outputs);
-                match changed {
-                    Ok(failure) => failure.map(|text| (row, Err(text))),
-                    Err(panic) => Some((row, Ok(panic))),
-                }
-            };
             workers.run(|| {
                 let each = rows.par_iter_mut().zip(outputs.par_chunks_mut(length)).zip(&place).enumerate();
-                each.filter_map(|(row, ((own, outputs), at))| change_row((row, *at, own, outputs)))
+                each.filter_map(|(row, ((own, outputs), at))| change_row(row, *at, own, outputs))
                     .min_by_key(|(row, _)| *row)
             })
         });
@@ -105,17 +104,6 @@ impl Batch {
             None => Ok(()),
             Some((row, Err(text))) => Err(input_error(py, format!("row {row}: {text}"))),
             Some((row, Ok(panic))) => Err(internal_error(py, &format!("row {row}: {panic}"))),
-        }
-    }
-
-    /// State of a row that has not failed.
-    fn whole<'r>(&self, py: Python<'_>, rows: &'r Rows, at: usize) -> PyResult<&'r RunState> {
-        let row = &rows.rows[at];
-        match &row.failure {
-            None => Ok(&row.run),
-            Some(failure) => {
-                Err(failure.exception(py, &format!("row {at} has failed, reset or restore it: ")))
-            }
         }
     }
 }
@@ -130,20 +118,18 @@ impl Batch {
         if !(1..=MAX_ROWS).contains(&n) {
             return Err(input_error(py, format!("n is {n}, expected 1 to {MAX_ROWS}")));
         }
-        let threads = match threads {
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-            Some(given) if (1..=MAX_THREADS).contains(&given) => given as usize,
-            Some(given) => {
-                return Err(input_error(py, format!("threads is {given}, expected 1 to {MAX_THREADS}")));
-            }
-        };
-        let len = n as usize;
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from) as i64;
+        let threads = threads.unwrap_or_else(cores);
+        if !(1..=MAX_THREADS).contains(&threads) {
+            return Err(input_error(py, format!("threads is {threads}, expected 1 to {MAX_THREADS}")));
+        }
+        let (len, threads) = (n as usize, threads as usize);
         let mut workers = Workers::new(threads).map_err(|error| no_threads(py, &error))?;
         let made = py.detach(|| catch_panic(|| make_rows(&inner, len, &mut workers)));
         let rows = made.map_err(|text| internal_error(py, &text))?.map_err(|text| input_error(py, text))?;
         let outputs = BatchOutputs::new(py, &inner, len);
         let mut numbers = vec![0.0; len * outputs.row_length()];
-        rows.iter().zip(numbers.chunks_exact_mut(outputs.row_length())).for_each(|(row, own)| row.fill(own));
+        fill_rows(&rows, &mut numbers, outputs.row_length());
         outputs.write(py, &numbers)?;
         let rows = Rows { rows, outputs: numbers, motion: BatchMotion::new(&inner, len), workers };
         let layout = ContactLayout::new(&inner);
@@ -181,8 +167,7 @@ impl Batch {
     /// InputError
     ///     If an array has another shape, or numbers that are not finite. Nothing has moved then.
     /// StepError
-    ///     If hands moved too far in one step to be followed. Its attribute `rows` has the numbers of the rows; all others have made the step.
-    ///     These rows take no part until they are reset or restored.
+    ///     If hands moved too far in one step. Its attribute `rows` has these rows, which take no part until reset; all others have made the step.
     #[pyo3(signature = (positions=None, *, obstacles=None, clamps=None))]
     fn step(
         &self,
@@ -264,10 +249,10 @@ impl Batch {
             failed.append(&mut part.map_err(|error| no_threads(py, &error))?);
             interrupt = py.check_signals().err();
         }
-        let length = self.outputs.row_length();
-        rows.iter().zip(outputs.chunks_exact_mut(length)).for_each(|(row, own)| row.fill(own));
+        let done = series.done();
+        fill_rows(rows, outputs, self.outputs.row_length());
         self.outputs.write(py, outputs)?;
-        let series = self.outputs.series(py, series)?;
+        let series = self.outputs.series(py, series.numbers, (self.len, [count, done]))?;
         failed.sort_unstable();
         match interrupt.map_or_else(|| failure_of(py, rows, failed), |error| Ok(Some(error)))? {
             None => Ok(series),
@@ -361,7 +346,7 @@ impl Batch {
         let at = usize::try_from(row).ok().filter(|at| *at < self.len);
         let at =
             at.ok_or_else(|| input_error(py, format!("row is {row}, expected 0 to {}", self.len - 1)))?;
-        let run = self.whole(py, &*self.lock(py)?, at)?.clone();
+        let run = self.lock(py)?.whole(py, at)?.clone();
         Simulation::with(py, self.scene.clone_ref(py), run)
     }
 
@@ -407,7 +392,7 @@ impl Batch {
         let chosen = chosen_rows(self.len, rows)?;
         let guard = self.lock(py)?;
         let snapshot = |at: &usize| {
-            let run = self.whole(py, &guard, *at)?.clone();
+            let run = guard.whole(py, *at)?.clone();
             Ok(Snapshot { scene: Arc::clone(&self.inner), run })
         };
         chosen.iter().map(snapshot).collect()
@@ -429,24 +414,13 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let chosen = chosen_rows(self.len, rows)?;
-        let snapshots: Vec<Py<Snapshot>> = match snapshots.extract::<Py<Snapshot>>() {
-            Ok(one) => vec![one],
-            Err(_) => snapshots
-                .extract()
-                .map_err(|_| input_error(py, "snapshots is no Snapshot, and no list of them"))?,
-        };
+        let snapshots = Snapshot::list(snapshots, &self.inner)?;
         let is_one = snapshots.len() == 1;
         if !is_one && snapshots.len() != chosen.len() {
             let message = format!("there are {} snapshots for {} rows", snapshots.len(), chosen.len());
             return Err(input_error(py, message));
         }
         let snapshots: Vec<&Snapshot> = snapshots.iter().map(Py::get).collect();
-        if snapshots.iter().any(|own| !Arc::ptr_eq(&own.scene, &self.inner)) {
-            return Err(input_error(
-                py,
-                "the snapshot is of another scene: restore it in a batch of the same Scene object",
-            ));
-        }
         self.change(py, &chosen, |at, row| {
             *row = Row::new(snapshots[if is_one { 0 } else { at }].run.clone());
             Ok(())

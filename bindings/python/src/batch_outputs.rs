@@ -1,7 +1,6 @@
 //! Outputs of a batch: arrays that every step writes over.
 
 use crate::arrays::{array, pose_row, twist_row};
-use crate::batch_series::BatchSeries;
 use crate::errors::{Class, exception};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use palpate::Output;
@@ -50,10 +49,16 @@ impl BatchOutputs {
         Self { arrays: shapes.map(make).into() }
     }
 
-    /// Arrays of a series by name, of shape (steps, rows, …): views of one array.
-    pub fn series<'py>(&self, py: Python<'py>, series: BatchSeries) -> PyResult<Bound<'py, PyDict>> {
-        let (shape, done) = (series.shape(), series.done());
-        let all = array(py, series.numbers, &shape)?.call_method1("transpose", ((1, 0, 2),))?;
+    /// Arrays of a series by name, of shape (steps, rows, …): views of one array, made of the numbers of the buffer in every step, row by row. `steps` are
+    /// those that there is room for, and those that were made.
+    pub fn series<'py>(
+        &self,
+        py: Python<'py>,
+        numbers: Vec<f64>,
+        (rows, [steps, done]): (usize, [usize; 2]),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let all = array(py, numbers, &[rows, steps, self.row_length()])?;
+        let all = all.call_method1("transpose", ((1, 0, 2),))?;
         let dict = PyDict::new(py);
         for (name, (own, place)) in NAMES.into_iter().zip(&self.arrays) {
             let (start, end) = (place.start as isize, place.end as isize);

@@ -23,6 +23,18 @@ pub struct Rows {
     pub workers: Workers,
 }
 
+impl Rows {
+    /// State of a row that has not failed.
+    pub fn whole(&self, py: Python<'_>, at: usize) -> PyResult<&RunState> {
+        match &self.rows[at].failure {
+            None => Ok(&self.rows[at].run),
+            Some(failure) => {
+                Err(failure.exception(py, &format!("row {at} has failed, reset or restore it: ")))
+            }
+        }
+    }
+}
+
 /// State of a row.
 pub struct Row {
     pub run: RunState,
@@ -56,6 +68,11 @@ impl Row {
             outputs[1..].fill(f64::NAN);
         }
     }
+}
+
+/// Write the numbers of all rows, each of a length.
+pub fn fill_rows(rows: &[Row], outputs: &mut [f64], length: usize) {
+    rows.iter().zip(outputs.chunks_exact_mut(length)).for_each(|(row, own)| row.fill(own));
 }
 
 /// Numbers of the chosen rows: all, by a mask or by numbers.

@@ -13,7 +13,6 @@ const STEPS_AT_ONCE: usize = 16;
 pub struct BatchSeries {
     /// Numbers of a row, step by step; row by row.
     pub numbers: Vec<f64>,
-    rows: usize,
     steps: usize,
     /// Numbers of a row in a step.
     length: usize,
@@ -27,17 +26,12 @@ impl BatchSeries {
         let mut numbers = Vec::new();
         numbers.try_reserve_exact(count)?;
         numbers.resize(count, 0.0);
-        Ok(Self { numbers, rows, steps, length, done: 0 })
+        Ok(Self { numbers, steps, length, done: 0 })
     }
 
     /// Number of steps that all rows have made.
     pub fn done(&self) -> usize {
         self.done
-    }
-
-    /// Extents of the numbers: rows, steps, numbers of a row in a step.
-    pub fn shape(&self) -> [usize; 3] {
-        [self.rows, self.steps, self.length]
     }
 
     /// Let all rows make the next steps, on the threads that it is called on; gives the rows that failed, in their order.

@@ -33,6 +33,8 @@ impl Series {
         let room = |width: usize| with_room(steps.saturating_mul(width));
         let (devices, objects) = (scene.devices.len(), scene.object_names.len());
         let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
+        let mut energy = [(); 10].map(|()| Vec::new());
+        energy.iter_mut().try_for_each(|terms| terms.try_reserve_exact(steps))?;
         Ok(Self {
             steps: 0,
             time: room(1)?,
@@ -44,16 +46,10 @@ impl Series {
             penetration: room(objects)?,
             clamps: [room(7 * clamps)?, room(3 * clamps)?, room(3 * clamps)?],
             probes: [room(3 * probes)?, room(3 * probes)?],
-            energy: [(); 10].map(|()| Vec::new()),
+            energy,
             unsolved: with_room(steps)?,
             contacts: with_contacts.then(Vec::new),
-        }
-        .with_energy(steps)?)
-    }
-
-    fn with_energy(mut self, steps: usize) -> Result<Self, TryReserveError> {
-        self.energy.iter_mut().try_for_each(|terms| terms.try_reserve_exact(steps))?;
-        Ok(self)
+        })
     }
 
     /// Memory of a step [bytes], without contacts.
