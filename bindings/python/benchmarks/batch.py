@@ -1,6 +1,6 @@
 """Steps per second of a batch of 1,000 scenes, by the number of threads; with `step`, and with `run` of 16 steps at a time.
 
-    target/python-tests/bin/python bindings/python/benchmarks/batch.py [ROWS [SECONDS]]
+    target/python-tests/bin/python bindings/python/benchmarks/batch.py [ROWS [SECONDS [SCENES]]]
 
 In each scene a finger touches a body, each at another place and depth: it presses up and down, or slides as well, on a block whose lower side is glued;
 or on a cube that lies on a floor. Short blocks of steps on each number of threads take turns for some seconds, so that whatever else the machine does
@@ -50,10 +50,11 @@ def block_of_steps(batch, motions):
 def main():
     rows = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     seconds = float(sys.argv[2]) if len(sys.argv) > 2 else SECONDS
+    most = int(sys.argv[3]) if len(sys.argv) > 3 else 3
     warnings.simplefilter("ignore", palpate.PalpateWarning)
     ways = {"step": block_of_steps, "run": lambda batch, motions: batch.run(motions)}
     counts = sorted({1, os.cpu_count() or 1})
-    for name, scene, slide in scenes():
+    for name, scene, slide in list(scenes())[:most]:
         batches = {(way, count): palpate.Batch(scene, rows, threads=count) for way in ways for count in counts}
         wall, processors = {key: [] for key in batches}, {key: [] for key in batches}
         end, done = time.monotonic() + seconds, 0

@@ -357,3 +357,25 @@ def test_ctrl_c_ends_a_run_with_all_rows_at_one_step(held):
         series = caught.value.series
         assert 0 < len(series["time"]) < 5000 and np.array_equal(series["time"][-1], batch.time)
         assert np.array_equal(series["poses"][-1], batch.poses)
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="the resident memory is read from /proc")
+def test_memory_does_not_grow_with_the_steps(held):
+    batch = palpate.Batch(held, 4, threads=2)
+    hands = batch.held_points()
+    rest = hands.copy()
+
+    def resident_bytes():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def steps(count):
+        for number in range(count):
+            hands[:, 0, 0] = rest[:, 0, 0] + 1e-3 * np.sin(0.01 * number)
+            batch.step(hands)
+
+    steps(2000)
+    before = resident_bytes()
+    steps(30_000)
+    # A number of eight bytes that each row kept in each step would be 0.96 MB.
+    assert resident_bytes() - before < 600_000
