@@ -7,7 +7,7 @@
 >>> series = simulation.run(steps=100)
 
 Lengths are metres, times seconds, forces newtons; vectors are in world axes. A recording is made once of a mesh (:func:`record`) or read from
-a file (:meth:`Recording.open`); a :class:`Scene` puts recordings among planes, obstacles and devices; a :class:`Simulation` steps it.
+a file (:meth:`Recording.open`); a :class:`Scene` puts recordings among planes, obstacles and devices; a :class:`Simulation` steps it, a :class:`Batch` many of it.
 """
 
 from palpate._errors import (
@@ -21,10 +21,11 @@ from palpate._errors import (
     SceneError,
     StepError,
 )
-from palpate._palpate import Log, Recording, Simulation, Snapshot, __version__, record
+from palpate._palpate import Batch, Log, Recording, Simulation, Snapshot, __version__, record
 from palpate._scene import Clamp, Device, Object, Obstacle, Plane, Probe, Scene
 
 __all__ = [
+    "Batch",
     "Clamp",
     "Device",
     "FileError",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from typing import Any
+
 __all__ = [
     "FileError",
     "InputError",
@@ -70,11 +73,34 @@ class InputError(PalpateError, ValueError):
 
 
 class StepError(PalpateError):
-    """Step that could not be followed: hands or bodies move too far in it."""
+    """Step that could not be followed: hands or bodies move too far in it.
+
+    Attributes
+    ----------
+    rows : list of int or None
+        Rows of a Batch whose step it was.
+    series : dict or None
+        Series of the steps before, and of this one, of :meth:`Simulation.run`.
+    """
+
+    rows: list[int] | None = None
+    series: dict[str, Any] | None = None
 
 
 class FileError(PalpateError, OSError):
-    """File that cannot be read or written."""
+    """File that cannot be read or written.
+
+    Attributes
+    ----------
+    errno, strerror, filename
+        As of every OSError; None where it was not the operating system that refused.
+    """
+
+    def __init__(self, message: str = "", *, errno: int | None = None, file: object = None, kind: str | None = None, **more: Any) -> None:
+        super().__init__(message, kind=kind, file=file, **more)
+        self.errno = errno
+        self.strerror = None if errno is None else os.strerror(errno)
+        self.filename = self.file
 
 
 class PalpateWarning(UserWarning):

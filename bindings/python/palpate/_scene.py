@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Union
 
 from palpate import _palpate
-from palpate._errors import FileError, InputError, SceneError
+from palpate._errors import FileError, InputError, PalpateWarning, SceneError
+from palpate._saved_scene import SavedScene
 from palpate._toml import Texts, table
 
 if TYPE_CHECKING:
@@ -269,23 +271,24 @@ class Scene(_palpate.Scene):
             "sleep_after": sleep_after,
         }
         lines = table(whole)
-        groups: list[tuple[str, Iterable[Any]]] = [
-            ("object", objects),
-            ("device", devices),
-            ("plane", planes),
-            ("obstacle", obstacles),
-            ("clamp", clamps),
-            ("probe", probes),
+        groups: list[tuple[type, Iterable[Any]]] = [
+            (Object, objects),
+            (Device, devices),
+            (Plane, planes),
+            (Obstacle, obstacles),
+            (Clamp, clamps),
+            (Probe, probes),
         ]
-        for header, parts in groups:
+        for kind, parts in groups:
+            header = kind.__name__.lower()
             if isinstance(parts, (str, Mapping)) or not isinstance(parts, Iterable):
-                raise InputError(f"{header}s is {parts!r}, expected a list of {header.capitalize()}")
+                raise InputError(f"{header}s is {parts!r}, expected a list of {kind.__name__}")
             for number, part in enumerate(parts):
-                lines += [f"[[{header}]]", *table(_keys(part, header, number, texts))]
+                lines += [f"[[{header}]]", *table(_keys(part, kind, number, texts))]
         text = "\n".join(lines) + "\n"
         path = os.path.join(os.fspath(folder), _IN_CODE)
         try:
-            return super().__new__(cls, text, path, texts.recordings, texts.paths, reference)
+            return cls._read(text, path, texts.recordings, texts.paths, reference)
         except SceneError as error:
             raise _with_part(error, lines) from None
 
@@ -303,10 +306,11 @@ class Scene(_palpate.Scene):
             with open(path, encoding="utf-8") as file:
                 text = file.read()
         except OSError as error:
-            raise FileError(f"cannot read the scene {os.fspath(path)}: {error.strerror}", file=path) from None
+            message = f"cannot read the scene {os.fspath(path)}: {error.strerror}"
+            raise FileError(message, file=path, errno=error.errno) from None
         except UnicodeDecodeError:
             raise SceneError(f"{os.fspath(path)}: it is not a text file; a scene is TOML", kind="syntax", file=path) from None
-        return super().__new__(cls, text, path, {}, {}, reference)
+        return cls._read(text, path, {}, {}, reference)
 
     @classmethod
     def from_toml(cls, text: str, folder: str | os.PathLike[str] = ".", *, reference: bool = False) -> Self:
@@ -320,21 +324,73 @@ class Scene(_palpate.Scene):
         reference : bool
             Every surface node as a contact, and no object asleep: slow, to compare with.
         """
-        return super().__new__(cls, text, os.path.join(os.fspath(folder), _IN_CODE), {}, {}, reference)
+        return cls._read(text, os.path.join(os.fspath(folder), _IN_CODE), {}, {}, reference)
+
+    _source: tuple[str, str, dict[str, _palpate.Recording], dict[str, str], bool]
+
+    @classmethod
+    def _read(
+        cls,
+        text: str,
+        path: str | os.PathLike[str],
+        recordings: dict[str, _palpate.Recording],
+        paths: dict[str, str],
+        reference: bool,
+    ) -> Self:
+        source = (text, os.fspath(path), recordings, paths, reference)
+        scene = super().__new__(cls, *source)
+        scene._source = source
+        return scene
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the scene to a TOML file, for :meth:`load` and the command line.
+
+        What it has in memory goes to files beside it: recordings to `STEM-object-NAME.palp`, paths to `STEM-device-NAME.csv` and so on. Files that it
+        names stay where they are, and are named from there.
+
+        Parameters
+        ----------
+        path : str or path
+            File, usually `*.toml`. It is whole or not there.
+
+        Raises
+        ------
+        FileError
+            If a file cannot be written.
+        """
+        text, source, recordings, paths, reference = self._source
+        target = os.fspath(path)
+        saved = SavedScene(text, os.path.dirname(source), recordings, paths, target)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PalpateWarning)
+            # It is what will be read, or nothing is written.
+            super().__new__(type(self), saved.text, target, saved.recordings, saved.paths, reference)
+        saved.write()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self), *self._source)
+
+
+def _again(cls: type[Scene], *source: Any) -> Scene:
+    """Scene of a pickle, whose remarks were made before."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PalpateWarning)
+        return cls._read(*source)
 
 
 #: Name of a text without a file in errors.
 _IN_CODE = "<scene>"
 
 
-def _keys(part: Any, header: str, number: int, texts: Texts) -> dict[str, Any]:
+def _keys(part: Any, kind: Any, number: int, texts: Texts) -> dict[str, Any]:
     """Keys of a part; its path and recording by the names that the text gives them."""
+    header = kind.__name__.lower()
     if isinstance(part, Mapping):
         keys = dict(part)
-    elif type(part).__name__.lower() == header and hasattr(part, "__dataclass_fields__"):
-        keys = {field.name: getattr(part, field.name) for field in fields(part)}
+    elif isinstance(part, kind):
+        keys = {field.name: getattr(part, field.name) for field in fields(kind)}
     else:
-        raise InputError(f"{header}s has {part!r}, expected palpate.{header.capitalize()}")
+        raise InputError(f"{header}s has {part!r}, expected palpate.{kind.__name__}")
     name = f"{header} {keys.get('name') or number}"
     if keys.get("path") is not None:
         keys["path"] = texts.path(keys["path"], name)

@@ -52,6 +52,18 @@ def table(keys: Mapping[str, Any]) -> list[str]:
     return [f"{_key(key)} = {_value(value, key)}" for key, value in keys.items() if value is not None]
 
 
+def material_tables(tables: Any) -> str:
+    """Text of a material file of its tables."""
+    if isinstance(tables, Mapping) or not hasattr(tables, "__iter__"):
+        raise InputError(f"materials is {tables!r}, expected a file, or a list of dicts with region, name or young, poisson and density")
+    lines = []
+    for own in tables:
+        if not isinstance(own, Mapping):
+            raise InputError(f"materials has {own!r}, expected a dict with region, name or young, poisson and density")
+        lines += ["[[material]]", *table(own)]
+    return "\n".join(lines) + "\n"
+
+
 def _key(key: str) -> str:
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else _text(key)
 

@@ -14,7 +14,10 @@ impl<'py> Numbers<'py> {
     /// Array of float64, or what NumPy makes such an array of without loss: lists, other real numbers. `name` is that of the argument;
     /// None is an extent of any length.
     pub fn read(given: &Bound<'py, PyAny>, name: &str, expected: &[Option<usize>]) -> PyResult<Self> {
-        let own = given.cast::<PyArrayDyn<f64>>().ok().filter(|array| array.is_c_contiguous());
+        let is_plain = |array: &&Bound<'py, PyArrayDyn<f64>>| {
+            array.is_c_contiguous() && array.data().addr().is_multiple_of(align_of::<f64>())
+        };
+        let own = given.cast::<PyArrayDyn<f64>>().ok().filter(is_plain);
         let array = match own {
             Some(array) => array.clone(),
             None => convert(given, name, expected)?,
@@ -68,9 +71,8 @@ fn convert<'py>(
     if !["f", "i", "u"].contains(&dtype.getattr("kind")?.extract::<String>()?.as_str()) {
         return Err(refused(format!("holds {}", dtype.str()?)));
     }
-    let options = PyDict::new(py);
-    options.set_item("dtype", "float64")?;
-    let array = numpy.call_method("ascontiguousarray", (array,), Some(&options))?;
+    // C-contiguous and aligned.
+    let array = numpy.call_method1("require", (array, "float64", ["C", "A"]))?;
     Ok(array.cast_into::<PyArrayDyn<f64>>()?)
 }
 

@@ -36,6 +36,12 @@ impl ContactLayout {
         }
     }
 
+    /// Memory of a contact's row [bytes], without the number of its row in a batch.
+    pub fn row_bytes(&self) -> usize {
+        // Time, three vectors, gap, slip speed and device; two names.
+        8 * 13 + 2 * 4 * self.width
+    }
+
     /// Append the row of a contact of the step that ends at a time [s].
     pub fn append(&self, time_s: f64, contact: &ContactOutput, rows: &mut Vec<u8>) {
         let mut number = |number: f64| rows.extend((number + 0.0).to_ne_bytes());
@@ -56,7 +62,9 @@ impl ContactLayout {
     }
 
     /// Structured array of rows, whose memory it takes.
-    pub fn array<'py>(&self, py: Python<'py>, rows: Vec<u8>) -> PyResult<Bound<'py, PyAny>> {
+    ///
+    /// `has_rows` says whether an integer, the number of its row in a batch, stands before each contact.
+    pub fn array<'py>(&self, py: Python<'py>, rows: Vec<u8>, has_rows: bool) -> PyResult<Bound<'py, PyAny>> {
         let text = format!("U{}", self.width);
         let mut fields: Vec<Bound<'py, PyAny>> = Vec::new();
         let mut field = |name: &str, kind: &str, extent: usize| {
@@ -68,6 +76,9 @@ impl ContactLayout {
             fields.push(one.into_any());
             PyResult::Ok(())
         };
+        if has_rows {
+            field("row", "i8", 1)?;
+        }
         field("time", "f8", 1)?;
         for name in ["point", "normal", "force"] {
             field(name, "f8", 3)?;

@@ -6,6 +6,7 @@ use pyo3::types::PyDict;
 use std::any::Any;
 use std::fmt::{Debug, Display};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
 /// Class of an exception, by its name in `palpate._errors`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,7 +70,18 @@ pub fn scene_error(py: Python<'_>, error: &SceneError) -> PyErr {
         .and_then(|()| attributes.set_item("file", error.file.as_deref()))
         .and_then(|()| attributes.set_item("line", error.line))
         .and_then(|()| attributes.set_item("key", error.key.as_deref()));
+    let filled = filled.and_then(|()| match class {
+        Class::File => attributes.set_item("errno", error.os_error),
+        _ => Ok(()),
+    });
     filled.err().unwrap_or_else(|| raise(py, class, &error.to_string(), &attributes))
+}
+
+/// Exception for a file that the operating system refuses to read.
+pub fn file_error(py: Python<'_>, file: &Path, os_error: Option<i32>, message: &str) -> PyErr {
+    let attributes = PyDict::new(py);
+    let filled = attributes.set_item("file", file).and_then(|()| attributes.set_item("errno", os_error));
+    filled.err().unwrap_or_else(|| raise(py, Class::File, message, &attributes))
 }
 
 /// Kind in words with underscores, as `out_of_range`.

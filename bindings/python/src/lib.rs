@@ -4,17 +4,27 @@
 //! a step; a simulation that another thread uses is an exception; panics become exceptions.
 
 mod arrays;
+mod batch;
+mod batch_motion;
+mod batch_outputs;
+mod batch_rows;
+mod batch_series;
 mod contacts;
+mod device_mode;
 mod errors;
 mod log;
 mod motion;
 mod progress;
 mod record;
 mod recording;
+mod run_length;
 mod run_state;
 mod scene;
 mod series;
 mod simulation;
+mod snapshot;
+mod starts;
+mod workers;
 
 use pyo3::prelude::*;
 
@@ -24,7 +34,8 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::Recording>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<simulation::Simulation>()?;
-    module.add_class::<run_state::Snapshot>()?;
+    module.add_class::<batch::Batch>()?;
+    module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<log::Log>()?;
     module.add_function(wrap_pyfunction!(record::record, module)?)
 }

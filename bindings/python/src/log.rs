@@ -1,7 +1,7 @@
 //! `palpate.Log`: a log of a run as arrays.
 
 use crate::arrays::{array, pose_row, read_only, twist_row};
-use crate::errors::{Class, catch_panic, exception, internal_error};
+use crate::errors::{Class, catch_panic, exception, file_error, internal_error};
 use numpy::PyArray1;
 use palpate::EnergyLedger;
 use palpate_haptics::log::{LogReader, LoggedStep};
@@ -118,10 +118,20 @@ impl Content {
     }
 }
 
-/// Reads a log; errors are the class of the exception, and its message.
-fn read(path: &Path) -> Result<Content, (Class, String)> {
-    let unread = |error| (Class::File, format!("cannot read the log {}: {error}", path.display()));
-    let refused = |error| (Class::Log, format!("{}: {error}", path.display()));
+/// Reason that a log cannot be read, with the message.
+enum ReadError {
+    /// The operating system refused, with the number of its error.
+    Io(String, Option<i32>),
+    /// It is no log.
+    Content(String),
+}
+
+/// Reads a log.
+fn read(path: &Path) -> Result<Content, ReadError> {
+    let unread = |error: std::io::Error| {
+        ReadError::Io(format!("cannot read the log {}: {error}", path.display()), error.raw_os_error())
+    };
+    let refused = |error| ReadError::Content(format!("{}: {error}", path.display()));
     let bytes = read_regular_file(path).map_err(unread)?;
     let reader = LogReader::new(bytes).map_err(|error| refused(error.to_string()))?;
     let metadata = reader.metadata().map_err(|error| refused(error.to_string()))?;
@@ -140,7 +150,10 @@ impl Log {
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let content = py.detach(|| catch_panic(|| read(&path)));
         let content = content.map_err(|text| internal_error(py, &text))?;
-        let content = content.map_err(|(class, message)| exception(py, class, message))?;
+        let content = content.map_err(|error| match error {
+            ReadError::Io(message, number) => file_error(py, &path, number, &message),
+            ReadError::Content(message) => exception(py, Class::Log, message),
+        })?;
         let count = content.steps.len();
         let numbers = |numbers: Vec<f64>| Ok::<_, PyErr>(read_only(array(py, numbers, &[count])?)?.unbind());
         let energy = PyDict::new(py);

@@ -5,6 +5,7 @@ use crate::errors::input_error;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Pose};
 use palpate_scene::{Scene, SceneDevice};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
 /// Arguments `positions`, `obstacles` and `clamps` of a call.
@@ -16,7 +17,7 @@ pub struct Arguments<'a, 'py> {
 }
 
 /// Argument and number of rows of each kind of parts.
-fn parts<'a, 'py>(arguments: &Arguments<'a, 'py>, scene: &Scene) -> [Part<'a, 'py>; 3] {
+pub fn parts<'a, 'py>(arguments: &Arguments<'a, 'py>, scene: &Scene) -> [Part<'a, 'py>; 3] {
     let Arguments { positions, obstacles, clamps } = *arguments;
     [
         Part { kind: Kind::Devices, given: positions, rows: scene.devices.len() },
@@ -27,7 +28,7 @@ fn parts<'a, 'py>(arguments: &Arguments<'a, 'py>, scene: &Scene) -> [Part<'a, 'p
 
 /// Kind of parts that move.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub enum Kind {
     Devices,
     Obstacles,
     Clamps,
@@ -35,7 +36,7 @@ enum Kind {
 
 impl Kind {
     /// Name of the argument.
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Devices => "positions",
             Self::Obstacles => "obstacles",
@@ -44,15 +45,15 @@ impl Kind {
     }
 
     /// Numbers of a row: of a position, or of a pose.
-    fn columns(self) -> usize {
+    pub fn columns(self) -> usize {
         if self == Self::Devices { 3 } else { 7 }
     }
 }
 
-struct Part<'a, 'py> {
-    kind: Kind,
-    given: Option<&'a Bound<'py, PyAny>>,
-    rows: usize,
+pub struct Part<'a, 'py> {
+    pub kind: Kind,
+    pub given: Option<&'a Bound<'py, PyAny>>,
+    pub rows: usize,
 }
 
 /// Check that no device needs what this process does not have.
@@ -71,7 +72,7 @@ pub fn check_devices(py: Python<'_>, scene: &Scene) -> PyResult<()> {
 }
 
 /// Check that every device has a path, since no positions are given.
-fn check_paths(py: Python<'_>, scene: &Scene) -> PyResult<()> {
+pub fn check_paths(py: Python<'_>, scene: &Scene) -> PyResult<()> {
     match scene.devices.iter().find(|device| device.path.is_none()) {
         None => Ok(()),
         Some(device) => Err(input_error(
@@ -131,7 +132,12 @@ impl SeriesMotion {
             if kind != Kind::Devices {
                 check_poses(py, name, numbers)?;
             }
-            series.parts.push((kind, numbers.to_vec(), rows * columns));
+            let mut copied = Vec::new();
+            copied
+                .try_reserve_exact(numbers.len())
+                .map_err(|error| PyMemoryError::new_err(format!("{name}: {error}")))?;
+            copied.extend_from_slice(numbers);
+            series.parts.push((kind, copied, rows * columns));
         }
         Ok(series)
     }
@@ -148,6 +154,15 @@ impl SeriesMotion {
     }
 }
 
+/// Copy the numbers of an argument into a list, in place of what is in it.
+pub fn copy(name: &str, numbers: &[f64], into: &mut Vec<f64>) -> PyResult<()> {
+    into.clear();
+    into.try_reserve_exact(numbers.len())
+        .map_err(|error| PyMemoryError::new_err(format!("{name}: {error}")))?;
+    into.extend_from_slice(numbers);
+    Ok(())
+}
+
 fn check_poses(py: Python<'_>, name: &str, numbers: &[f64]) -> PyResult<()> {
     for (row, pose) in numbers.chunks_exact(7).enumerate() {
         pose_of(pose).map_err(|error| input_error(py, format!("row {row} of {name}: {error}")))?;
@@ -156,7 +171,7 @@ fn check_poses(py: Python<'_>, name: &str, numbers: &[f64]) -> PyResult<()> {
 }
 
 /// Write rows of numbers of a kind of parts into an input.
-fn write(kind: Kind, numbers: &[f64], input: &mut Input) -> Result<(), String> {
+pub fn write(kind: Kind, numbers: &[f64], input: &mut Input) -> Result<(), String> {
     let poses = |into: &mut Vec<Pose>| {
         for (row, (pose, numbers)) in into.iter_mut().zip(numbers.chunks_exact(7)).enumerate() {
             *pose = pose_of(numbers).map_err(|error| format!("row {row} of {}: {error}", kind.name()))?;

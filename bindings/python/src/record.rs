@@ -1,16 +1,16 @@
 //! `palpate.record`: from a mesh to a recording, with the options of `palpate record`.
 
 use crate::arrays::{Numbers, check_finite, read_integers};
-use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
+use crate::errors::{Class, catch_panic, exception, file_error, input_error, internal_error, scene_error};
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
 use glam::DVec3;
 use palpate::{Damping, Material};
 use palpate_fem::{
     ElementOrder, ErrorTarget, Precision, Progress, RecordParameters, RecordedBody, ResidualChoice,
-    library_material,
+    library_material, materials_from_toml,
 };
-use palpate_mesh::{Mesh, MeshingParameters, Region, Repair};
+use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Region, Repair, read_regular_text};
 use palpate_scene::{SceneError, SceneErrorKind, read_body, read_supports, source_name};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -26,6 +26,8 @@ enum Source {
 /// Options of a recording, as the command line has them.
 struct Options {
     material: Option<Material>,
+    /// Materials by region, as the text of a material file, and its name in errors.
+    materials: Option<(String, String)>,
     damping: Damping,
     modes: usize,
     target: ErrorTarget,
@@ -36,6 +38,7 @@ struct Options {
     spring: Vec<String>,
     residual: ResidualChoice,
     precision: Precision,
+    repair: Repair,
 }
 
 /// Recording of a mesh by finite elements, with the options of `palpate record` (docs/recording.md).
@@ -48,7 +51,10 @@ struct Options {
 /// young, poisson, density : float, optional
 ///     Young's modulus [Pa], Poisson's ratio [1] and density [kg/m³] of the whole body.
 /// material : str, optional
-///     Material by name instead, as `palpate materials` lists them. Without either the materials of the mesh file.
+///     Material by name instead, as `palpate materials` lists them.
+/// materials : str, path, or list of dict, optional
+///     Materials by region of the mesh instead: a material file, or its tables, as `[{"region": "skin", "name": "liver"}, {"region": "bone",
+///     "young": 1e9, "poisson": 0.3, "density": 1800}]` (docs/recording.md). Without any the materials of the mesh file.
 /// rayleigh : (float, float), optional
 ///     Rayleigh damping α [1/s], β [s].
 /// damping_ratio : float, optional
@@ -65,6 +71,10 @@ struct Options {
 ///     Side of the cells that a surface is filled with [m].
 /// fix, spring : str or list of str, optional
 ///     Nodes that are fixed, and faces on springs, as on the command line: `fix="x<-0.049"`.
+/// merge_nodes : {"auto", "always", "never"}
+///     Whether nodes on one point are merged; "auto" where the body falls into fewer pieces by it.
+/// piece : "largest" or int, optional
+///     Piece of a mesh in several pieces, by its number in `palpate mesh`, from 1.
 /// residual : {"auto", "whole", "none"} or float, optional
 ///     Part of the residual compliance to keep, or a cut-off radius [m].
 /// precision : {"compact", "full"}
@@ -83,9 +93,9 @@ struct Options {
 /// KeyboardInterrupt
 ///     If Ctrl-C is pressed meanwhile. Other threads run meanwhile, too.
 #[pyfunction]
-#[pyo3(signature = (mesh, *, young=None, poisson=None, density=None, material=None, rayleigh=None, damping_ratio=None,
-    modes=200, force_error=None, bandwidth=None, order=2, scale=1.0, cell_size=None, fix=None, spring=None, residual=None,
-    precision="compact", progress=None))]
+#[pyo3(signature = (mesh, *, young=None, poisson=None, density=None, material=None, materials=None, rayleigh=None, damping_ratio=None,
+    modes=200, force_error=None, bandwidth=None, order=2, scale=1.0, cell_size=None, fix=None, spring=None, merge_nodes="auto",
+    piece=None, residual=None, precision="compact", progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub fn record(
     py: Python<'_>,
@@ -94,6 +104,7 @@ pub fn record(
     poisson: Option<f64>,
     density: Option<f64>,
     material: Option<&str>,
+    materials: Option<&Bound<'_, PyAny>>,
     rayleigh: Option<[f64; 2]>,
     damping_ratio: Option<f64>,
     modes: i64,
@@ -104,12 +115,19 @@ pub fn record(
     cell_size: Option<f64>,
     fix: Option<&Bound<'_, PyAny>>,
     spring: Option<&Bound<'_, PyAny>>,
+    merge_nodes: &str,
+    piece: Option<&Bound<'_, PyAny>>,
     residual: Option<&Bound<'_, PyAny>>,
     precision: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Recording> {
     let refused = |message: String| input_error(py, message);
     let (material, named) = read_material((young, poisson, density), material).map_err(refused)?;
+    if materials.is_some() && material.is_some() {
+        return Err(refused(
+            "give materials, or material, or young, poisson and density: one of them".into(),
+        ));
+    }
     let damping = match (rayleigh, damping_ratio) {
         (Some(_), Some(_)) => return Err(refused("give rayleigh or damping_ratio, not both".into())),
         (Some([alpha, beta]), None) => Damping::Rayleigh { alpha, beta },
@@ -118,6 +136,7 @@ pub fn record(
     };
     let options = Options {
         material,
+        materials: materials.map(read_materials).transpose()?,
         damping,
         modes: usize::try_from(modes)
             .map_err(|_| refused(format!("modes is {modes}, expected at least 1")))?,
@@ -138,6 +157,19 @@ pub fn record(
             other => {
                 return Err(refused(format!("precision is {other:?}, expected \"compact\" or \"full\"")));
             }
+        },
+        repair: Repair {
+            merge_nodes: match merge_nodes {
+                "auto" => MergeNodes::JoiningPieces,
+                "always" => MergeNodes::Always,
+                "never" => MergeNodes::Never,
+                other => {
+                    let message =
+                        format!("merge_nodes is {other:?}, expected \"auto\", \"always\" or \"never\"");
+                    return Err(refused(message));
+                }
+            },
+            piece: piece.map_or(Ok(PieceChoice::default()), read_piece)?,
         },
     };
     let source = read_source(mesh)?;
@@ -168,12 +200,15 @@ impl Options {
             move |error: String| SceneError::new(kind, format!("{name}: {error}"))
         };
         let mesh_error = refused(SceneErrorKind::Mesh);
-        mesh.repair(&Repair::default()).map_err(|error| mesh_error(error.to_string()))?;
+        mesh.repair(&self.repair).map_err(|error| mesh_error(error.to_string()))?;
         if self.order == ElementOrder::Quadratic {
             mesh.add_mid_edge_nodes();
         }
-        let materials =
-            mesh.regions.iter().map(|region| self.material_of(region)).collect::<Result<_, _>>()?;
+        let materials = match &self.materials {
+            Some((text, file)) => materials_from_toml(text, &mesh)
+                .map_err(|error| SceneError::new(SceneErrorKind::Record, format!("{file}: {error}")))?,
+            None => mesh.regions.iter().map(|region| self.material_of(region)).collect::<Result<_, _>>()?,
+        };
         let (fixed_nodes, supports) = read_supports(&mesh, &self.fix, &self.spring)?;
         let parameters = RecordParameters {
             residual: self.residual,
@@ -199,7 +234,7 @@ impl Options {
         }
         let Some(found) = &region.material else {
             let message = format!(
-                "region '{}' has no material in the mesh: give young, poisson and density, or material",
+                "region '{}' has no material in the mesh: give young, poisson and density, material or materials",
                 region.label()
             );
             return Err(SceneError::new(SceneErrorKind::Mesh, message));
@@ -224,6 +259,32 @@ fn read_material(
             Ok((Some(Material::isotropic(young, poisson, density)), None))
         }
         _ => Err("give young, poisson and density together, or material alone".into()),
+    }
+}
+
+/// Text of a material file, and its name: from the file, or from its tables.
+fn read_materials(given: &Bound<'_, PyAny>) -> PyResult<(String, String)> {
+    let py = given.py();
+    if let Ok(path) = given.extract::<PathBuf>() {
+        let text = read_regular_text(&path).map_err(|error| {
+            let message = format!("cannot read the materials {}: {error}", path.display());
+            file_error(py, &path, error.raw_os_error(), &message)
+        })?;
+        return Ok((text, path.display().to_string()));
+    }
+    let text = py.import("palpate._toml")?.call_method1("material_tables", (given,))?.extract()?;
+    Ok((text, "materials".into()))
+}
+
+/// Piece of a mesh: "largest", or its number.
+fn read_piece(given: &Bound<'_, PyAny>) -> PyResult<PieceChoice> {
+    match (given.extract::<String>().as_deref(), given.extract::<usize>()) {
+        (Ok("largest"), _) => Ok(PieceChoice::Largest),
+        (_, Ok(number)) if number > 0 => Ok(PieceChoice::Number(number)),
+        _ => {
+            let message = format!("piece is {}, expected \"largest\", or a number from 1", given.repr()?);
+            Err(input_error(given.py(), message))
+        }
     }
 }
 

@@ -96,7 +96,7 @@ impl Recording {
     ///     File, usually `*.palp`.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let bytes = self.bytes(py)?;
-        py.detach(|| write_atomically(&path, &bytes)).map_err(|error| exception(py, Class::File, error))
+        py.detach(|| write_atomically(&path, &bytes)).map_err(|error| scene_error(py, &error.into()))
     }
 
     /// Pickle by the bytes of the file.

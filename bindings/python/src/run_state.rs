@@ -1,65 +1,155 @@
 //! State of a simulation, its snapshots, and the loop of a run.
 
+use crate::arrays::pose_of;
+use crate::errors::{Class, catch_panic, exception, internal_error};
 use crate::motion::SeriesMotion;
 use crate::progress::SIGNAL_INTERVAL;
-use palpate::{Input, State, step};
+use glam::DVec3;
+use palpate::{DeviceMode, Grasp, Input, State, Support, Twist, step};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use std::sync::Arc;
+use std::collections::TryReserveError;
+
 use std::time::Instant;
 
 /// Number of steps between looks at the clock.
 const STEPS_PER_LOOK: usize = 16;
 
-/// State of a simulation.
+/// State of a simulation, or of one row of a batch.
 #[derive(Clone)]
 pub struct RunState {
     pub state: State,
     pub input: Input,
     pub steps: u64,
+    /// Modes of the devices: those of the scene, until one grasps, lets go or leaves.
+    pub modes: Vec<DeviceMode>,
+    /// Text of a panic in a step: what is left of the state is of no use.
+    panic: Option<String>,
 }
 
-/// State of a simulation at a time, for :meth:`Simulation.restore`.
-#[pyclass(frozen, module = "palpate")]
-pub struct Snapshot {
-    /// Scene, which a restored simulation shares.
-    pub scene: Arc<palpate_scene::Scene>,
-    pub run: RunState,
+/// Reason that a step failed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StepFailure {
+    /// Motion that cannot be written or followed.
+    Motion(String),
+    /// Panic, in this step or in an earlier one.
+    Panic(String),
+    /// No memory for what is kept of a step.
+    Memory(TryReserveError),
 }
 
-#[pymethods]
-impl Snapshot {
-    /// Time [s].
-    #[getter]
-    fn time(&self) -> f64 {
-        self.run.state.output().time_s
+impl StepFailure {
+    /// Exception with a text before the reason.
+    pub fn exception(&self, py: Python<'_>, before: &str) -> PyErr {
+        match self {
+            Self::Motion(text) => exception(py, Class::Step, format!("{before}{text}")),
+            Self::Panic(text) => internal_error(py, &format!("{before}{text}")),
+            Self::Memory(error) => PyMemoryError::new_err(format!("{before}{error}")),
+        }
     }
+}
 
-    fn __repr__(&self) -> String {
-        format!("<palpate.Snapshot at {:.6} s>", self.time())
-    }
+/// Placement and motion of the objects at the start: rows of poses and velocities, one for each object.
+#[derive(Clone, Copy, Default)]
+pub struct Start<'a> {
+    /// x, y, z [m], qw, qx, qy, qz.
+    pub poses: Option<&'a [f64]>,
+    /// Velocity [m/s] and angular velocity [rad/s, world].
+    pub velocities: Option<&'a [f64]>,
 }
 
 impl RunState {
-    /// State at the start.
+    /// State at the start of the scene.
     pub fn new(scene: &palpate_scene::Scene) -> Self {
-        Self { state: State::new(&scene.model), input: scene.input_at(0.0), steps: 0 }
+        Self::with(scene, State::new(&scene.model))
+    }
+
+    fn with(scene: &palpate_scene::Scene, state: State) -> Self {
+        let modes = scene.devices.iter().map(|device| device.mode).collect();
+        Self { state, input: scene.input_at(0.0), steps: 0, modes, panic: None }
+    }
+
+    /// State at the start of the scene, its objects placed and moving as given; those with fixed nodes or on a table as the scene says.
+    ///
+    /// # Errors
+    /// Text, for quaternions that are none.
+    pub fn at(scene: &palpate_scene::Scene, start: Start) -> Result<Self, String> {
+        if start.poses.is_none() && start.velocities.is_none() {
+            return Ok(Self::new(scene));
+        }
+        let mut objects = State::new(&scene.model).snapshots();
+        for (at, (own, recording)) in objects.iter_mut().zip(scene.model.recordings()).enumerate() {
+            if recording.metadata.support == Support::Fixed || own.modes.is_empty() {
+                continue;
+            }
+            if let Some(poses) = start.poses {
+                own.pose = pose_of(&poses[7 * at..][..7])?;
+            }
+            if let Some(velocities) = start.velocities {
+                let row = &velocities[6 * at..][..6];
+                own.twist = Twist { linear: DVec3::from_slice(row), angular: DVec3::from_slice(&row[3..]) };
+            }
+            let (turn, inertia) = (own.pose.orientation, recording.inertia());
+            own.angular_momentum = turn * (inertia * (turn.inverse() * own.twist.angular));
+        }
+        Ok(Self::with(scene, State::resume(&scene.model, &objects)))
+    }
+
+    /// Whether a step has panicked: only a reset or a snapshot helps.
+    pub fn has_panicked(&self) -> Option<StepFailure> {
+        self.panic.clone().map(StepFailure::Panic)
     }
 
     /// Move what has a path in the scene to its place at the end of the next step.
     pub fn follow_paths(&mut self, scene: &palpate_scene::Scene) {
         let end_s = (self.steps + 1) as f64 * scene.model.parameters().step_s;
         scene.follow_paths(end_s, &mut self.input);
+        for (own, mode) in self.input.devices.iter_mut().zip(&self.modes) {
+            // A force of the scene's course, or of the last step.
+            if !matches!((own.mode, mode), (DeviceMode::Force(_), DeviceMode::Force(_))) {
+                own.mode = *mode;
+            }
+        }
     }
 
     /// Step with the input.
     ///
     /// # Errors
-    /// Text, when the motion cannot be followed.
-    pub fn step(&mut self, scene: &palpate_scene::Scene) -> Result<(), String> {
-        step(&scene.model, &mut self.state, &self.input);
+    /// When the motion cannot be followed; when a step panics, and from then on.
+    pub fn step(&mut self, scene: &palpate_scene::Scene) -> Result<(), StepFailure> {
+        if let Some(failure) = self.has_panicked() {
+            return Err(failure);
+        }
+        let stepped = catch_panic(|| {
+            step(&scene.model, &mut self.state, &self.input);
+            scene.check_step(&self.input, &self.state)
+        });
         self.steps += 1;
-        scene.check_step(&self.input, &self.state)
+        match stepped {
+            Ok(checked) => checked.map_err(StepFailure::Motion),
+            Err(text) => {
+                self.panic = Some(text.clone());
+                Err(StepFailure::Panic(text))
+            }
+        }
     }
+}
+
+/// Points that devices hold or exert forces on [m, world]; NaN for tips.
+pub fn held_points(scene: &palpate_scene::Scene, run: &RunState) -> impl Iterator<Item = DVec3> {
+    let (model, state) = (&scene.model, &run.state);
+    run.modes.iter().map(|mode| {
+        let grasp = match mode {
+            DeviceMode::Held(grasp) => *grasp,
+            DeviceMode::Force(applied) => applied.grasp,
+            _ => return DVec3::NAN,
+        };
+        let Grasp { object, point } = grasp;
+        let Some(recording) = model.recordings().nth(object) else { return DVec3::NAN };
+        let moved = state.point_displacement(model, object, &point);
+        let pose = state.output().objects[object].pose;
+        pose.world_from_body(recording.surface.rest_position(&point) + moved)
+    })
 }
 
 /// Run steps until they are done, or it is time to ask for signals; gives the number of the next.
@@ -68,17 +158,17 @@ pub fn run_part(
     run: &mut RunState,
     motion: &SeriesMotion,
     steps: std::ops::Range<usize>,
-    mut append: impl FnMut(&Input, &State),
-) -> Result<usize, String> {
+    mut append: impl FnMut(&Input, &State) -> Result<(), StepFailure>,
+) -> Result<usize, StepFailure> {
     let started = Instant::now();
     for number in steps.clone() {
         if (number - steps.start).is_multiple_of(STEPS_PER_LOOK) && started.elapsed() > SIGNAL_INTERVAL {
             return Ok(number);
         }
         run.follow_paths(scene);
-        motion.write(number, &mut run.input)?;
+        motion.write(number, &mut run.input).map_err(StepFailure::Motion)?;
         run.step(scene)?;
-        append(&run.input, &run.state);
+        append(&run.input, &run.state)?;
     }
     Ok(steps.end)
 }

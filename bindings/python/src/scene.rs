@@ -23,17 +23,26 @@ pub struct Scene {
 impl Scene {
     /// Number of an object by its name or number.
     pub fn object(scene: &palpate_scene::Scene, given: &Bound<'_, PyAny>) -> PyResult<usize> {
-        let names = &scene.object_names;
-        let found = match (given.extract::<String>(), given.extract::<usize>()) {
-            (Ok(name), _) => names.iter().position(|own| *own == name),
-            (_, Ok(at)) => Some(at).filter(|at| *at < names.len()),
-            _ => None,
-        };
-        found.ok_or_else(|| {
-            let message = format!("there is no object {}; the scene has {}", given, names.join(", "));
-            input_error(given.py(), message)
-        })
+        number_of("object", &scene.object_names, given)
     }
+
+    /// Number of a device by its name or number.
+    pub fn device(scene: &palpate_scene::Scene, given: &Bound<'_, PyAny>) -> PyResult<usize> {
+        number_of("device", &scene.names().devices, given)
+    }
+}
+
+/// Number of a part by its name or number.
+fn number_of(kind: &str, names: &[String], given: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let found = match (given.extract::<String>(), given.extract::<usize>()) {
+        (Ok(name), _) => names.iter().position(|own| *own == name),
+        (_, Ok(at)) => Some(at).filter(|at| *at < names.len()),
+        _ => None,
+    };
+    found.ok_or_else(|| {
+        let message = format!("there is no {kind} {}; the scene has {}", given, names.join(", "));
+        input_error(given.py(), message)
+    })
 }
 
 #[pymethods]
@@ -57,9 +66,9 @@ impl Scene {
         let read = py.detach(|| catch_panic(|| read_scene_text(&path, &text, &parts, mode)));
         let read = read.map_err(|text| internal_error(py, &text))?;
         let inner = read.map_err(|error| scene_error(py, &error))?;
-        // Above: palpate.Scene, and its caller.
+        // Above: two functions of palpate.Scene, and its caller.
         for warning in &inner.warnings {
-            warn(py, &warning.to_string(), 2)?;
+            warn(py, &warning.to_string(), 3)?;
         }
         Ok(Self { inner: Arc::new(inner), text })
     }

@@ -6,6 +6,7 @@ use palpate::{Input, State};
 use palpate_scene::Scene;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::collections::TryReserveError;
 
 /// Numbers of the steps of a run, step by step.
 pub struct Series {
@@ -19,7 +20,8 @@ pub struct Series {
     penetration: Vec<f64>,
     clamps: [Vec<f64>; 3],
     probes: [Vec<f64>; 2],
-    energy: Vec<[f64; 10]>,
+    /// Terms of the ledger, in its order.
+    energy: [Vec<f64>; 10],
     unsolved: Vec<i64>,
     /// Rows of contacts; none if they are not asked for.
     contacts: Option<Vec<u8>>,
@@ -27,25 +29,27 @@ pub struct Series {
 
 impl Series {
     /// Empty series with room for a number of steps.
-    pub fn new(scene: &Scene, steps: usize, with_contacts: bool) -> Self {
-        let room = |width: usize| Vec::with_capacity(steps * width);
+    pub fn new(scene: &Scene, steps: usize, with_contacts: bool) -> Result<Self, TryReserveError> {
+        let room = |width: usize| with_room(steps.saturating_mul(width));
         let (devices, objects) = (scene.devices.len(), scene.object_names.len());
         let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
-        Self {
+        let mut energy = [(); 10].map(|()| Vec::new());
+        energy.iter_mut().try_for_each(|terms| terms.try_reserve_exact(steps))?;
+        Ok(Self {
             steps: 0,
-            time: room(1),
-            positions: room(3 * devices),
-            forces: room(3 * devices),
-            proxies: room(3 * devices),
-            poses: room(7 * objects),
-            velocities: room(6 * objects),
-            penetration: room(objects),
-            clamps: [room(7 * clamps), room(3 * clamps), room(3 * clamps)],
-            probes: [room(3 * probes), room(3 * probes)],
-            energy: Vec::with_capacity(steps),
-            unsolved: Vec::with_capacity(steps),
+            time: room(1)?,
+            positions: room(3 * devices)?,
+            forces: room(3 * devices)?,
+            proxies: room(3 * devices)?,
+            poses: room(7 * objects)?,
+            velocities: room(6 * objects)?,
+            penetration: room(objects)?,
+            clamps: [room(7 * clamps)?, room(3 * clamps)?, room(3 * clamps)?],
+            probes: [room(3 * probes)?, room(3 * probes)?],
+            energy,
+            unsolved: with_room(steps)?,
             contacts: with_contacts.then(Vec::new),
-        }
+        })
     }
 
     /// Memory of a step [bytes], without contacts.
@@ -57,7 +61,16 @@ impl Series {
     }
 
     /// Append the last step of a state.
-    pub fn append(&mut self, scene: &Scene, layout: &ContactLayout, input: &Input, state: &State) {
+    ///
+    /// # Errors
+    /// Without memory for its contacts.
+    pub fn append(
+        &mut self,
+        scene: &Scene,
+        layout: &ContactLayout,
+        input: &Input,
+        state: &State,
+    ) -> Result<(), TryReserveError> {
         let output = state.output();
         self.steps += 1;
         self.time.push(output.time_s);
@@ -83,11 +96,15 @@ impl Series {
             points.extend(reading.position.to_array());
             displacements.extend(reading.displacement.to_array());
         }
-        self.energy.push(output.energy.named().map(|(_, value)| value));
+        for (terms, (_, value)) in self.energy.iter_mut().zip(output.energy.named()) {
+            terms.push(value);
+        }
         self.unsolved.push(i64::from(output.status.unsolved_islands));
         if let Some(rows) = &mut self.contacts {
+            rows.try_reserve(layout.row_bytes() * output.contacts.len())?;
             output.contacts.iter().for_each(|contact| layout.append(output.time_s, contact, rows));
         }
+        Ok(())
     }
 
     /// Arrays by name, which take the memory of the numbers.
@@ -120,14 +137,20 @@ impl Series {
         set("probe_displacements", displacements, &[probes, 3])?;
         dict.set_item("unsolved_islands", numpy::PyArray1::from_vec(py, self.unsolved))?;
         let energy = PyDict::new(py);
-        for (at, (name, _)) in palpate::EnergyLedger::default().named().into_iter().enumerate() {
-            let numbers = self.energy.iter().map(|terms| terms[at]).collect();
-            energy.set_item(name, array(py, numbers, &[steps])?)?;
+        for (terms, (name, _)) in self.energy.into_iter().zip(palpate::EnergyLedger::default().named()) {
+            energy.set_item(name, array(py, terms, &[steps])?)?;
         }
         dict.set_item("energy", energy)?;
         if let Some(rows) = self.contacts {
-            dict.set_item("contacts", layout.array(py, rows)?)?;
+            dict.set_item("contacts", layout.array(py, rows, false)?)?;
         }
         Ok(dict)
     }
+}
+
+/// Empty list with room for a number of items.
+fn with_room<T>(count: usize) -> Result<Vec<T>, TryReserveError> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count)?;
+    Ok(list)
 }

@@ -4,22 +4,24 @@
 
 use crate::arrays::{array, flat, pose_row, twist_row};
 use crate::contacts::ContactLayout;
+use crate::device_mode::{ModeChange, mode_name};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error};
 use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
-
-use crate::run_state::{RunState, Snapshot, run_part};
+use crate::run_length::count_steps;
+use crate::run_state::{RunState, StepFailure, held_points, run_part};
 use crate::scene::Scene;
 use crate::series::Series;
+use crate::snapshot::Snapshot;
+use crate::starts::Starts;
 use glam::DVec3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use palpate::{DeviceMode, Grasp, Output};
+use palpate::Output;
 use palpate_fem::check_memory;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::collections::TryReserveError;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
-
-/// Largest number of steps of one `run`: a day at 1 kHz.
-const MAX_STEPS: f64 = 1e8;
 
 /// Simulation of a scene: its state, stepped from Python.
 ///
@@ -41,7 +43,8 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    fn with(py: Python<'_>, scene: Py<Scene>, run: RunState) -> PyResult<Self> {
+    /// Simulation that goes on from a state.
+    pub fn with(py: Python<'_>, scene: Py<Scene>, run: RunState) -> PyResult<Self> {
         let inner = Arc::clone(&scene.get().inner);
         let forces = PyArray2::zeros(py, [inner.devices.len(), 3], false).unbind();
         let layout = ContactLayout::new(&inner);
@@ -50,7 +53,18 @@ impl Simulation {
         Ok(made)
     }
 
+    /// State that is whole.
     fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, RunState>> {
+        let run = self.lock_any(py)?;
+        match run.has_panicked() {
+            None => Ok(run),
+            Some(failure) => Err(failure
+                .exception(py, "an earlier step ended in the middle: reset() or restore() a snapshot; ")),
+        }
+    }
+
+    /// State, also one that a panic has left.
+    fn lock_any(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, RunState>> {
         match self.run.try_lock() {
             Ok(guard) => Ok(guard),
             // A panic is caught before it passes the guard.
@@ -82,41 +96,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Number of steps of a run, by the motions or the arguments.
-    fn count_steps(
-        &self,
-        py: Python<'_>,
-        motion: &SeriesMotion,
-        steps: Option<i64>,
-        duration: Option<f64>,
-    ) -> PyResult<usize> {
-        let step_s = self.inner.model.parameters().step_s;
-        let refused = |message: String| Err(input_error(py, message));
-        let count = match (motion.steps, steps, duration) {
-            (Some(given), None, None) => return Ok(given),
-            (Some(_), ..) => {
-                return refused("the motions have a row per step: leave steps and duration out".into());
-            }
-            (None, Some(_), Some(_)) => return refused("give steps or duration, not both".into()),
-            (None, Some(steps), None) => steps as f64,
-            (None, None, Some(duration)) => (duration / step_s).round(),
-            (None, None, None) if self.inner.end_s() > 0.0 => {
-                let done = self.steps_done(py)?;
-                ((self.inner.end_s() / step_s).round() - done as f64).max(0.0)
-            }
-            (None, None, None) => {
-                return refused("the scene has no path that ends: give positions, steps or duration".into());
-            }
-        };
-        if (0.0..=MAX_STEPS).contains(&count) {
-            Ok(count as usize)
-        } else {
-            refused(format!("the run has {count} steps of {step_s} s, expected 0 to {MAX_STEPS}"))
-        }
-    }
-
-    fn steps_done(&self, py: Python<'_>) -> PyResult<u64> {
-        Ok(self.lock(py)?.steps)
+    fn change(&self, py: Python<'_>, change: ModeChange) -> PyResult<()> {
+        change.apply(&self.inner, &mut *self.lock(py)?).map_err(|text| input_error(py, text))
     }
 
     /// Array of rows, one for each item of the output.
@@ -181,9 +162,9 @@ impl Simulation {
         let mut run = self.lock(py)?;
         run.follow_paths(&self.inner);
         write_step(py, &self.inner, &Arguments { positions, obstacles, clamps }, &mut run.input)?;
-        let stepped = catch_panic(|| run.step(&self.inner)).map_err(|text| internal_error(py, &text))?;
+        let stepped = run.step(&self.inner);
         self.write_forces(py, run.state.output())?;
-        stepped.map_err(|text| exception(py, Class::Step, text))?;
+        stepped.map_err(|failure| failure.exception(py, ""))?;
         Ok(self.forces.clone_ref(py))
     }
 
@@ -213,7 +194,15 @@ impl Simulation {
     /// Raises
     /// ------
     /// KeyboardInterrupt
-    ///     If Ctrl-C is pressed meanwhile; the simulation stays where it is. Other threads run meanwhile, too.
+    ///     If Ctrl-C is pressed meanwhile; the simulation stays after the last step. Other threads run meanwhile, too.
+    /// StepError
+    ///     If the hands moved too far in one step to be followed.
+    /// MemoryError
+    ///     If there is no room for the series.
+    ///
+    /// Notes
+    /// -----
+    /// A run that an exception ends leaves the series of its steps in the attribute `series` of the exception.
     #[pyo3(signature = (positions=None, *, steps=None, duration=None, obstacles=None, clamps=None, contacts=false))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn run<'py>(
@@ -227,29 +216,44 @@ impl Simulation {
         contacts: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = SeriesMotion::read(py, &self.inner, &Arguments { positions, obstacles, clamps })?;
-        let count = self.count_steps(py, &motion, steps, duration)?;
+        let count = count_steps(&self.inner, self.lock(py)?.steps, motion.steps, (steps, duration))
+            .map_err(|text| input_error(py, text))?;
         check_memory(count as f64 * Series::bytes_per_step(&self.inner)).map_err(|error| {
             input_error(py, format!("the series of {count} steps: {error}; run fewer at a time"))
         })?;
         let mut guard = self.lock(py)?;
         let (run, scene, layout) = (&mut *guard, &*self.inner, &self.layout);
-        let mut series = Series::new(scene, count, contacts);
+        let no_memory =
+            |error: TryReserveError| PyMemoryError::new_err(format!("the series of {count} steps: {error}"));
+        let mut series = Series::new(scene, count, contacts).map_err(no_memory)?;
         let mut done = 0;
-        while done < count {
+        let failure = loop {
             let part = py.detach(|| {
                 catch_panic(|| {
                     run_part(scene, run, &motion, done..count, |input, state| {
-                        series.append(scene, layout, input, state);
+                        series.append(scene, layout, input, state).map_err(StepFailure::Memory)
                     })
                 })
             });
             // The forces are those of the last step, however the run ends.
             self.write_forces(py, run.state.output())?;
-            let part = part.map_err(|text| internal_error(py, &text))?;
-            done = part.map_err(|text| exception(py, Class::Step, text))?;
-            py.check_signals()?;
+            match part.unwrap_or_else(|text| Err(StepFailure::Panic(text))) {
+                Ok(next) if next == count => break None,
+                Ok(next) => done = next,
+                Err(failure) => break Some(failure.exception(py, "")),
+            }
+            if let Err(interrupt) = py.check_signals() {
+                break Some(interrupt);
+            }
+        };
+        let series = series.into_dict(py, scene, layout)?;
+        match failure {
+            None => Ok(series),
+            Some(error) => {
+                error.value(py).setattr("series", series)?;
+                Err(error)
+            }
         }
-        series.into_dict(py, scene, layout)
     }
 
     /// Time at the end of the last step [s].
@@ -311,7 +315,7 @@ impl Simulation {
         let run = self.lock(py)?;
         let output = run.state.output();
         output.contacts.iter().for_each(|contact| self.layout.append(output.time_s, contact, &mut rows));
-        self.layout.array(py, rows)
+        self.layout.array(py, rows, false)
     }
 
     /// Energy ledger of the scene [J], by name (docs/scene.md).
@@ -366,20 +370,7 @@ impl Simulation {
     /// Points that devices hold or exert forces on [m, world]: float64 of shape (devices, 3), NaN for tips. Start a hand there.
     fn held_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let run = self.lock(py)?;
-        let (model, state) = (&self.inner.model, &run.state);
-        let held = |mode: &DeviceMode| {
-            let grasp = match mode {
-                DeviceMode::Held(grasp) => *grasp,
-                DeviceMode::Force(applied) => applied.grasp,
-                _ => return DVec3::NAN,
-            };
-            let Grasp { object, point } = grasp;
-            let Some(recording) = model.recordings().nth(object) else { return DVec3::NAN };
-            let moved = state.point_displacement(model, object, &point);
-            let pose = state.output().objects[object].pose;
-            pose.world_from_body(recording.surface.rest_position(&point) + moved)
-        };
-        let points = self.inner.devices.iter().map(|device| held(&device.mode));
+        let points = held_points(&self.inner, &run);
         array(py, flat(points), &[self.inner.devices.len(), 3])
     }
 
@@ -400,17 +391,86 @@ impl Simulation {
                 "the snapshot is of another scene: restore it in a simulation of the same Scene object",
             ));
         }
-        let mut run = self.lock(py)?;
+        let mut run = self.lock_any(py)?;
         run.clone_from(&snapshot.run);
         self.write_forces(py, run.state.output())
     }
 
     /// Go back to the start of the scene.
-    fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        let fresh = py.detach(|| catch_panic(|| RunState::new(&self.inner)));
-        let mut run = self.lock(py)?;
-        *run = fresh.map_err(|text| internal_error(py, &text))?;
+    ///
+    /// Parameters
+    /// ----------
+    /// poses : array_like, optional
+    ///     Centres of mass [m, world] and orientations of the objects at the start, shape (objects, 7): x, y, z, qw, qx, qy, qz. Without it
+    ///     those of the scene. Objects with fixed nodes, or on a table, start where the scene says.
+    /// velocities : array_like, optional
+    ///     Velocities [m/s] and angular velocities [rad/s, world] at the start, shape (objects, 6), likewise.
+    #[pyo3(signature = (*, poses=None, velocities=None))]
+    fn reset(
+        &self,
+        py: Python<'_>,
+        poses: Option<&Bound<'_, PyAny>>,
+        velocities: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let starts = Starts::read(py, &self.inner, None, (poses, velocities))?;
+        let fresh = py.detach(|| catch_panic(|| RunState::at(&self.inner, starts.of(0))));
+        let mut run = self.lock_any(py)?;
+        let fresh = fresh.map_err(|text| internal_error(py, &text))?;
+        *run = fresh.map_err(|text| input_error(py, text))?;
         self.write_forces(py, run.state.output())
+    }
+
+    /// Let a device take hold of a point, from the next step on.
+    ///
+    /// Parameters
+    /// ----------
+    /// device : str or int
+    ///     Name or number.
+    /// object : str or int
+    ///     Name or number of the object.
+    /// point : (3,) array_like
+    ///     Point near the surface [m, body frame]: the nearest material point is held. Without a coupling it goes to the hand's position in the
+    ///     first step: take a point where the hand is.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     If there is no surface near the point, its nodes are fixed, or another device holds it.
+    fn grasp(
+        &self,
+        py: Python<'_>,
+        device: &Bound<'_, PyAny>,
+        object: &Bound<'_, PyAny>,
+        point: [f64; 3],
+    ) -> PyResult<()> {
+        self.change(py, ModeChange::grasp(&self.inner, device, object, point)?)
+    }
+
+    /// Let a device let go of its point, from the next step on: it touches with its tip. That of a device which the scene has as `"held"` is a
+    /// point without friction.
+    ///
+    /// Parameters
+    /// ----------
+    /// device : str or int
+    ///     Name or number.
+    fn release(&self, py: Python<'_>, device: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.change(py, ModeChange::release(&self.inner, device)?)
+    }
+
+    /// Take a device out of the scene, from the next step on, until it grasps or is released: it passes through everything.
+    ///
+    /// Parameters
+    /// ----------
+    /// device : str or int
+    ///     Name or number.
+    fn deactivate(&self, py: Python<'_>, device: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.change(py, ModeChange::deactivate(&self.inner, device)?)
+    }
+
+    /// Modes of the devices in the next step: "touch", "held", "force" or "inactive".
+    #[getter]
+    fn modes(&self, py: Python<'_>) -> PyResult<Vec<&'static str>> {
+        Ok(self.lock(py)?.modes.iter().map(mode_name).collect())
     }
 
     /// Simulation that goes on from the same state by itself.

@@ -1,5 +1,9 @@
 """Exceptions: every mistake has its class, and a text that says what to do; nothing panics."""
 
+import errno
+import subprocess
+import sys
+
 import numpy as np
 import palpate
 import pytest
@@ -38,6 +42,55 @@ def test_positions_that_cannot_be_used_move_nothing(held, given, text):
     simulation = palpate.Simulation(held)
     assert refusal(palpate.InputError, lambda: simulation.step(given)) == text
     assert simulation.time == 0 and not simulation.forces.any()
+
+
+def test_a_series_that_stops_early_is_in_the_exception(held):
+    simulation = palpate.Simulation(held)
+    hands = np.repeat(simulation.held_points()[None], 20, axis=0)
+    hands[12] += 1e4  # m, within one step
+    with pytest.raises(palpate.StepError, match="at 0.013000 s the held points can't be met") as caught:
+        simulation.run(hands)
+    series = caught.value.series
+    assert np.array_equal(series["time"], np.arange(1, 13) * 1e-3) and caught.value.rows is None
+
+
+# A process that may have 0.4 GB more than it has, and a run whose series take 0.8 GB.
+LIMITED = """
+import resource, sys
+import palpate
+cube = palpate.Recording.open(sys.argv[1])
+simulation = palpate.Simulation(palpate.Scene([palpate.Object("cube", cube)]))
+with open("/proc/self/statm") as file:
+    now = int(file.read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (now + 400_000_000, now + 400_000_000))
+try:
+    simulation.run(steps=int(sys.argv[2]))
+except MemoryError as error:
+    print(type(error).__name__, error)
+print(len(simulation.run(steps=3)["time"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space are Linux'")
+def test_a_series_without_room_is_a_memory_error(folder):
+    # 208 bytes a step.
+    steps = 4_000_000
+    command = [sys.executable, "-c", LIMITED, folder / "cube.palp", steps]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    first, last = done.stdout.splitlines()
+    assert first.startswith(f"MemoryError the series of {steps} steps: memory allocation failed")
+    assert last == "3"
+
+
+def test_arrays_at_odd_addresses_are_copied(held):
+    simulation = palpate.Simulation(held)
+    hand = simulation.held_points()
+    odd = np.zeros(hand.nbytes + 1, np.uint8)[1:].view(np.float64).reshape(hand.shape)
+    odd[:] = hand + 1e-4
+    assert not odd.flags.aligned and odd.flags.c_contiguous
+    twin = simulation.copy()
+    assert np.array_equal(simulation.step(odd), twin.step(hand + 1e-4)) and simulation.forces.any()
 
 
 def test_rows_of_other_lengths_are_no_array(held):
@@ -136,6 +189,19 @@ def test_missing_files_are_file_errors(tmp_path, cube):
     ]:
         assert refusal(palpate.FileError, call).startswith(text)
     assert issubclass(palpate.FileError, OSError) and issubclass(palpate.InputError, ValueError)
+    for name, call in [
+        ("no.palp", lambda: palpate.Recording.open(tmp_path / "no.palp")),
+        ("no.toml", lambda: palpate.Scene.load(tmp_path / "no.toml")),
+        ("no.mcap", lambda: palpate.Log(tmp_path / "no.mcap")),
+        ("no.txt", lambda: palpate.record(BOX, materials=tmp_path / "no.txt")),
+    ]:
+        with pytest.raises(OSError) as caught:
+            call()
+        assert caught.value.errno == errno.ENOENT and caught.value.filename == str(tmp_path / name) == caught.value.file
+    # A folder is refused by palpate, not by the system.
+    with pytest.raises(palpate.FileError, match="it is a folder, not a file") as caught:
+        palpate.Recording.open(tmp_path)
+    assert caught.value.errno is None and caught.value.filename == str(tmp_path)
     assert refusal(palpate.MeshError, lambda: palpate.record(tmp_path / "no.msh", **BODY)).startswith("cannot read mesh ")
 
 
@@ -167,6 +233,10 @@ def test_damaged_files_are_refused(tmp_path, cube):
         ({"spring": "x"}, palpate.MeshError, "expected 'STIFFNESS: NODES'"),
         ({"residual": "some"}, palpate.InputError, "residual is 'some', expected"),
         ({"residual": float("nan")}, palpate.RecordingError, ""),
+        ({"merge_nodes": "some"}, palpate.InputError, 'merge_nodes is "some", expected "auto", "always" or "never"'),
+        ({"piece": 0}, palpate.InputError, 'piece is 0, expected "largest", or a number from 1'),
+        ({"piece": 7}, palpate.MeshError, "box:0.1x0.1x0.1/1x1x1: "),
+        ({"materials": []}, palpate.InputError, "give materials, or material"),
         ({"precision": "half"}, palpate.InputError, 'precision is "half", expected "compact" or "full"'),
         ({"rayleigh": (1, 1), "damping_ratio": 0.1}, palpate.InputError, "give rayleigh or damping_ratio, not both"),
         ({"damping_ratio": -1}, palpate.RecordingError, ""),
@@ -175,6 +245,16 @@ def test_damaged_files_are_refused(tmp_path, cube):
 )
 def test_options_of_a_recording_are_checked(options, kind, text):
     assert text in refusal(kind, lambda: palpate.record(BOX, **{**BODY, **options}))
+
+
+def test_tables_of_materials_are_checked():
+    for materials, kind, text in [
+        ({"young": 1}, palpate.InputError, "materials is {'young': 1}, expected a file, or a list of dicts"),
+        (["liver"], palpate.InputError, "materials has 'liver', expected a dict"),
+        ([{"region": "skin", "name": "liver"}], palpate.RecordingError, "materials: "),
+        ([{"colour": 3}], palpate.RecordingError, "materials: "),
+    ]:
+        assert text in refusal(kind, lambda materials=materials: palpate.record(BOX, materials=materials))
 
 
 def test_meshes_of_arrays_are_checked():

@@ -85,6 +85,63 @@ def test_bodies_are_fixed_and_named_as_on_the_command_line():
     assert sprung.is_fixed and sprung.frequencies[0] < bar.frequencies[-1]
 
 
+# Two tetrahedra of 1/6000 m³ that do not touch, and one of 1/750 m³ on the same corner as the second; skin and bone by number.
+MESH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+12
+1 0 0 0
+2 0.1 0 0
+3 0 0.1 0
+4 0 0 0.1
+5 1 0 0
+6 1.1 0 0
+7 1 0.1 0
+8 1 0 0.1
+9 2 0 0
+10 2.2 0 0
+11 2 0.2 0
+12 2 0 0.2
+$EndNodes
+$Elements
+3
+1 4 2 1 1 1 2 3 4
+2 4 2 1 1 5 6 7 8
+3 4 2 2 2 9 10 11 12
+$EndElements
+"""
+
+
+def test_pieces_and_materials_of_regions_are_chosen_as_on_the_command_line(tmp_path):
+    mesh = tmp_path / "three.msh"
+    mesh.write_text(MESH)
+    materials = [
+        {"region": "1", "name": "liver"},
+        {"region": "2", "young": 1e6, "poisson": 0.3, "density": 2000.0},
+    ]
+    options = {"modes": 3, "order": 1}
+    with pytest.raises(palpate.RecordingError, match="three.msh: the mesh is disconnected: 3 pieces"):
+        palpate.record(mesh, materials=materials, **options)
+    first = palpate.record(mesh, materials=materials[:1], piece=2, **options)
+    largest = palpate.record(mesh, materials=materials[1:], piece="largest", **options)
+    assert first.mass == pytest.approx(1060 * 0.1**3 / 6) and largest.mass == pytest.approx(2000 * 0.2**3 / 6)
+    file = tmp_path / "materials.toml"
+    file.write_text('[[material]]\nregion = "2"\nyoung = 1e6\npoisson = 0.3\ndensity = 2000.0\n')
+    assert palpate.record(mesh, materials=file, piece=1, **options).to_bytes() == largest.to_bytes()
+
+
+def test_nodes_on_one_point_are_merged_when_asked():
+    # Two tetrahedra with a face in common, whose nodes are there twice.
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1], [0.1, 0.1, 0.1]])
+    mesh = (corners, [[0, 1, 2, 3], [4, 5, 6, 7]])
+    options = {"young": 1e4, "poisson": 0.3, "density": 1000, "modes": 3, "order": 1}
+    for merge in ["auto", "always"]:
+        assert len(palpate.record(mesh, merge_nodes=merge, **options).positions) == 5
+    with pytest.raises(palpate.RecordingError, match="2 pieces"):
+        palpate.record(mesh, merge_nodes="never", **options)
+
+
 def test_progress_is_told_by_stage():
     stages = {}
     palpate.record(

@@ -1,5 +1,9 @@
 """Scenes of files, texts and dataclasses: one parser, one set of messages."""
 
+import dataclasses
+import pickle
+import warnings
+
 import numpy as np
 import palpate
 import pytest
@@ -91,3 +95,71 @@ def test_gravity_and_bases_follow_rows():
     series = palpate.Simulation(scene).run()
     assert len(series["time"]) == 1000
     assert np.allclose(series["poses"][-2, 0, 0], 0.1, atol=1e-3)
+
+
+def test_a_saved_scene_is_the_same_for_python_and_the_command_line(cube, tmp_path, palpate_run):
+    rows = np.array([[0, 0, 0, 0.06], [0.05, 0.01, 0, 0.048]])
+    folder, other = tmp_path / "one", tmp_path / "two"
+    folder.mkdir(), other.mkdir()
+    cube.save(folder / "file.palp")
+    scene = palpate.Scene(
+        [
+            palpate.Object("first", cube),
+            palpate.Object("second", cube, position=[0.3, 0, 0]),
+            palpate.Object("third", "file.palp", position=[0, 0.3, 0]),
+        ],
+        devices=[palpate.Device("finger", tip_radius=0.005, path=rows)],
+        gravity={"file": [[0, 0, 0, 0], [0.05, 0, 0, -1]]},
+        folder=folder,
+    )
+    expected = palpate.Simulation(scene).run()
+    scene.save(other / "scene.toml")
+    # Objects that share a recording share its file; the one that was a file still is.
+    names = ["scene-device-finger.csv", "scene-gravity.csv", "scene-object-first.palp", "scene.toml"]
+    assert sorted(path.name for path in other.iterdir()) == names
+    loaded = palpate.Scene.load(other / "scene.toml")
+    again = palpate.Simulation(loaded).run()
+    assert np.array_equal(again["poses"], expected["poses"]) and expected["forces"].any()
+    palpate_run("run", other / "scene.toml", "--csv", other / "out.csv")
+    table = np.genfromtxt(other / "out.csv", delimiter=",", names=True, deletechars="")
+    assert np.array_equal(table["finger.fz"], expected["forces"][:, 0, 2])
+    # A scene of a file may be saved elsewhere, too, and a second time in its place.
+    loaded.save(folder / "moved.toml")
+    assert "../two/scene-object-first.palp" in (folder / "moved.toml").read_text()
+    assert np.array_equal(palpate.Simulation(palpate.Scene.load(folder / "moved.toml")).run()["poses"], expected["poses"])
+    text = (other / "scene.toml").read_text()
+    loaded.save(other / "scene.toml")
+    assert (other / "scene.toml").read_text() == text
+    with pytest.raises(palpate.FileError, match="cannot write .*none/scene.toml: there is no folder"):
+        loaded.save(tmp_path / "none" / "scene.toml")
+
+
+def test_scenes_are_pickled_with_all_that_is_in_memory(cube):
+    scene = palpate.Scene(
+        [palpate.Object("cube", cube)],
+        planes=[palpate.Plane(name="floor", point=[0, 0, 0], normal=[0, 0, 1])],
+        devices=[palpate.Device("finger", path=[[0, 0, 0, 0.06], [0.02, 0, 0, 0.045]])],
+    )
+    with warnings.catch_warnings():
+        # The cube begins in the floor, as was said before.
+        warnings.simplefilter("error")
+        again = pickle.loads(pickle.dumps(scene))
+    assert type(again) is palpate.Scene and again.toml == scene.toml
+    assert np.array_equal(palpate.Simulation(again).run()["forces"], palpate.Simulation(scene).run()["forces"])
+
+
+def test_parts_are_those_classes_and_their_heirs(cube):
+    class Object(palpate.Object):
+        """Body with a default friction of its own."""
+
+        def __init__(self, name, recording):
+            super().__init__(name, recording, friction=0.25)
+
+    assert "friction = 0.25" in palpate.Scene([Object("cube", cube)]).toml
+
+    @dataclasses.dataclass
+    class Device:
+        name: str
+
+    with pytest.raises(palpate.InputError, match="devices has .*Device.*, expected palpate.Device"):
+        palpate.Scene([palpate.Object("cube", cube)], devices=[Device("finger")])

@@ -268,3 +268,71 @@ def test_step_returns_one_array_that_it_writes_over(held):
     simulation.step((hand + [1e-4, 0, 0]).tolist())
     simulation.step(hand.astype(np.float32))
     simulation.step(np.repeat(hand, 2, axis=0)[::2])
+
+
+def test_a_hand_grasps_moves_lets_go_and_leaves(cube):
+    scene = palpate.Scene([palpate.Object("cube", cube)], devices=[palpate.Device("hand", tip_radius=0.01, patch_radius=0.03)])
+    simulation = palpate.Simulation(scene)
+    assert simulation.modes == ["touch"]
+    simulation.grasp("hand", "cube", [0.0501, 0, 0])
+    assert np.allclose(simulation.held_points(), [[0.05, 0, 0]]) and simulation.modes == ["held"]
+    hand = simulation.held_points()
+    impulse = np.zeros(3)
+    for _ in range(100):
+        hand[0, 0] += 1e-4
+        impulse -= simulation.step(hand)[0] * scene.step
+    # Held: the point goes with the hand, and the cube has the momentum that it gave.
+    assert np.allclose(simulation.held_points(), hand, atol=1e-9)
+    assert impulse[0] > 0.05 and np.allclose(cube.mass * simulation.velocities[0, :3], impulse, atol=1e-12)
+    before = simulation.snapshot()
+    simulation.release(0)
+    away = hand + [0.1, 0, 0]
+    assert not simulation.step(away).any() and simulation.modes == ["touch"]
+    # It touches: a tip that comes back presses.
+    simulation.step(simulation.poses[:, :3] + [0.065, 0, 0])
+    assert simulation.step(simulation.poses[:, :3] + [0.059, 0, 0])[0, 0] > 0
+    simulation.deactivate("hand")
+    # It passes through, and neither gets nor gives.
+    speed = simulation.velocities[0, 0]
+    assert not simulation.step(simulation.poses[:, :3] + [0.055, 0, 0]).any()
+    assert simulation.velocities[0, 0] == speed and simulation.modes == ["inactive"]
+    # Modes go with snapshots, and back to the scene's.
+    simulation.restore(before)
+    assert simulation.modes == ["held"]
+    simulation.reset()
+    assert simulation.modes == ["touch"]
+
+
+def test_a_device_with_a_path_keeps_the_mode_that_it_is_given(cube):
+    rows = [[0, 0.05, 0, 0], [0.1, 0.06, 0, 0]]
+    scene = palpate.Scene([palpate.Object("cube", cube)], devices=[palpate.Device("hand", path=rows)])
+    simulation = palpate.Simulation(scene)
+    simulation.grasp("hand", "cube", [0.05, 0, 0])
+    simulation.run()
+    assert simulation.modes == ["held"] and simulation.held_points()[0, 0] == pytest.approx(0.06)
+
+
+def test_grasps_that_cannot_be_are_refused(cube):
+    hands = [palpate.Device("left"), palpate.Device("right")]
+    load = palpate.Device("load", mode="force", attach={"object": "cube", "point": [0, 0, 0.05]}, path=[[0, 0, 0, 0], [1, 0, 0, 1]])
+    simulation = palpate.Simulation(palpate.Scene([palpate.Object("cube", cube)], devices=[*hands, load]))
+    simulation.grasp("left", "cube", [0.05, 0, 0])
+    for call, text in [
+        (lambda: simulation.grasp("right", "cube", [0.05, 0, 0]), 'device "left" holds the same point'),
+        (lambda: simulation.grasp("right", "cube", [0.5, 0, 0]), "is 0.4500 m from the surface of \"cube\", at most 0.0087 m"),
+        (lambda: simulation.grasp("right", "cube", [np.nan, 0, 0]), "expected finite numbers"),
+        (lambda: simulation.grasp("right", "ball", [0, 0, 0.05]), "there is no object ball; the scene has cube"),
+        (lambda: simulation.release("middle"), "there is no device middle; the scene has left, right, load"),
+        (lambda: simulation.release(3), "there is no device 3"),
+        (lambda: simulation.release("load"), 'device "load" has a path of forces'),
+    ]:
+        with pytest.raises(palpate.InputError) as caught:
+            call()
+        assert text in str(caught.value)
+    assert simulation.modes == ["held", "touch", "force"]
+    simulation.deactivate("load")
+    assert simulation.modes[2] == "inactive"
+    bar = palpate.record("box:0.2x0.05x0.05/4x1x1", material="rubber", modes=10, fix="x<-0.099")
+    fixed = palpate.Simulation(palpate.Scene([palpate.Object("bar", bar)], devices=[palpate.Device("hand")]))
+    with pytest.raises(palpate.InputError, match='of "bar" cannot be held'):
+        fixed.grasp("hand", "bar", [-0.1, 0, 0])

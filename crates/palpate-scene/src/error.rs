@@ -1,5 +1,6 @@
 //! Errors of scenes: kind, file, line, key and message.
 
+use palpate_export::ExportError;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,8 @@ pub struct SceneError {
     pub key: Option<String>,
     /// Message for people: lower case, no full stop.
     pub message: String,
+    /// Number of the operating system's error, if it was the one that refused.
+    pub os_error: Option<i32>,
 }
 
 /// Kind of a [`SceneError`].
@@ -76,7 +79,7 @@ impl fmt::Display for SceneError {
 impl SceneError {
     /// Error without a place.
     pub fn new(kind: SceneErrorKind, message: impl fmt::Display) -> Self {
-        Self { kind, file: None, line: None, key: None, message: message.to_string() }
+        Self { kind, file: None, line: None, key: None, message: message.to_string(), os_error: None }
     }
 
     /// Error of a file, which the message names.
@@ -86,12 +89,17 @@ impl SceneError {
 
     /// Error of the operating system.
     pub(crate) fn io(action: &str, file: &Path, error: &io::Error) -> Self {
-        Self::of_file(SceneErrorKind::Io, file, format!("cannot {action} {}: {error}", file.display()))
+        let message = format!("cannot {action} {}: {error}", file.display());
+        Self { os_error: error.raw_os_error(), ..Self::of_file(SceneErrorKind::Io, file, message) }
     }
 }
 
-impl From<palpate_export::ExportError> for SceneError {
-    fn from(error: palpate_export::ExportError) -> Self {
-        Self::new(SceneErrorKind::Io, error)
+impl From<ExportError> for SceneError {
+    fn from(error: ExportError) -> Self {
+        let (file, os_error) = match &error {
+            ExportError::Io { path, source, .. } => (Some(path.clone()), source.raw_os_error()),
+            _ => (None, None),
+        };
+        Self { file, os_error, ..Self::new(SceneErrorKind::Io, error) }
     }
 }

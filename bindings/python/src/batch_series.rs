@@ -1,0 +1,53 @@
+//! Series of a run of a batch. Each row makes some steps while its state is in the cache.
+
+use crate::batch_motion::BatchMotion;
+use crate::batch_rows::Row;
+use palpate_scene::Scene;
+use rayon::prelude::*;
+use std::collections::TryReserveError;
+
+/// Number of steps that a row makes at once: a thousand rows take some hundredths of a second for them, after which Python is asked for signals.
+const STEPS_AT_ONCE: usize = 16;
+
+/// Numbers of the steps of all rows.
+pub struct BatchSeries {
+    /// Numbers of a row, step by step; row by row.
+    pub numbers: Vec<f64>,
+    steps: usize,
+    /// Numbers of a row in a step.
+    length: usize,
+    done: usize,
+}
+
+impl BatchSeries {
+    /// Series with room for a number of steps of a number of rows.
+    pub fn new(rows: usize, steps: usize, length: usize) -> Result<Self, TryReserveError> {
+        let count = rows.saturating_mul(steps).saturating_mul(length);
+        let mut numbers = Vec::new();
+        numbers.try_reserve_exact(count)?;
+        numbers.resize(count, 0.0);
+        Ok(Self { numbers, steps, length, done: 0 })
+    }
+
+    /// Number of steps that all rows have made.
+    pub fn done(&self) -> usize {
+        self.done
+    }
+
+    /// Let all rows make the next steps, on the threads that it is called on; gives the rows that failed, in their order.
+    pub fn run_part(&mut self, scene: &Scene, motion: &BatchMotion, rows: &mut [Row]) -> Vec<usize> {
+        let (length, from) = (self.length, self.done);
+        let to = self.steps.min(from + STEPS_AT_ONCE);
+        self.done = to;
+        let run_row = |at: usize, row: &mut Row, numbers: &mut [f64]| {
+            let mut has_failed = false;
+            for step in from..to {
+                has_failed |= row.step(scene, motion, (step, at));
+                row.fill(&mut numbers[step * length..][..length]);
+            }
+            has_failed.then_some(at)
+        };
+        let each = rows.par_iter_mut().zip(self.numbers.par_chunks_mut(self.steps * length)).enumerate();
+        each.filter_map(|(at, (row, numbers))| run_row(at, row, numbers)).collect()
+    }
+}
