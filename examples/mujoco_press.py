@@ -3,7 +3,7 @@
     pip install mujoco, and palpate's wheel (docs/python.md#install)
     python examples/mujoco_press.py
 
-The liver is an ellipsoid with one flat, thin side and a hollow, 12 cm long, on a table. The finger is a ball of 8 mm on 100 g.
+The liver is an ellipsoid with one flat, thin side and a hollow, 16 cm long, on a table. The finger is a ball of 12 mm radius on 100 g.
 """
 
 import os
@@ -23,8 +23,8 @@ MODEL = """
     <geom name="table" type="plane" size="0.3 0.3 0.01" friction="0.6" rgba="0.7 0.7 0.7 1"/>
     <body name="finger" pos="-0.015 0 0.08">
       <joint name="down" type="slide" axis="0 0 -1" damping="5"/>
-      <geom name="tip" type="sphere" size="0.008" mass="0.1" friction="0.6" rgba="0.2 0.4 0.7 1"/>
-      <geom name="shaft" type="cylinder" fromto="0 0 0 0 0 0.1" size="0.006" mass="0" contype="0" conaffinity="0" rgba="0.2 0.4 0.7 1"/>
+      <geom name="tip" type="sphere" size="0.012" mass="0.1" friction="0.6" rgba="0.2 0.4 0.7 1"/>
+      <geom name="shaft" type="cylinder" fromto="0 0 0 0 0 0.1" size="0.009" mass="0" contype="0" conaffinity="0" rgba="0.2 0.4 0.7 1"/>
       <site name="tip" pos="0 0 0"/>
     </body>
   </worldbody>
@@ -34,14 +34,14 @@ MODEL = """
 """
 
 
-def liver(modes=60, cell_size=0.012):
+def liver(modes=40, cell_size=0.016):
     """Recording of a body like a liver: broad and thick on one side, thin on the other."""
     rows, columns = 12, 24
     polar, around = np.meshgrid(np.pi * np.arange(1, rows) / rows, 2 * np.pi * np.arange(columns) / columns, indexing="ij")
     ring = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1).reshape(-1, 3)
     x, y, z = np.concatenate([ring, [[0, 0, 1], [0, 0, -1]]]).T
-    thickness = 0.022 - 0.008 * x - 0.004 * y**2
-    nodes = np.stack([0.06 * x, 0.04 * y * (1 - 0.25 * x), z * thickness], axis=1)
+    thickness = 0.03 - 0.01 * x - 0.005 * y**2
+    nodes = np.stack([0.08 * x, 0.05 * y * (1 - 0.25 * x), z * thickness], axis=1)
     at = np.arange((rows - 1) * columns).reshape(rows - 1, columns)
     a, b = at[:-1], at[1:]
     next_a, next_b = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
@@ -56,15 +56,15 @@ def liver(modes=60, cell_size=0.012):
         return palpate.record(path, cell_size=cell_size, material="liver", damping_ratio=0.1, modes=modes)
 
 
-def make(wanted_recording=None, timestep=None, **options):
+def make(recording=None, timestep=None, **options):
     """Model, data and soft liver on the table; options of SoftBody."""
     model = mujoco.MjModel.from_xml_string(MODEL)
     if timestep is not None:
         model.opt.timestep = timestep
     data = mujoco.MjData(model)
-    recording = wanted_recording or liver()
+    recording = recording or liver()
     low = recording.positions[:, 2].min()
-    soft = SoftBody(model, data, palpate.Object("liver", recording, position=[0, 0, -low]), sensors=["touch"], **options)
+    soft = SoftBody(model, data, palpate.Object("liver", recording, position=[0, 0, -low]), sensors=["touch"], **{"max_contact_samples": 24, **options})
     return model, data, soft
 
 
@@ -79,7 +79,7 @@ class ForceControl:
         Of the integral [1/s].
     """
 
-    def __init__(self, model, wanted=1.0, gain=3.0):
+    def __init__(self, model, wanted=1.0, gain=5.0):
         self.wanted, self.gain = wanted, gain
         self.weight = model.body("finger").mass[0] * 9.81
         self.integral = 0.0
@@ -88,7 +88,7 @@ class ForceControl:
         """Force of the motor [N]."""
         self.integral += self.gain * (self.wanted - measured) * step
         self.integral = min(max(self.integral, -1.0), 1.0)
-        return self.wanted * 0.5 + self.integral - self.weight
+        return 0.8 * self.wanted + self.integral - self.weight
 
 
 def main():

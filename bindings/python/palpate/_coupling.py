@@ -60,7 +60,8 @@ class RigidCoupling:
     applied : (N, 6) array
         Mean wrenches that moved the bodies in the last step.
     work : (N,) array
-        Work that each body has done on the soft ones so far [J].
+        Work that each body has done on the soft ones so far [J], by the forces and the travel of the bodies at the contacts' points. Their sum is the
+        `input` of :attr:`Simulation.energy` but for a part of the order of the step.
     contacts : structured array
         Contacts of the last substep: those of :attr:`Simulation.contacts`, with `body` and the shape's number `shape`, or -1.
     trials : int

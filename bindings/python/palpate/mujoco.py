@@ -207,7 +207,8 @@ class SoftBody:
                 body = self._bodies[row]
                 mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], data.xipos[body], body, force)
         on_rigid = self.coupling.step * float(force @ (velocity + data.qvel)) / 2
-        on_soft = float(self.coupling.work[self._moving].sum()) - self.work_on_soft
+        driven = self.coupling.work.sum() - self.coupling.work[self._moving].sum()  # by bodies that forces do not move
+        on_soft = float(self.simulation.energy["input"] - driven) - self.work_on_soft
         self.work_on_soft += on_soft
         self.work_on_rigid += on_rigid
         keep = 1 - 1 / _MEMORY
