@@ -3,7 +3,7 @@
     pip install mujoco, and palpate's wheel (docs/python.md#install)
     python examples/mujoco_press.py
 
-The liver is an ellipsoid with one flat, thin side and a hollow, 16 cm long, on a table. The finger is a ball of 12 mm radius on 100 g.
+The liver is an ellipsoid with one flat, thin side and a hollow, 16 cm long, on a table. The finger is a ball of 20 mm radius on 100 g, as a thumb.
 """
 
 import os
@@ -21,15 +21,14 @@ MODEL = """
   <worldbody>
     <light pos="0.3 -0.5 1" dir="-0.3 0.5 -1"/>
     <geom name="table" type="plane" size="0.3 0.3 0.01" friction="0.6" rgba="0.7 0.7 0.7 1"/>
-    <body name="finger" pos="-0.015 0 0.08">
+    <body name="finger" pos="-0.015 0 0.09">
       <joint name="down" type="slide" axis="0 0 -1" damping="5"/>
-      <geom name="tip" type="sphere" size="0.012" mass="0.1" friction="0.6" rgba="0.2 0.4 0.7 1"/>
-      <geom name="shaft" type="cylinder" fromto="0 0 0 0 0 0.1" size="0.009" mass="0" contype="0" conaffinity="0" rgba="0.2 0.4 0.7 1"/>
-      <site name="tip" pos="0 0 0"/>
+      <geom name="tip" type="sphere" size="0.02" mass="0.1" friction="0.6" rgba="0.2 0.4 0.7 1"/>
+      <geom name="shaft" type="cylinder" fromto="0 0 0 0 0 0.1" size="0.015" mass="0" contype="0" conaffinity="0" rgba="0.2 0.4 0.7 1"/>
     </body>
   </worldbody>
   <actuator><motor name="down" joint="down" ctrlrange="-5 5"/></actuator>
-  <sensor><user name="touch" objtype="geom" objname="tip" dim="1"/></sensor>
+  <sensor><user name="touch" objtype="body" objname="finger" dim="3"/></sensor>
 </mujoco>
 """
 
@@ -97,10 +96,10 @@ def main():
     print("  time  measured  contact points  indentation of the tip")
     first = None
     while data.time < 5:
-        measured = data.sensor("touch").data[0]
+        measured = data.sensor("touch").data[2]
         data.ctrl[0] = control.command(measured, model.opt.timestep)
         soft.step()
-        measured = data.sensor("touch").data[0]
+        measured = data.sensor("touch").data[2]
         first = data.qpos[0] if first is None and measured > 0 else first
         if round(data.time / model.opt.timestep) % 250 == 0:
             contacts = (soft.contacts["geom"] == model.geom("tip").id).sum()

@@ -16,7 +16,7 @@ import numpy as np
 from palpate._errors import InputError
 from palpate._interface import Interface
 from palpate._palpate import Simulation, Snapshot
-from palpate._poses import IDENTITY, between, points_in_world, pose_product, quaternion_product, rotated
+from palpate._poses import IDENTITY, between, cross, points_in_world, pose_product, quaternion_product, rotated
 from palpate._scene import Object, Obstacle, Plane, Scene
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class RigidCoupling:
         substeps: int | None = None,
         centers: ArrayLike | None = None,
         moving: ArrayLike | None = None,
-        iterations: int = 20,
+        iterations: int = 10,
         tolerance: float = 1e-3,
         **options: Any,
     ) -> None:
@@ -100,10 +100,11 @@ class RigidCoupling:
         scene = self._scene(objects, shapes, options)
         self.simulation = Simulation(scene)
         self._start = self.simulation.snapshot()
+        self._contact_type = np.dtype([*self.simulation.contacts.dtype.descr, ("body", "i8"), ("shape", "i8")])
         size = max((float(np.ptp(scene.rest_positions(name), axis=0).max()) for name in scene.object_names), default=1.0)
         #: Unknowns of the interface: forces [N], and torques as forces at the size of the objects.
         self._scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
-        self._interface = Interface(6 * int(self._moving.sum()), iterations, tolerance)
+        self._interface = Interface(iterations, tolerance)
         self.reset(poses)
 
     def _scene(self, objects: Iterable[Object | Mapping[str, Any]], shapes: Sequence[Sequence[Obstacle | Plane]], options: dict[str, Any]) -> Scene:
@@ -245,10 +246,10 @@ class RigidCoupling:
             if len(on):
                 force, point, body = -on["force"], on["point"], on["body"]
                 pressing = (force * on["normal"]).sum(axis=1, keepdims=True)
-                np.add.at(self._loads, on["shape"], np.concatenate([force, np.cross(point, force), pressing], axis=1))
+                np.add.at(self._loads, on["shape"], np.concatenate([force, cross(point, force), pressing], axis=1))
                 # Where the bodies' points at the contacts came from.
-                turn = quaternion_product(start[body, 3:], poses[body, 3:] * [1, -1, -1, -1])
-                travel = point - start[body, :3] - rotated(turn, point - poses[body, :3])
+                turn = quaternion_product(start[:, 3:], poses[:, 3:] * [1, -1, -1, -1])
+                travel = point - start[body, :3] - rotated(turn[body], point - poses[body, :3])
                 np.add.at(self._step_work, body, -(force * travel).sum(axis=1))
             start = poses
         self._loads /= self.substeps
@@ -259,7 +260,7 @@ class RigidCoupling:
     def _with_bodies(self, contacts: NDArray[np.void]) -> NDArray[np.void]:
         """Contacts with the columns `body` and `shape`."""
         at = np.minimum(np.searchsorted(self._names, contacts["against"]), max(len(self._names) - 1, 0))
-        wide = np.empty(len(contacts), dtype=[*contacts.dtype.descr, ("body", "i8"), ("shape", "i8")])
+        wide = np.empty(len(contacts), dtype=self._contact_type)
         for name in contacts.dtype.names or ():
             wide[name] = contacts[name]
         wide["body"] = wide["shape"] = -1
@@ -284,7 +285,7 @@ _UNPLACED: dict[type, dict[str, Any]] = {
 def about(wrenches: Array, points: Array) -> Array:
     """Wrenches with their torques about points, of ones about the origin that the points are from."""
     force = wrenches[:, :3]
-    return np.concatenate([force, wrenches[:, 3:] - np.cross(points, force)], axis=1)
+    return np.concatenate([force, wrenches[:, 3:] - cross(points, force)], axis=1)
 
 
 def _local_pose(shape: Obstacle | Plane) -> Array:

@@ -1,7 +1,8 @@
 """Quasi-Newton solution of an interface problem: the wrenches x that return as x from a step that they move.
 
-r(x) = F(x) + d − x = 0, with F the wrenches that contacts answer with and d what is owed from the last step. F is linear but where contacts open or
-close. Broyden's update keeps an estimate of the inverse of dr/dx, which lasts from step to step: H += (Δx − H·Δr)·Δxᵀ·H / (Δxᵀ·H·Δr).
+r(x) = F(x) + d − x = 0, with F the wrenches that contacts answer with and d what is owed from the last step. With the differences V of residuals and W of
+answers y = F + d between trials, of this step and some before it: x' = y + W·c with c the least squares of V·c + r = 0 (interface quasi-Newton with
+least squares, IQN-ILS; Degroote, Bathe and Vierendeels, Computers & Structures 87, 2009).
 """
 
 from __future__ import annotations
@@ -15,30 +16,35 @@ if TYPE_CHECKING:
 
     from palpate._poses import Array
 
-#: Least share of a secant's denominator that an update is made with.
-_CONDITION = 1e-8
+#: Least share of a difference that must be new beside the later ones.
+_NEW = 0.03
+#: Differences that are kept from earlier steps, at most.
+_KEPT = 12
+#: Trials after which differences of earlier steps are dropped: contacts have changed.
+_PATIENCE = 6
 
 
 class Interface:
-    """Estimate of the inverse Jacobian, and the iteration.
+    """Differences between trials, and the iteration.
 
     Parameters
     ----------
-    size : int
-        Number of unknowns.
     iterations : int
         Most evaluations in a step.
     tolerance : float
         Residual, as a share of the wrenches, at which the iteration ends.
     """
 
-    def __init__(self, size: int, iterations: int, tolerance: float) -> None:
-        self.size, self.iterations, self.tolerance = size, iterations, tolerance
+    def __init__(self, iterations: int, tolerance: float) -> None:
+        self.iterations, self.tolerance = iterations, tolerance
+        #: Residual of the last step, as a share of the wrenches.
+        self.residual = 0.0
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew, with relaxation: dr/dx = −1."""
-        self.inverse = -np.eye(self.size)
+        """Begin anew, with relaxation."""
+        #: Differences of residuals and of answers, the latest first.
+        self._differences: list[tuple[Array, Array]] = []
 
     def solve(self, residual: Callable[[Array], tuple[Array, float]], x: Array) -> tuple[int, bool]:
         """Find x with a small residual; the last evaluation is at the x that is kept.
@@ -47,7 +53,7 @@ class Interface:
         ----------
         residual : callable
             Residual at x, and the size of the wrenches there.
-        x : (size,) array
+        x : array
             First guess.
 
         Returns
@@ -55,29 +61,49 @@ class Interface:
         evaluations, is_converged
         """
         r, size = residual(x)
-        best, best_norm = (x, r), self._norm(r)
-        count = 1
-        at_best = True
+        best, best_norm = x, _norm(r)
+        count, at_best = 1, True
         while best_norm > self.tolerance * size and count < self.iterations:
-            x = best[0] - self.inverse @ best[1]
-            r, size = residual(x)
+            if count == _PATIENCE:
+                del self._differences[count - 1 :]
+            x_next = x + r + self._correction(r)
+            r_next, size = residual(x_next)
             count += 1
-            self._update(x - best[0], r - best[1])
-            norm = self._norm(r)
-            at_best = norm < best_norm
+            dr = r_next - r
+            self._differences.insert(0, (dr, x_next - x + dr))
+            x, r = x_next, r_next
+            at_best = _norm(r) < best_norm
             if at_best:
-                best, best_norm = (x, r), norm
+                best, best_norm = x, _norm(r)
         if not at_best:
-            r, size = residual(best[0])
+            r, size = residual(best)
             count += 1
+        del self._differences[_KEPT:]
+        self.residual = best_norm / size
         return count, bool(best_norm <= self.tolerance * size)
 
-    @staticmethod
-    def _norm(r: Array) -> float:
-        return float(np.sqrt(r @ r))
+    def _correction(self, r: Array) -> Array:
+        """W·c with c the least squares of V·c + r = 0, by Gram–Schmidt over the differences that are new, the latest first."""
+        basis: list[Array] = []
+        triangle: list[list[float]] = []
+        answers: list[Array] = []
+        for dr, dy in self._differences:
+            rest, above = dr, []
+            for unit in basis:
+                above.append(float(unit @ rest))
+                rest = rest - above[-1] * unit
+            left = _norm(rest)
+            if left > _NEW * _norm(dr) > 0:
+                basis.append(rest / left)
+                triangle.append([*above, left])
+                answers.append(dy)
+        c = [-float(unit @ r) for unit in basis]
+        for column in reversed(range(len(c))):
+            c[column] /= triangle[column][column]
+            for row in range(column):
+                c[row] -= triangle[column][row] * c[column]
+        return sum((share * dy for share, dy in zip(c, answers)), np.zeros_like(r))
 
-    def _update(self, dx: Array, dr: Array) -> None:
-        step = self.inverse @ dr
-        bottom = float(dx @ step)
-        if abs(bottom) > _CONDITION * self._norm(dx) * self._norm(step):
-            self.inverse += np.outer(dx - step, dx @ self.inverse) / bottom
+
+def _norm(r: Array) -> float:
+    return float(np.sqrt(r @ r))

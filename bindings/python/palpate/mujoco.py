@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 
 try:
-    import mujoco
+    import mujoco  # type: ignore[import-untyped, import-not-found, unused-ignore]
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError("palpate.mujoco needs MuJoCo: pip install mujoco", name=error.name) from error
 
@@ -96,7 +96,7 @@ class SoftBody:
         friction: float | None = None,
         sensors: Iterable[str] = (),
         substeps: int | None = None,
-        iterations: int = 20,
+        iterations: int = 10,
         tolerance: float = 1e-3,
         **options: Any,
     ) -> None:
@@ -231,14 +231,15 @@ class SoftBody:
     @property
     def owed(self) -> Array:
         """Momentum [N·s] that MuJoCo's bodies get in the next step, (3,)."""
-        return self.coupling.owed[self._moving, :3].sum(axis=0)
+        owed: Array = self.coupling.owed[self._moving, :3].sum(axis=0)
+        return owed
 
     @property
     def contacts(self) -> NDArray[np.void]:
         """Contacts at the end of the step: those of :attr:`Simulation.contacts`, with MuJoCo's numbers `body` and `geom`, -1 between soft bodies."""
-        contacts = self.coupling.contacts.copy()
-        names = tuple("geom" if name == "shape" else name for name in contacts.dtype.names or ())
-        contacts.dtype.names = names
+        contacts = self.coupling.contacts
+        renamed = [("geom" if field[0] == "shape" else field[0], *field[1:]) for field in contacts.dtype.descr]
+        contacts = contacts.copy().view(np.dtype(renamed))
         is_rigid = contacts["body"] >= 0
         contacts["body"][is_rigid] = self._bodies[contacts["body"][is_rigid]]
         contacts["geom"][is_rigid] = np.array(self._geoms)[contacts["geom"][is_rigid]]
@@ -254,9 +255,9 @@ class SoftBody:
         """
         if (body is None) == (geom is None):
             raise InputError("give a body or a geom")
-        if geom is not None:
-            return self.coupling.shape_forces[self._geom_row(geom)]
-        return self.coupling.wrenches[self._body_row(body), :3].copy()
+        every = self.coupling.wrenches[:, :3] if geom is None else self.coupling.shape_forces
+        force: Array = every[self._body_row(body) if geom is None else self._geom_row(geom)].copy()
+        return force
 
     def torque(self, body: str | int) -> Array:
         """Mean torque on a body about its centre of mass at the start of the step [N·m, world], (3,)."""
@@ -287,12 +288,13 @@ class SoftBody:
         model, data, coupling = self.model, self.data, self.coupling
         if kind == mujoco.mjtObj.mjOBJ_GEOM:
             row = self._geom_row(number)
-            return coupling.pressing_forces[[row]] if extent == 1 else coupling.shape_forces[row]
+            own: Array = coupling.pressing_forces[[row]] if extent == 1 else coupling.shape_forces[row]
+            return own
         body = int(model.site_bodyid[number]) if kind == mujoco.mjtObj.mjOBJ_SITE else number
         row = self._body_row(body)
         if extent == 1:
             rows = [at for at, geom in enumerate(self._geoms) if model.geom_bodyid[geom] == body]
-            return coupling.pressing_forces[rows].sum(keepdims=True)
+            return np.array([coupling.pressing_forces[rows].sum()])
         force, torque = coupling.wrenches[row, :3], coupling.wrenches[row, 3:]
         if kind == mujoco.mjtObj.mjOBJ_SITE:
             frame = data.site_xmat[number].reshape(3, 3)
