@@ -1,5 +1,8 @@
 """palpate.RigidCoupling: soft bodies among the rigid ones of another engine, here a few lines of NumPy."""
 
+import importlib
+import pathlib
+
 import numpy as np
 import palpate
 import pytest
@@ -187,3 +190,10 @@ def test_wrong_arguments_say_what_is_expected(cube):
     coupling = palpate.RigidCoupling(objects, shapes, poses, step=0.001)
     with pytest.raises(palpate.InputError, match="not finite"):
         coupling.follow([[np.nan, 0, 0, 1, 0, 0, 0]])
+
+
+def test_newton_moves_the_ball_of_the_example(monkeypatch, capsys):
+    pytest.importorskip("newton", reason="Newton is not installed: pip install newton")
+    monkeypatch.syspath_prepend(str(pathlib.Path(__file__).parents[3] / "examples"))
+    importlib.import_module("newton_ball").main()
+    assert float(capsys.readouterr().out.split("off by ")[1].split()[0]) < 1e-6
