@@ -3,7 +3,7 @@
     pip install mujoco, and palpate's wheel (docs/python.md#install)
     python examples/mujoco_press.py
 
-The liver is an ellipsoid with one flat, thin side and a hollow, 16 cm long, on a table. The finger is a ball of 20 mm radius on 100 g, as a thumb.
+The liver is an ellipsoid that is thin on one side, 16 cm long, on a table. The finger is a ball of 20 mm radius on 100 g, as a thumb.
 """
 
 import os
