@@ -10,6 +10,7 @@ Lengths are metres, times seconds, forces newtons; vectors are in world axes. A 
 a file (:meth:`Recording.open`); a :class:`Scene` puts recordings among planes, obstacles and devices; a :class:`Simulation` steps it, a :class:`Batch` many of it.
 """
 
+from palpate._coupling import RigidCoupling
 from palpate._errors import (
     FileError,
     InputError,
@@ -41,6 +42,7 @@ __all__ = [
     "Probe",
     "Recording",
     "RecordingError",
+    "RigidCoupling",
     "Scene",
     "SceneError",
     "Simulation",

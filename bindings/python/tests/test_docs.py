@@ -1,4 +1,4 @@
-"""Code blocks of docs/python.md and of the package's README, run as a reader would."""
+"""Code blocks of docs/python.md, docs/mujoco.md and of the package's README, run as a reader would."""
 
 import pathlib
 import re
@@ -67,8 +67,27 @@ def test_the_code_of_the_readme_runs(reader, capsys):
     assert len(capsys.readouterr().out.split()) >= 7
 
 
-def test_links_of_the_page_lead_somewhere():
-    text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+def test_the_code_of_the_mujoco_page_runs(reader, capsys):
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
+    names = {}
+    found = blocks("docs/mujoco.md")
+    assert len(found) >= 5
+    for number, block in enumerate(found):
+        before = names["mass"] * names["velocity"][2] if number == len(found) - 1 else 0
+        exec(compile(block, f"block {number} of docs/mujoco.md", "exec"), names)
+        if number == 0:
+            # The finger rests on the cube.
+            assert np.isclose(names["data"].sensor("touch").data[2], 0.1 * 9.81, rtol=0.01)
+    coupling, velocity = names["coupling"], names["velocity"]
+    falling = names["mass"] * 9.81 * 0.1  # N·s
+    cube = names["cube"].mass * coupling.simulation.velocities[0, 2]
+    assert np.isclose(names["mass"] * velocity[2] + cube + coupling.owed[0, 2], before - falling, rtol=1e-9)
+    assert len(capsys.readouterr().out.splitlines()) >= 2
+
+
+@pytest.mark.parametrize("page", ["python.md", "mujoco.md"])
+def test_links_of_the_page_lead_somewhere(page):
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     headings = {re.sub(r"[^\w -]", "", line.lstrip("# ").lower()).replace(" ", "-") for line in text.splitlines() if line.startswith("#")}
     for target in re.findall(r"\]\(([^)]+)\)", text):
         file, _, anchor = target.partition("#")
