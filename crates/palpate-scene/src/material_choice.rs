@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// Choice of the materials of a body.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[expect(clippy::large_enum_variant, reason = "there is one per recording")]
 pub enum MaterialChoice {
     /// Those of the mesh file.
     #[default]
