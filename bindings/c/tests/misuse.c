@@ -81,9 +81,9 @@ int main(int argc, char **argv) {
   }
   PalpateVector a = palpate_state_devices(state, NULL)->force_on_hand, b = palpate_state_devices(copy, NULL)->force_on_hand;
   printf("pulled: %d, alike: %d, time: %g\n", a.z < -0.001, memcmp(&a, &b, sizeof a) == 0, palpate_state_time_s(copy));
-  size_t obstacles, contacts;
+  size_t obstacles;
   const PalpateObstacleOutput *floor = palpate_state_obstacles(state, &obstacles);
-  const PalpateContactOutput *contact = palpate_state_contacts(state, &contacts);
+  contact = palpate_state_contacts(state, &contacts);
   double carried = 0.0;
   for (size_t i = 0; i < contacts; i++)
     if (contact[i].against == PALPATE_COLLIDER_OBSTACLE) carried -= contact[i].force.z;

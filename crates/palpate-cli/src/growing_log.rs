@@ -96,7 +96,10 @@ pub fn create_part(path: &Path, inputs: &[&Path]) -> Result<PartFile, ExportErro
 /// Whether something can be read of an unfinished log; what is no log counts, too.
 fn has_steps(part: &Path) -> bool {
     let Ok(bytes) = read_regular_file(part) else { return true };
-    !matches!(LogReader::new(bytes), Err(palpate_haptics::Error::Log(LogError::NoWholeStep)))
+    match LogReader::new(bytes) {
+        Ok(log) => log.step_count() > 0,
+        Err(error) => !matches!(error, palpate_haptics::Error::Log(LogError::NoWholeStep)),
+    }
 }
 
 impl Write for GrowingLog {
