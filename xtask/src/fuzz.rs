@@ -92,7 +92,7 @@ const TEXTS: &[(&str, &str)] = &[
 ];
 
 /// Run targets for some time each, or say why not.
-pub fn run_targets(target: Option<&str>, seconds: Option<&str>) -> Result<(), String> {
+pub fn run_targets(target: Option<&str>, seconds: Option<&str>, arguments: &[&str]) -> Result<(), String> {
     if !runs("cargo", &["+nightly", "--version"]) {
         println!("skipped: fuzzing needs a nightly toolchain: `rustup toolchain install nightly`");
         return Ok(());
@@ -113,7 +113,7 @@ pub fn run_targets(target: Option<&str>, seconds: Option<&str>) -> Result<(), St
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     for together in targets.chunks(cores) {
         let started: Result<Vec<_>, String> =
-            together.iter().map(|name| start(&folder, name, seconds)).collect();
+            together.iter().map(|name| start(&folder, name, seconds, arguments)).collect();
         for (name, fuzzer) in together.iter().zip(started?) {
             let output = fuzzer.wait_with_output().map_err(|error| format!("{name}: {error}"))?;
             let said = String::from_utf8_lossy(&output.stderr);
@@ -128,7 +128,7 @@ pub fn run_targets(target: Option<&str>, seconds: Option<&str>) -> Result<(), St
 }
 
 /// Starts a built target; its output is kept for a failure.
-fn start(folder: &Path, name: &str, seconds: &str) -> Result<Child, String> {
+fn start(folder: &Path, name: &str, seconds: &str, arguments: &[&str]) -> Result<Child, String> {
     let corpus = sow(name).map_err(|error| format!("the seeds of {name}: {error}"))?;
     let artifacts = folder.join("artifacts").join(name);
     std::fs::create_dir_all(&artifacts).map_err(|error| format!("{}: {error}", artifacts.display()))?;
@@ -138,7 +138,7 @@ fn start(folder: &Path, name: &str, seconds: &str) -> Result<Child, String> {
     fuzzer.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={SECONDS_PER_INPUT}"));
     fuzzer.arg(format!("-rss_limit_mb={MEGABYTES}")).arg(format!("-max_len={LARGEST_INPUT}"));
     // The same inputs each time, as long as the code stays: a longer run by hand starts from what it has found.
-    fuzzer.args(["-seed=1", "-verbosity=0", "-print_final_stats=1"]).current_dir(folder);
+    fuzzer.args(["-seed=1", "-verbosity=0", "-print_final_stats=1"]).args(arguments).current_dir(folder);
     let started = fuzzer.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
     started.map_err(|error| format!("the fuzzer of {name} can't be started: {error}"))
 }

@@ -36,8 +36,8 @@ const CHORES: &[Chore] = &[
     Chore {
         name: "demo",
         summary: "build palpate with its viewer and run its demo: elastic objects to touch in the browser",
-        flags: &[],
-        run: |_| demo(),
+        flags: &[(REST, &[], "arguments of `palpate demo`")],
+        run: |flags| demo(&flags.rest()),
     },
     Chore {
         name: "test",
@@ -48,8 +48,8 @@ const CHORES: &[Chore] = &[
     Chore {
         name: "verify",
         summary: "the slow proofs: computed numbers against analytic ones",
-        flags: &[],
-        run: |_| verify(),
+        flags: &[(REST, &[], "arguments of `palpate verify`, as the names of cases")],
+        run: |flags| verify(&flags.rest()),
     },
     Chore {
         name: "viewer",
@@ -72,14 +72,14 @@ const CHORES: &[Chore] = &[
     Chore {
         name: "attack",
         summary: "attack a running palpate on loopback: server, links, files, ends, numbers (SECURITY.md)",
-        flags: &[],
-        run: |_| attack(&[]),
+        flags: &[(REST, &[], "arguments of `palpate-attack`, as --only")],
+        run: |flags| attack(&flags.rest()),
     },
     Chore {
         name: "soak",
         summary: "30 minutes of fingers, a log, pages and a link, with one core hogged for a third of the time",
-        flags: &[],
-        run: |_| attack(&["--soak", SOAK_MINUTES]),
+        flags: &[(REST, &[], "arguments of `palpate-attack`")],
+        run: |flags| attack(&[&["--soak", SOAK_MINUTES], &*flags.rest()].concat()),
     },
     Chore {
         name: "layers",
@@ -135,10 +135,14 @@ const CHORES: &[Chore] = &[
         flags: &[
             ("--target", fuzz::TARGETS, "one reader; all without"),
             ("--seconds", fuzz::SECONDS, "time for each; 60 without"),
+            (REST, &[], "arguments of libFuzzer, as -- -runs=1000"),
         ],
-        run: |flags| fuzz::run_targets(flags.value("--target"), flags.value("--seconds")),
+        run: |flags| fuzz::run_targets(flags.value("--target"), flags.value("--seconds"), &flags.rest()),
     },
 ];
+
+/// Flag of chores that pass arguments on: all from the first that is none of their flags, or from `--`.
+const REST: &str = "--";
 
 /// Flags of a call.
 struct Flags(Vec<(String, Option<String>)>);
@@ -146,6 +150,11 @@ struct Flags(Vec<(String, Option<String>)>);
 impl Flags {
     fn has(&self, name: &str) -> bool {
         self.0.iter().any(|(own, _)| own == name)
+    }
+
+    /// Arguments that are passed on.
+    fn rest(&self) -> Vec<&str> {
+        self.0.iter().filter(|(own, _)| own == REST).filter_map(|(_, value)| value.as_deref()).collect()
     }
 
     fn value(&self, name: &str) -> Option<&str> {
@@ -164,7 +173,7 @@ fn main() -> ExitCode {
         eprintln!("xtask: there is no chore {first:?}\n\n{}", list());
         return ExitCode::from(2);
     };
-    if arguments.iter().any(is_help) {
+    if arguments.iter().take_while(|argument| *argument != REST).any(is_help) {
         print!("{}", help(chore));
         return ExitCode::SUCCESS;
     }
@@ -196,7 +205,13 @@ fn list() -> String {
 /// One chore with its flags.
 fn help(chore: &Chore) -> String {
     let usage = |(flag, values, _): &(&str, &[&str], &str)| {
-        if values.is_empty() { format!(" [{flag}]") } else { format!(" [{flag} {}]", values.join("|")) }
+        if *flag == REST {
+            " [[--] ARGUMENT …]".to_string()
+        } else if values.is_empty() {
+            format!(" [{flag}]")
+        } else {
+            format!(" [{flag} {}]", values.join("|"))
+        }
     };
     let usage: String = chore.flags.iter().map(usage).collect();
     let mut text = format!("cargo xtask {}{usage}\n\n  {}\n", chore.name, chore.summary);
@@ -211,8 +226,16 @@ fn flags(chore: &Chore, arguments: &[String]) -> Result<Flags, String> {
     let mut found = Vec::new();
     let mut arguments = arguments.iter();
     while let Some(argument) = arguments.next() {
-        let known = chore.flags.iter().find(|(flag, ..)| flag == argument);
-        let Some((flag, values, _)) = known else { return Err(format!("unknown argument {argument:?}")) };
+        let known = chore.flags.iter().find(|(flag, ..)| flag == argument && *flag != REST);
+        let Some((flag, values, _)) = known else {
+            if !chore.flags.iter().any(|(flag, ..)| *flag == REST) {
+                return Err(format!("unknown argument {argument:?}"));
+            }
+            let first = Some(argument).filter(|argument| *argument != REST);
+            let rest = first.into_iter().chain(arguments);
+            found.extend(rest.map(|argument| (REST.to_string(), Some(argument.clone()))));
+            break;
+        };
         let mut value = None;
         if !values.is_empty() {
             let given = arguments.next().map(String::as_str).unwrap_or_default();
@@ -226,17 +249,18 @@ fn flags(chore: &Chore, arguments: &[String]) -> Result<Flags, String> {
     Ok(Flags(found))
 }
 
-fn demo() -> Result<(), String> {
+fn demo(arguments: &[&str]) -> Result<(), String> {
     machine::need_c_compiler()?;
     if let Err(what) = viewer::build() {
         eprintln!("xtask: {what}: palpate is built without its viewer");
     }
-    run(Command::new(palpate()?).args(["demo", "--output", "target/demo"]))
+    let folder: &[&str] = if arguments.contains(&"--output") { &[] } else { &["--output", "target/demo"] };
+    run(Command::new(palpate()?).arg("demo").args(folder).args(arguments))
 }
 
-fn verify() -> Result<(), String> {
+fn verify(arguments: &[&str]) -> Result<(), String> {
     machine::need_c_compiler()?;
-    run(Command::new(palpate()?).arg("verify"))
+    run(Command::new(palpate()?).arg("verify").args(arguments))
 }
 
 /// Duration of a soak [min].
@@ -307,8 +331,22 @@ mod command_line_tests {
         );
         assert!(flags(chore("words"), &given("--list")).is_ok_and(|flags| flags.has("--list")));
         let refused = |name: &str, text: &str| flags(chore(name), &given(text)).err();
-        assert_eq!(refused("demo", "--fast").as_deref(), Some("unknown argument \"--fast\""));
+        assert_eq!(refused("bare", "--fast").as_deref(), Some("unknown argument \"--fast\""));
         let expected = "--only \"all\": expected one of build, python, viewer, c, doc, rust";
         assert_eq!(refused("test", "--only all").as_deref(), Some(expected));
+    }
+
+    #[test]
+    fn arguments_are_passed_on_from_the_first_that_is_no_flag() {
+        let rest = |name: &str, text: &str| {
+            let given: Vec<String> = text.split(' ').map(str::to_string).collect();
+            flags(chore(name), &given).map(|flags| flags.rest().join(" "))
+        };
+        assert_eq!(rest("verify", "hertz pinch"), Ok("hertz pinch".into()));
+        assert_eq!(rest("demo", "-- --help"), Ok("--help".into()));
+        assert_eq!(rest("attack", "--only files -- --seed"), Ok("--only files -- --seed".into()));
+        assert_eq!(rest("fuzz", "--seconds 10 -- -runs=5"), Ok("-runs=5".into()));
+        assert_eq!(rest("soak", "--help"), Ok("--help".into()));
+        assert!(help(chore("verify")).starts_with("cargo xtask verify [[--] ARGUMENT …]\n"));
     }
 }

@@ -26,6 +26,13 @@ namespace Palpate
         public Vector ForceOnHand, Proxy;
     }
 
+    /// <summary>Plane or obstacle after a step: net force on it [N], and torque about its position [N·m].</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct ObstacleOutput
+    {
+        public Vector Force, Torque;
+    }
+
     /// <summary>Failure of the library, with its status (PalpateStatus in palpate.h).</summary>
     public class PalpateException : Exception
     {
@@ -64,6 +71,7 @@ namespace Palpate
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_set_position(IntPtr state, UIntPtr device, Vector position);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_step(IntPtr state);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_devices(IntPtr state, out UIntPtr count);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_obstacles(IntPtr state, out UIntPtr count);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_contacts(IntPtr state, out UIntPtr count);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_surface(IntPtr state, UIntPtr body, double[] positions, UIntPtr count);
 
@@ -137,6 +145,19 @@ namespace Palpate
                 if (device < 0 || device >= (int)count) throw new ArgumentOutOfRangeException("device");
                 IntPtr own = IntPtr.Add(first, device * Marshal.SizeOf(typeof(DeviceOutput)));
                 return (DeviceOutput)Marshal.PtrToStructure(own, typeof(DeviceOutput));
+            }
+        }
+
+        /// <summary>Plane or obstacle after the last step, by its number in the scene file.</summary>
+        public ObstacleOutput Obstacle(int number)
+        {
+            lock (turn)
+            {
+                UIntPtr count;
+                IntPtr first = Library.palpate_state_obstacles(state, out count);
+                if (number < 0 || number >= (int)count) throw new ArgumentOutOfRangeException("number");
+                IntPtr own = IntPtr.Add(first, number * Marshal.SizeOf(typeof(ObstacleOutput)));
+                return (ObstacleOutput)Marshal.PtrToStructure(own, typeof(ObstacleOutput));
             }
         }
 

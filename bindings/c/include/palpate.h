@@ -205,6 +205,10 @@ typedef struct {
   PalpateVector velocity;
   // Angular velocity [rad/s].
   PalpateVector angular_velocity;
+  // Net force of contacts, hands, clamps and prescribed forces on it, held over the step [N]; without its weight.
+  PalpateVector force;
+  // Torque of these forces about the position of its pose [N·m].
+  PalpateVector torque;
   // Energy ledger.
   PalpateEnergy energy;
   // Largest penetration of its contacts [m], not negative.
@@ -212,6 +216,14 @@ typedef struct {
   // Whether it is asleep.
   bool is_asleep;
 } PalpateObjectOutput;
+
+// Plane or obstacle after a step.
+typedef struct {
+  // Net force of the objects on it, held over the step [N].
+  PalpateVector force;
+  // Torque of the objects on it about the position of its pose [N·m].
+  PalpateVector torque;
+} PalpateObstacleOutput;
 
 // Clamp after a step.
 typedef struct {
@@ -334,6 +346,11 @@ const PalpateDeviceOutput *palpate_state_devices(const PalpateState *state, size
 //
 // state is a state or null; count can be written, or is null.
 const PalpateObjectOutput *palpate_state_objects(const PalpateState *state, size_t *count);
+
+// Planes and obstacles after the last step, with the net force on each; *count is their number.
+//
+// state is a state or null; count can be written, or is null.
+const PalpateObstacleOutput *palpate_state_obstacles(const PalpateState *state, size_t *count);
 
 // Clamps after the last step; *count is their number.
 //

@@ -179,9 +179,7 @@ pub unsafe extern "C" fn palpate_state_follow_paths(state: *mut State) -> Status
     // SAFETY: as promised by the caller.
     unsafe {
         change(state, ptr::null_mut(), |state| {
-            let scene = &state.scene.scene;
-            let end_s = state.state.output().time_s + scene.model.parameters().step_s;
-            scene.follow_paths(end_s, &mut state.input);
+            state.scene.scene.follow_next_step(&state.state, &mut state.input);
             Ok(())
         })
     }

@@ -29,7 +29,7 @@ pub use input::{
 };
 pub use output::{
     palpate_state_clamps, palpate_state_contacts, palpate_state_devices, palpate_state_energy,
-    palpate_state_objects, palpate_state_status, palpate_state_time_s,
+    palpate_state_objects, palpate_state_obstacles, palpate_state_status, palpate_state_time_s,
 };
 pub use scene::{
     Scene, palpate_scene_count, palpate_scene_find, palpate_scene_free, palpate_scene_load,
@@ -41,8 +41,8 @@ pub use state::{
     palpate_state_point_position, palpate_state_step, palpate_state_surface,
 };
 pub use types::{
-    ClampOutput, Collider, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Energy, ObjectOutput, Part,
-    Pose, Purpose, Quaternion, StepStatus, SurfacePoint, Vector,
+    ClampOutput, Collider, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Energy, ObjectOutput,
+    ObstacleOutput, Part, Pose, Purpose, Quaternion, StepStatus, SurfacePoint, Vector,
 };
 
 use std::ffi::{CStr, c_char};

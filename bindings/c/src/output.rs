@@ -3,7 +3,9 @@
 use crate::buffers::Buffers;
 use crate::error::put;
 use crate::state::State;
-use crate::types::{ClampOutput, ContactOutput, DeviceOutput, Energy, ObjectOutput, StepStatus};
+use crate::types::{
+    ClampOutput, ContactOutput, DeviceOutput, Energy, ObjectOutput, ObstacleOutput, StepStatus,
+};
 use std::ptr;
 
 /// Array of a state, and its length.
@@ -52,6 +54,19 @@ pub unsafe extern "C" fn palpate_state_objects(
 ) -> *const ObjectOutput {
     // SAFETY: as promised by the caller.
     unsafe { array(state, count, |buffers| &buffers.objects) }
+}
+
+/// Planes and obstacles after the last step, with the net force on each; `*count` is their number.
+///
+/// # Safety
+/// `state` is a state or null; `count` can be written, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_obstacles(
+    state: *const State,
+    count: *mut usize,
+) -> *const ObstacleOutput {
+    // SAFETY: as promised by the caller.
+    unsafe { array(state, count, |buffers| &buffers.obstacles) }
 }
 
 /// Clamps after the last step; `*count` is their number.

@@ -128,6 +128,16 @@ pub struct ClampOutput {
     pub torque: Vector,
 }
 
+/// Plane or obstacle after a step.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ObstacleOutput {
+    /// Net force of the objects on it, held over the step [N].
+    pub force: Vector,
+    /// Torque of the objects on it about the position of its pose [N·m].
+    pub torque: Vector,
+}
+
 /// Energies of an object, or of a scene [J]: kinetic + elastic + residual + potential + coupling = at the start + input − dissipated −
 /// friction − impact + defect.
 #[repr(C)]
@@ -165,6 +175,10 @@ pub struct ObjectOutput {
     pub velocity: Vector,
     /// Angular velocity [rad/s].
     pub angular_velocity: Vector,
+    /// Net force of contacts, hands, clamps and prescribed forces on it, held over the step [N]; without its weight.
+    pub force: Vector,
+    /// Torque of these forces about the position of its pose [N·m].
+    pub torque: Vector,
     /// Energy ledger.
     pub energy: Energy,
     /// Largest penetration of its contacts [m], not negative.
@@ -329,6 +343,12 @@ impl From<&palpate::ClampOutput> for ClampOutput {
     }
 }
 
+impl From<&palpate::ObstacleOutput> for ObstacleOutput {
+    fn from(output: &palpate::ObstacleOutput) -> Self {
+        Self { force: output.force.into(), torque: output.torque.into() }
+    }
+}
+
 impl From<&palpate::EnergyLedger> for Energy {
     fn from(ledger: &palpate::EnergyLedger) -> Self {
         let &palpate::EnergyLedger {
@@ -353,6 +373,8 @@ impl From<&palpate::ObjectOutput> for ObjectOutput {
             pose: output.pose.into(),
             velocity: output.twist.linear.into(),
             angular_velocity: output.twist.angular.into(),
+            force: output.force.into(),
+            torque: output.torque.into(),
             energy: (&output.energy).into(),
             penetration_m: output.penetration_m,
             is_asleep: output.is_asleep,

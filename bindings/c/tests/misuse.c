@@ -81,6 +81,13 @@ int main(int argc, char **argv) {
   }
   PalpateVector a = palpate_state_devices(state, NULL)->force_on_hand, b = palpate_state_devices(copy, NULL)->force_on_hand;
   printf("pulled: %d, alike: %d, time: %g\n", a.z < -0.001, memcmp(&a, &b, sizeof a) == 0, palpate_state_time_s(copy));
+  size_t obstacles;
+  const PalpateObstacleOutput *floor = palpate_state_obstacles(state, &obstacles);
+  contact = palpate_state_contacts(state, &contacts);
+  double carried = 0.0;
+  for (size_t i = 0; i < contacts; i++)
+    if (contact[i].against == PALPATE_COLLIDER_OBSTACLE) carried -= contact[i].force.z;
+  printf("obstacles: %d, pressed: %d, by its contacts: %d\n", (int)obstacles, floor->force.z < 0.0, floor->force.z == carried);
   palpate_state_free(state);
   palpate_state_free(copy);
   return 0;

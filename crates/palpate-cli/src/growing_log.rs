@@ -96,7 +96,10 @@ pub fn create_part(path: &Path, inputs: &[&Path]) -> Result<PartFile, ExportErro
 /// Whether something can be read of an unfinished log; what is no log counts, too.
 fn has_steps(part: &Path) -> bool {
     let Ok(bytes) = read_regular_file(part) else { return true };
-    !matches!(LogReader::new(bytes), Err(palpate_haptics::Error::Log(LogError::NoWholeStep)))
+    match LogReader::new(bytes) {
+        Ok(log) => log.step_count() > 0,
+        Err(error) => !matches!(error, palpate_haptics::Error::Log(LogError::NoWholeStep)),
+    }
 }
 
 impl Write for GrowingLog {
@@ -115,5 +118,34 @@ impl Seek for GrowingLog {
     fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
         let done = self.file.seek(to);
         self.watch(done)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use palpate::{Input, ModelParameters};
+    use palpate_haptics::log::{LogWriter, SceneNames};
+    use palpate_testkit::{free_block, model_and_state, object_at};
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+
+    #[test]
+    fn a_whole_log_without_steps_that_was_left_is_replaced() {
+        let objects = vec![object_at(&free_block(), DVec3::ZERO, DVec3::ZERO)];
+        let (model, state) = model_and_state(ModelParameters::default(), objects);
+        let names = SceneNames { objects: vec!["body".into()], ..SceneNames::default() };
+        let start = (&model, &state, &Input::default());
+        let (_, writer) = LogWriter::new(Cursor::new(Vec::new()), names, BTreeMap::new(), &[], start)
+            .expect("a log in memory");
+        let written = writer.run(&AtomicBool::new(true));
+        assert_eq!(written.failure, None);
+        let folder = tempfile::tempdir().expect("a folder");
+        let part = folder.path().join("run.mcap.part");
+        std::fs::write(&part, written.sink.into_inner()).expect("a writable folder");
+        assert!(!has_steps(&part));
+        let file = create_part(&folder.path().join("run.mcap"), &[]).expect("a new log");
+        assert_eq!(file.part(), part);
     }
 }

@@ -1,6 +1,6 @@
 //! The command line `palpate` as a library: one command, one file or folder under `commands`.
 //!
-//! Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
+//! `-` is standard input or output, where a file is read or written as a stream. Results go to standard output, messages and progress to standard error. Exit status 0: done; 1: the
 //! input is bad or a check failed; 2: the command line is wrong.
 
 mod commands;
@@ -12,11 +12,12 @@ mod interrupt;
 mod log_kind;
 mod progress;
 mod secret_file;
+mod standard_streams;
 mod terminal;
 
 pub use failure::Failure;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::process::ExitCode;
 use terminal::notify;
@@ -25,7 +26,8 @@ use terminal::notify;
 #[derive(Parser)]
 #[command(name = "palpate", version, arg_required_else_help = true)]
 #[command(
-    after_help = "Start with `palpate demo`. `palpate COMMAND --help` has the options of each command."
+    after_help = "Start with `palpate demo`. `palpate COMMAND --help` has the options of each command. `-` is standard input or output, where a \
+file is read or written as a stream."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -52,6 +54,8 @@ enum Command {
     Reproduce(commands::reproduce::Arguments),
     Verify(commands::verify::Arguments),
     Bench(commands::bench::Arguments),
+    Completions(commands::completions::CompletionsArguments),
+    Man(commands::completions::ManArguments),
 }
 
 /// Checks a command line, and runs nothing.
@@ -90,6 +94,10 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Reproduce(arguments) => commands::reproduce::reproduce(&arguments),
         Command::Verify(arguments) => commands::verify::verify(&arguments),
         Command::Bench(arguments) => commands::bench::bench(&arguments),
+        Command::Completions(arguments) => {
+            commands::completions::completions(&arguments, Arguments::command())
+        }
+        Command::Man(arguments) => commands::completions::man(&arguments, Arguments::command()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

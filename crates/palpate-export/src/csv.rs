@@ -3,23 +3,64 @@
 use crate::atomic_file::AtomicFile;
 use crate::error::ExportError;
 use crate::labels::{ProbeReading, SceneLabels};
+use glam::DVec3;
 use palpate::{Collider, Input, Model, Output, State};
+use std::io::{self, BufWriter, Stdout, Write};
 use std::path::{Path, PathBuf};
 
 /// Rows of numbers, written so that they parse to the same bits.
-struct Rows {
-    file: AtomicFile,
+enum Rows {
+    File(AtomicFile),
+    /// Standard output; none once its reader has gone away.
+    Output(Option<BufWriter<Stdout>>),
 }
 
 impl Rows {
+    /// Rows of a file, or for the path `-` of standard output.
     fn new(path: &Path, labels: &SceneLabels, header: &str) -> Result<Self, ExportError> {
-        let mut rows = Self { file: AtomicFile::create(path, &labels.input_paths())? };
+        let mut rows = if path.as_os_str() == STANDARD_OUTPUT {
+            Self::Output(Some(BufWriter::new(io::stdout())))
+        } else {
+            Self::File(AtomicFile::create(path, &labels.input_paths())?)
+        };
         rows.line(header)?;
         Ok(rows)
     }
 
     fn line(&mut self, text: &str) -> Result<(), ExportError> {
-        self.file.write(format!("{text}\n").as_bytes())
+        match self {
+            Self::File(file) => file.write(format!("{text}\n").as_bytes()),
+            Self::Output(output) => put(output, |writer| writeln!(writer, "{text}")),
+        }
+    }
+
+    fn finish(self) -> Result<PathBuf, ExportError> {
+        match self {
+            Self::File(file) => file.finish(),
+            Self::Output(mut output) => {
+                put(&mut output, BufWriter::flush)?;
+                Ok(STANDARD_OUTPUT.into())
+            }
+        }
+    }
+}
+
+/// Path that means standard output.
+const STANDARD_OUTPUT: &str = "-";
+
+/// Writes to standard output; a reader that has gone away is no failure.
+fn put(
+    output: &mut Option<BufWriter<Stdout>>,
+    write: impl FnOnce(&mut BufWriter<Stdout>) -> io::Result<()>,
+) -> Result<(), ExportError> {
+    match output.as_mut().map_or(Ok(()), write) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+            // What its buffer holds can't be written either.
+            output.take().map(BufWriter::into_parts);
+            Ok(())
+        }
+        Err(error) => Err(ExportError::io("write", Path::new("standard output"), error)),
+        Ok(()) => Ok(()),
     }
 }
 
@@ -28,13 +69,16 @@ fn joined(numbers: impl IntoIterator<Item = f64>) -> String {
     cells.join(",")
 }
 
+/// Columns of a net force [N] and torque [N·m].
+const NET_FORCE: [&str; 6] = ["fx", "fy", "fz", "tx", "ty", "tz"];
+
 /// Writer of one row per step: poses, forces, velocities and energies.
 pub struct StepsCsv {
     rows: Rows,
 }
 
 impl StepsCsv {
-    /// Creates the file and writes its header.
+    /// Creates the file, or for `-` takes standard output, and writes the header.
     pub fn new(path: &Path, labels: &SceneLabels) -> Result<Self, ExportError> {
         let mut columns = vec!["t".to_string()];
         for device in &labels.devices {
@@ -43,7 +87,10 @@ impl StepsCsv {
         }
         for name in &labels.objects {
             let parts = ["px", "py", "pz", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
-            columns.extend(parts.map(|c| format!("{name}.{c}")));
+            columns.extend(parts.into_iter().chain(NET_FORCE).map(|c| format!("{name}.{c}")));
+        }
+        for name in &labels.obstacles {
+            columns.extend(NET_FORCE.map(|c| format!("{name}.{c}")));
         }
         for name in &labels.clamps {
             let parts = ["x", "y", "z", "qw", "qx", "qy", "qz", "fx", "fy", "fz", "tx", "ty", "tz"];
@@ -78,6 +125,13 @@ impl StepsCsv {
             numbers.extend([q.w, q.x, q.y, q.z]);
             numbers.extend(object.twist.linear.to_array());
             numbers.extend(object.twist.angular.to_array());
+            numbers.extend(object.force.to_array());
+            numbers.extend(object.torque.to_array());
+        }
+        for obstacle in &output.obstacles {
+            // −0 + 0 = 0.
+            numbers.extend((obstacle.force + DVec3::ZERO).to_array());
+            numbers.extend((obstacle.torque + DVec3::ZERO).to_array());
         }
         for (at, clamp) in output.clamps.iter().enumerate() {
             let frame = input.clamps.get(at).copied().unwrap_or(model.parameters().clamps[at].frame);
@@ -101,7 +155,7 @@ impl StepsCsv {
 
     /// Renames the file to its final path; returns it.
     pub fn finish(self) -> Result<PathBuf, ExportError> {
-        self.rows.file.finish()
+        self.rows.finish()
     }
 }
 
@@ -111,7 +165,7 @@ pub struct ContactsCsv {
 }
 
 impl ContactsCsv {
-    /// Creates the file and writes its header.
+    /// Creates the file, or for `-` takes standard output, and writes the header.
     pub fn new(path: &Path, labels: &SceneLabels) -> Result<Self, ExportError> {
         let header = "t,object,against,px,py,pz,nx,ny,nz,fx,fy,fz,gap,slip_speed";
         Ok(Self { rows: Rows::new(path, labels, header)? })
@@ -137,6 +191,6 @@ impl ContactsCsv {
 
     /// Renames the file to its final path; returns it.
     pub fn finish(self) -> Result<PathBuf, ExportError> {
-        self.rows.file.finish()
+        self.rows.finish()
     }
 }

@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 /// Files to write, and the steps that they show.
 #[derive(Debug, Clone, Default)]
 pub struct ExportOptions<'a> {
-    /// CSV file with a row per step.
+    /// CSV file with a row per step; `-` is standard output.
     pub csv: Option<&'a Path>,
-    /// CSV file with a row per contact and step.
+    /// CSV file with a row per contact and step; `-` is standard output.
     pub contacts: Option<&'a Path>,
     /// Folder for VTU files.
     pub vtu: Option<&'a Path>,

@@ -47,6 +47,14 @@ pub struct RecordParameters {
     pub extent: RecordExtent,
 }
 
+impl Default for RecordParameters {
+    /// Quadratic elements, since linear ones lock; 200 modes, for events of some 10 ms; no damping. The materials are to be filled in, one per
+    /// region of the mesh.
+    fn default() -> Self {
+        Self::new(Vec::new(), ElementOrder::Quadratic, 200, Damping::Ratio(0.0))
+    }
+}
+
 impl RecordParameters {
     /// Parameters of a free body: whole residual compliance, full precision, certificate, source "mesh".
     pub fn new(materials: Vec<Material>, order: ElementOrder, modes: usize, damping: Damping) -> Self {

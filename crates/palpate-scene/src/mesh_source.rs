@@ -5,8 +5,9 @@ use palpate_fem::Progress;
 use palpate_mesh::{
     CellSplit, Files, Mesh, MeshError, MeshFile, MeshingParameters, SurfaceMesh, ball_mesh, split_box_mesh,
 };
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Makes a primitive, or reads a mesh file: its solid elements, or the inside of its surface; in metres.
 ///
@@ -25,8 +26,30 @@ pub fn read_body(
         mesh.scale(scale).map_err(refused)?;
         return Ok(mesh);
     }
-    let path = Path::new(source);
-    let file = MeshFile::read(Files::Disk, path).map_err(refused)?;
+    let file = MeshFile::read(Files::Disk, Path::new(source)).map_err(refused)?;
+    body_of(file, source, scale, meshing, progress)
+}
+
+/// Reads a mesh file that is in memory, as [`read_body`] does: one that names no other file.
+pub(crate) fn read_body_bytes(
+    (name, bytes): (&str, &[u8]),
+    scale: f64,
+    meshing: &MeshingParameters,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, SceneError> {
+    let files = BTreeMap::from([(PathBuf::from(name), bytes.to_vec())]);
+    let file = MeshFile::read(Files::Memory(&files), Path::new(name)).map_err(refused)?;
+    body_of(file, name, scale, meshing, progress)
+}
+
+/// Body of a mesh file, in metres.
+fn body_of(
+    file: MeshFile,
+    name: &str,
+    scale: f64,
+    meshing: &MeshingParameters,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, SceneError> {
     let mut told = 0;
     if matches!(file, MeshFile::Surface(_)) {
         progress.begin("tetrahedra", PERCENT);
@@ -39,7 +62,7 @@ pub fn read_body(
     };
     file.into_body(scale, meshing, &mut watch).map_err(|error| match error {
         MeshError::Scale { .. } => refused(error),
-        error => mesh_error(format!("{}: {error}", path.display())),
+        error => mesh_error(format!("{name}: {error}")),
     })
 }
 

@@ -3,7 +3,7 @@
 use crate::devices::RealDevice;
 use crate::warning::Warning;
 use glam::DVec3;
-use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose};
+use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose, State};
 use palpate_export::{DeviceLabel, ProbeLabel, SceneLabels};
 use palpate_haptics::device::{DeviceSpec, Hand};
 use palpate_haptics::log::SceneNames;
@@ -184,6 +184,14 @@ impl Scene {
             *own = base.as_ref().map(|path| path.of_base(time_s, step_s));
         }
         input.gravity = self.gravity_at(time_s).or(input.gravity);
+    }
+
+    /// Move all parts that have a path to their place at the end of the next step of a state, at the times of `palpate run`; the others stay.
+    ///
+    /// # Real time
+    /// No allocation.
+    pub fn follow_next_step(&self, state: &State, input: &mut Input) {
+        self.follow_paths((state.step_count() + 1) as f64 * self.model.parameters().step_s, input);
     }
 
     /// Time of the last row of all paths [s]; 0 without paths.

@@ -1,6 +1,6 @@
 //! Hold a corner of a recorded block and move it by a millimetre: the force on the hand.
 
-use glam::DVec3;
+use palpate::glam::DVec3;
 use palpate::{
     DeviceInput, DeviceParameters, Grasp, Input, Model, ModelObject, ModelParameters, ObjectStart, Pose,
     Recording, State, Twist, step,

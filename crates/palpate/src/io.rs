@@ -139,6 +139,15 @@ pub struct ClampOutput {
     pub torque: DVec3,
 }
 
+/// Net force on a plane or obstacle in a step, the sum over its contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ObstacleOutput {
+    /// Force of the objects on it, held over the step [N, world].
+    pub force: DVec3,
+    /// Torque of the objects on it about the origin of its frame, the position of its pose, with arms at the end of the step [N·m, world].
+    pub torque: DVec3,
+}
+
 /// Contact that carries force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactOutput {
@@ -165,6 +174,11 @@ pub struct ObjectOutput {
     pub pose: Pose,
     /// Velocity at the end of the step.
     pub twist: Twist,
+    /// Net force of contacts, hands, clamps and prescribed forces on it, held over the step [N, world]; without its weight, and without what
+    /// its support carries.
+    pub force: DVec3,
+    /// Torque of these forces about the origin of the body frame, the centre of mass at rest, with arms at the end of the step [N·m, world].
+    pub torque: DVec3,
     /// Energy ledger.
     pub energy: EnergyLedger,
     /// Largest penetration of the object's contacts at the end of the step [m], not negative; 0 without contact. Between
@@ -206,6 +220,8 @@ pub struct Output {
     pub devices: Vec<DeviceOutput>,
     /// Objects, in the model's order.
     pub objects: Vec<ObjectOutput>,
+    /// Planes and obstacles, in the model's order.
+    pub obstacles: Vec<ObstacleOutput>,
     /// Clamps, in the model's order.
     pub clamps: Vec<ClampOutput>,
     /// Contacts that carry force, without held points; those of sleeping objects first, as they were.

@@ -16,7 +16,7 @@
 //!   [`DeviceParameters`] with a [`Coupling`]; [`Obstacle`] with a [`Shape`] or an [`ObstacleMesh`]; [`RigidCompliance`] and
 //!   [`RigidIntegrator`]; [`Pose`] and [`Twist`], with [`cayley`] and [`inertia_in_world`].
 //! - **Step.** [`step`] takes [`Input`] ([`DeviceInput`], [`DeviceMode`], [`Grasp`]) and gives [`Output`]: [`DeviceOutput`],
-//!   [`ObjectOutput`], [`ContactOutput`] against a [`Collider`], [`EnergyLedger`] and [`StepStatus`].
+//!   [`ObjectOutput`], [`ObstacleOutput`], [`ContactOutput`] against a [`Collider`], [`EnergyLedger`] and [`StepStatus`].
 //! - **State.** [`State`] resumes from [`ObjectSnapshot`]s; a [`DeformationSnapshot`] gives surfaces to another thread, with a
 //!   [`ResidualFieldCache`].
 //! - **Surface.** [`Surface`] and [`SurfacePoint`]; [`SampleLevel`]s of contact samples, at least [`MIN_CONTACT_SAMPLES`].
@@ -27,6 +27,8 @@
 //!   [`ColumnsInMemory`]).
 //! - **Modes.** [`SampledOscillator`] and [`OscillatorState`]; [`SampledResidual`].
 //! - **Errors.** [`Error`] with the kinds of [`RecordingError`] ([`RecordingPart`]) and [`ModelError`].
+//!
+//! Vectors and rotations are those of [`glam`], in the version that is re-exported here.
 //!
 //! # Conventions
 //!
@@ -76,9 +78,10 @@ pub use collision::{Collider, Grasp};
 pub use device::{Coupling, DeviceParameters};
 pub use energy::EnergyLedger;
 pub use error::{Error, ModelError, RecordingError, RecordingPart};
+pub use glam;
 pub use io::{
     AppliedForce, ClampOutput, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Input, ObjectOutput,
-    Output, StepStatus,
+    ObstacleOutput, Output, StepStatus,
 };
 pub use motion::RigidIntegrator;
 pub use object::{InitialDeformation, ObjectStart};

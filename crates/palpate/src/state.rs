@@ -6,7 +6,7 @@ use crate::collision::{CollisionScene, CollisionWorkspace, Contact, Levels};
 use crate::contact::{Constraint, RecoveryBudget, Solver};
 use crate::device::DeviceState;
 use crate::energy::EnergyLedger;
-use crate::io::{ClampOutput, DeviceOutput, ObjectOutput, Output, StepStatus};
+use crate::io::{ClampOutput, DeviceOutput, ObjectOutput, ObstacleOutput, Output, StepStatus};
 use crate::motion::{RigidState, RigidStep};
 use crate::object::ObjectState;
 use crate::response::OscillatorState;
@@ -63,6 +63,8 @@ pub(crate) struct Resting {
     pub(crate) contacts: Vec<BoundedVec<Contact>>,
     /// Number of their contacts in the output, which are its first.
     pub(crate) outputs: usize,
+    /// Net forces of these contacts on the obstacles.
+    pub(crate) obstacles: Vec<ObstacleOutput>,
     /// Sum of their energy ledgers.
     energy: EnergyLedger,
 }
@@ -115,6 +117,8 @@ impl State {
         let object_outputs = model.objects.iter().zip(&objects).map(|(object, state)| ObjectOutput {
             pose: state.rigid.pose,
             twist: object.start.twist,
+            force: DVec3::ZERO,
+            torque: DVec3::ZERO,
             energy: state.ledger,
             penetration_m: 0.0,
             is_asleep: false,
@@ -124,6 +128,7 @@ impl State {
             time_s: 0.0,
             devices: vec![DeviceOutput::default(); devices],
             objects: object_outputs.collect(),
+            obstacles: vec![ObstacleOutput::default(); parameters.obstacles.len()],
             clamps: vec![ClampOutput::default(); parameters.clamps.len()],
             contacts: Vec::with_capacity(contacts),
             energy: objects.iter().fold(EnergyLedger::default(), |sum, o| sum.plus(&o.ledger)),
@@ -143,6 +148,7 @@ impl State {
             resting: Resting {
                 contacts: objects.iter().map(|own| BoundedVec::new(resting_contacts(own))).collect(),
                 outputs: 0,
+                obstacles: vec![ObstacleOutput::default(); parameters.obstacles.len()],
                 energy: EnergyLedger::default(),
             },
             couplings: EnergyLedger::default(),
@@ -203,6 +209,11 @@ impl State {
     /// Output of the last step; before the first, of the scene at its start.
     pub fn output(&self) -> &Output {
         &self.output
+    }
+
+    /// Number of steps since the start: the next one ends at (count + 1)·h.
+    pub fn step_count(&self) -> u64 {
+        self.steps
     }
 
     /// Modal coordinates q [m·√kg] of an object and their rates; none for one that uses a table.

@@ -2,13 +2,15 @@
 
 use crate::commands::record::MergeChoice;
 use crate::failure::Failure;
-use crate::terminal::{print, print_json};
+use crate::standard_streams::{self, STANDARD_INPUT, is_stream, read_input, takes_output, write_output};
+use crate::terminal::print_json;
 use clap::Args;
 use palpate_export::{check_writable, write_atomically};
 use palpate_mesh::{
     ANGLE_BIN_DEG, Files, MeshFile, MeshReport, MeshingParameters, MeshingReport, PieceChoice, Repair,
     VolumeReport,
 };
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -32,7 +34,7 @@ Examples:
 
 Good tetrahedra have dihedral angles of 15° to 150°. A few slivers make a body too stiff near them; a flat tetrahedron is an error.")]
 pub struct Arguments {
-    /// The mesh file; of a TetGen pair either
+    /// The mesh file, `-` for standard input; of a TetGen pair either
     file: PathBuf,
     /// Scale from the file's units to metres: 0.001 for a file in mm
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
@@ -46,7 +48,7 @@ pub struct Arguments {
     /// Side of the cells that a surface is filled with [m]; without it about 2,000 nodes come out
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     cell_size: Option<f64>,
-    /// Write the tetrahedra, in metres and repaired: VTK legacy or Gmsh 2.2, by the name
+    /// Write the tetrahedra, in metres and repaired: VTK legacy or Gmsh 2.2, by the name; `-` for VTK on standard output
     #[arg(short, long, value_name = "OUT.vtk|OUT.msh", value_parser = output_path)]
     output: Option<PathBuf>,
     /// One JSON object on standard output
@@ -62,10 +64,17 @@ const LONGEST_BAR: f64 = 40.0;
 
 /// Runs the command.
 pub fn mesh(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(output) = &arguments.output {
+    let output = arguments.output.as_deref();
+    let output_is_taken = takes_output(&[("-o", output)], arguments.json)?;
+    if let Some(output) = output.filter(|_| !output_is_taken) {
         check_writable(output, &[&arguments.file])?;
     }
-    let file = MeshFile::read(Files::Disk, &arguments.file)?;
+    let (file, name) = if is_stream(&arguments.file) {
+        let files = BTreeMap::from([(PathBuf::from(STANDARD_INPUT), read_input()?)]);
+        (MeshFile::read(Files::Memory(&files), Path::new(STANDARD_INPUT))?, STANDARD_INPUT.to_string())
+    } else {
+        (MeshFile::read(Files::Disk, &arguments.file)?, arguments.file.display().to_string())
+    };
     let repair =
         Repair { merge_nodes: arguments.merge_nodes.into(), piece: arguments.piece.unwrap_or_default() };
     let meshing = MeshingParameters { cell_size: arguments.cell_size };
@@ -75,15 +84,19 @@ pub fn mesh(arguments: &Arguments) -> Result<(), Failure> {
         let value = serde_json::to_value(&report).map_err(|error| Failure(error.to_string()))?;
         print_json(&value)?;
     } else {
-        let name = arguments.file.display().to_string();
-        print(&as_text(&name, &report).map_err(|error| Failure(error.to_string()))?)?;
+        let text = as_text(&name, &report).map_err(|error| Failure(error.to_string()))?;
+        standard_streams::report(&text, output_is_taken)?;
     }
     if let (Some(output), Some(mesh)) = (&arguments.output, mesh) {
-        let text = if has_ending(output, "vtk") { mesh.to_vtk() } else { mesh.to_gmsh() };
-        write_atomically(output, text.as_bytes())?;
+        let text = if has_ending(output, "msh") { mesh.to_gmsh() } else { mesh.to_vtk() };
+        if output_is_taken {
+            write_output(text.as_bytes())?;
+        } else {
+            write_atomically(output, text.as_bytes())?;
+        }
     }
     match report.problem {
-        Some(problem) => Err(Failure(format!("{}: {problem}", arguments.file.display()))),
+        Some(problem) => Err(Failure(format!("{name}: {problem}"))),
         None => Ok(()),
     }
 }
@@ -91,10 +104,10 @@ pub fn mesh(arguments: &Arguments) -> Result<(), Failure> {
 /// Value of `--output`.
 fn output_path(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    if has_ending(&path, "vtk") || has_ending(&path, "msh") {
+    if has_ending(&path, "vtk") || has_ending(&path, "msh") || is_stream(&path) {
         Ok(path)
     } else {
-        Err("expected a name that ends in .vtk or .msh".into())
+        Err("expected a name that ends in .vtk or .msh, or - for VTK on standard output".into())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Commands: one command, one file or folder.
 
 pub mod bench;
+pub mod completions;
 pub mod demo;
 pub mod device;
 pub mod devices;

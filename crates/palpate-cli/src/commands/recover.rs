@@ -1,6 +1,7 @@
 //! `palpate recover`: a whole log of one that was cut.
 
 use crate::failure::Failure;
+use crate::standard_streams::{LOG_INPUT, LOG_OUTPUT, refuse};
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
 use palpate_export::AtomicFile;
@@ -31,6 +32,7 @@ pub struct Arguments {
 /// Runs the command.
 pub fn recover(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { log, output, json } = arguments;
+    refuse(&[("the log", Some(log), LOG_INPUT), ("-o", Some(output), LOG_OUTPUT)])?;
     let file = AtomicFile::create(output, &[log])?;
     let bytes = read_regular_file(log).map_err(|error| Failure::file("read the log", log, &error))?;
     let recovered = palpate_haptics::log::recover(&bytes, file);

@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
 use crate::progress::CountBar;
+use crate::standard_streams::{FOLDER, LOG_INPUT, SEEKS, refuse};
 use crate::terminal::{print, print_json, warn_of_cut};
 use clap::{Args, ValueEnum};
 use palpate_export::{OutputFolder, write_atomically};
@@ -79,6 +80,12 @@ const MAX_IMAGES: u64 = 20_000;
 
 /// Runs the command.
 pub fn render(arguments: &Arguments) -> Result<(), Failure> {
+    refuse(&[
+        ("the log", Some(&arguments.log), LOG_INPUT),
+        ("-o", Some(&arguments.output), FOLDER),
+        ("--gif", arguments.gif.as_deref(), SEEKS),
+        ("--mp4", arguments.mp4.as_deref(), SEEKS),
+    ])?;
     let camera = arguments.camera.as_deref().map(read_camera).transpose()?;
     if !(arguments.fps > 0.0 && arguments.fps <= 1000.0) {
         return Err(Failure(format!("--fps is {}, expected above 0 and at most 1000", arguments.fps)));

@@ -3,7 +3,8 @@
 use crate::commands::run::{OutputArguments, Outputs};
 use crate::failure::Failure;
 use crate::progress::CountBar;
-use crate::terminal::{print, print_json, warn_of_cut};
+use crate::standard_streams::{FOLDER, LOG_INPUT, refuse, report, takes_output};
+use crate::terminal::{print_json, warn_of_cut};
 use clap::Args;
 use palpate_scene::{LogReplay, Progress};
 use serde_json::json;
@@ -36,6 +37,12 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.runs == 0 {
         return Err(Failure("--runs is 0, expected 1 or more".into()));
     }
+    let outputs = &arguments.outputs;
+    refuse(&[("the log", Some(&arguments.log), LOG_INPUT), ("--vtu", outputs.vtu.as_deref(), FOLDER)])?;
+    let output_is_taken = takes_output(
+        &[("--csv", outputs.csv.as_deref()), ("--contacts", outputs.contacts.as_deref())],
+        outputs.json,
+    )?;
     let log = LogReplay::read(&arguments.log)?;
     warn_of_cut(&log);
     let scene = &log.scene;
@@ -84,7 +91,8 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
             first.computed
         ),
     };
-    print(&format!("{} steps replayed: {compared}\n\n{}", done.steps, summary.text(scene)))
+    let text = format!("{} steps replayed: {compared}\n\n{}", done.steps, summary.text(scene));
+    report(&text, output_is_taken)
 }
 
 fn step_bar(log: &LogReplay) -> CountBar {

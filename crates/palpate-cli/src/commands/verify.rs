@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
 use clap::Args;
-use palpate_verify::{CaseResult, Check, run, select};
+use palpate_verify::{CASES, Case, CaseResult, Check, run, select};
 use serde_json::{Value, json};
 
 /// Compute cases with known answers and show the errors and orders of convergence
@@ -12,12 +12,20 @@ use serde_json::{Value, json};
 /// momentum and energy; contact: bounces, faces on few places, friction, presses, Hertz's law, pinched and lifted cubes, stacks, a million
 /// steps of random fingers. Takes some ten minutes in all on two cores. Exit status 1 when a check fails.
 #[derive(Args)]
+#[command(after_help = case_list())]
 pub struct Arguments {
     /// Only these cases
+    #[arg(value_name = "CASE")]
     cases: Vec<String>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+/// Cases with what they compute.
+fn case_list() -> String {
+    let line = |case: &Case| format!("  {:<24}{}\n", case.name, case.about);
+    format!("Cases:\n{}", CASES.iter().map(line).collect::<String>())
 }
 
 /// Runs the command.

@@ -19,6 +19,7 @@ mod recording_options;
 mod reproduction;
 mod results;
 mod stores;
+mod streams;
 mod viewer;
 mod viewer_access;
 mod workplace;

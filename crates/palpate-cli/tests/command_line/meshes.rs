@@ -188,7 +188,7 @@ fn a_surface_is_reported_with_its_tetrahedra() {
     assert_eq!(
         error.lines().next(),
         Some(
-            "error: invalid value 'box.txt' for '--output <OUT.vtk|OUT.msh>': expected a name that ends in .vtk or .msh"
+            "error: invalid value 'box.txt' for '--output <OUT.vtk|OUT.msh>': expected a name that ends in .vtk or .msh, or - for VTK on standard output"
         )
     );
 

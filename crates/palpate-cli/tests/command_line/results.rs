@@ -172,7 +172,7 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
         table.header,
         "t,left.x,left.y,left.z,left.fx,left.fy,left.fz,left.proxy_x,left.proxy_y,left.proxy_z,right.x,right.y,right.z,\
          right.fx,right.fy,right.fz,right.proxy_x,right.proxy_y,right.proxy_z,cube.px,cube.py,cube.pz,cube.qw,cube.qx,\
-         cube.qy,cube.qz,cube.vx,cube.vy,cube.vz,cube.wx,cube.wy,cube.wz,energy.kinetic,energy.elastic,energy.residual,\
+         cube.qy,cube.qz,cube.vx,cube.vy,cube.vz,cube.wx,cube.wy,cube.wz,cube.fx,cube.fy,cube.fz,cube.tx,cube.ty,cube.tz,energy.kinetic,energy.elastic,energy.residual,\
          energy.potential,energy.coupling,energy.input,energy.dissipated,energy.friction,energy.impact,energy.defect"
     );
     // To the end of the longest path.
@@ -216,6 +216,9 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
         assert!(defect.abs() < SUMMED * moved, "row {row}: {defect}");
         assert!(dissipated >= lost - SUMMED * moved, "row {row}: {dissipated} after {lost}");
         lost = dissipated;
+        // The net force is that of the hands.
+        let net = table.vectors("cube", ["fx", "fy", "fz"])[row];
+        assert!((net + forces[0][row] + forces[1][row]).length() < SUMMED * net.length(), "row {row}: {net}");
         // m·v = Σ f·h + m·g·t.
         let weight = DVec3::Z * (-9.81 * 0.11 * 1e-3 * (row + 1) as f64);
         let momentum = velocities[row] * 0.11;
@@ -232,6 +235,7 @@ fn a_run_writes_every_step_and_its_energy_and_momentum_close() {
             "devices",
             "energy_j",
             "objects",
+            "obstacles",
             "probes",
             "solver",
             "step_s",

@@ -7,7 +7,7 @@
 //! | `/modes` | every frame | modal coordinates of every object |
 //! | `/tf` | every frame | poses, as `foxglove.FrameTransforms` |
 //!
-//! Messages are JSON, in which every number keeps its last bit. The files that the scene was read from are attached, and the metadata
+//! Each topic has a JSON Schema whose fields have their units in their descriptions. Messages are JSON, in which every number keeps its last bit. The files that the scene was read from are attached, and the metadata
 //! record `start` holds the initial state of every object, so that a log replays bit for bit anywhere.
 //!
 //! A log is a series of chunks, each of at most half a second and whole by itself: one that was cut is read up to its last whole
@@ -21,6 +21,7 @@ mod record_reader;
 mod records;
 mod recovery;
 mod scan;
+mod schemas;
 mod summary;
 mod writer;
 

@@ -5,6 +5,7 @@ use super::messages::{
     ModesMessage, STEP_TOPIC, SceneNames, StartMessage, StepMessageOf, contacts, transforms,
 };
 use super::records::{FrameRecord, StepRecord};
+use super::schemas;
 use crate::error::{Error, LogError, with_sources};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
@@ -166,11 +167,10 @@ impl<W: Write + Seek> LogWriter<W> {
             let schema = writer.add_schema(schema, "jsonschema", text.as_bytes()).map_err(failed)?;
             writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(failed)
         };
-        let object = r#"{"type":"object"}"#;
         let channels = Channels {
-            step: channel(STEP_TOPIC, "palpate.Step", object)?,
-            contacts: channel("/contacts", "palpate.Contacts", object)?,
-            modes: channel("/modes", "palpate.Modes", object)?,
+            step: channel(STEP_TOPIC, "palpate.Step", &schemas::step(&names).to_string())?,
+            contacts: channel("/contacts", "palpate.Contacts", &schemas::contacts().to_string())?,
+            modes: channel("/modes", "palpate.Modes", &schemas::modes(&names).to_string())?,
             tf: channel("/tf", "foxglove.FrameTransforms", TRANSFORMS_SCHEMA)?,
         };
         let (step_producer, steps) = buffer_pool(STEP_BUFFERS, || StepRecord::new(state, input));

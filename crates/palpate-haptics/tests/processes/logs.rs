@@ -5,6 +5,7 @@ use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, State, step};
 use palpate_haptics::log::{LogReader, LogWriter, SceneNames, WrittenLog};
 use palpate_haptics::{Error, Motion};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{Cursor, Seek, Write};
 use std::sync::Arc;
@@ -149,8 +150,10 @@ fn files_that_are_no_log_or_half_of_one_are_refused() {
         }
     };
     assert_eq!(error(&bytes), "");
+    // One chunk, and longer than the schemas in the summary.
+    let long = log(STEPS);
     for (what, bytes) in
-        [("empty", &[][..]), ("text", b"t,x,y,z\n0,0,0,0\n"), ("half", &bytes[..bytes.len() / 2])]
+        [("empty", &[][..]), ("text", b"t,x,y,z\n0,0,0,0\n"), ("half", &long[..long.len() / 2])]
     {
         assert!(error(bytes).starts_with("the log"), "{what}: {:?}", error(bytes));
     }
@@ -188,4 +191,60 @@ fn logs_of_every_form_open_with_their_start_and_inputs() {
         let held = |input: &Input| matches!(input.devices[0].mode, DeviceMode::Held(_));
         assert_eq!(inputs.filter(held).count(), if has_held_points { 250 } else { 0 }, "{form}");
     }
+}
+
+/// Check that a value has the fields and types of its schema, each with a description; gives the number of fields.
+fn check_against_schema(value: &Value, schema: &Value, path: &str) -> usize {
+    let description = schema["description"].as_str().unwrap_or_default();
+    assert!(!description.is_empty(), "{path} has no description: {schema}");
+    let is_of = |kind: bool| assert!(kind, "{path} is {value}, its schema {schema}");
+    match schema["type"].as_str().expect("a type") {
+        "object" => {
+            let fields = value.as_object().expect("an object");
+            let check = |(name, field): (&String, &Value)| {
+                let known = &schema["properties"][name];
+                assert!(known.is_object(), "{path}/{name} is not in the schema");
+                check_against_schema(field, known, &format!("{path}/{name}"))
+            };
+            1 + fields.iter().map(check).sum::<usize>()
+        }
+        "array" => {
+            let items = value.as_array().expect("an array");
+            1 + items.iter().map(|item| check_against_schema(item, &schema["items"], path)).sum::<usize>()
+        }
+        kind => {
+            match kind {
+                "number" => {
+                    is_of(value.is_number());
+                    assert!(description.contains('['), "{path} has no unit: {description}");
+                }
+                "integer" => is_of(value.is_u64()),
+                "boolean" => is_of(value.is_boolean()),
+                _ => is_of(kind == "string" && value.is_string()),
+            }
+            1
+        }
+    }
+}
+
+#[test]
+fn every_field_of_a_message_is_in_its_schema_with_its_unit() {
+    let bytes = log(STEPS);
+    let mut fields = BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).expect("a log") {
+        let message = message.expect("a message");
+        let schema = message.channel.schema.as_ref().expect("a schema");
+        if message.channel.topic == "/tf" {
+            assert_eq!(schema.name, "foxglove.FrameTransforms");
+            continue;
+        }
+        let value: Value = serde_json::from_slice(&message.data).expect("JSON");
+        let schema: Value = serde_json::from_slice(&schema.data).expect("a JSON schema");
+        let count = check_against_schema(&value, &schema, &message.channel.topic);
+        let most = fields.entry(message.channel.topic.clone()).or_insert(0);
+        *most = count.max(*most);
+    }
+    let topics: Vec<&str> = fields.keys().map(String::as_str).collect();
+    assert_eq!(topics, ["/contacts", "/modes", "/step"]);
+    assert!(fields.values().all(|count| *count > 12), "{fields:?}");
 }

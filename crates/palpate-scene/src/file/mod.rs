@@ -63,6 +63,19 @@ pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -
     read_source(&source, mode)
 }
 
+/// Reads a scene of bytes that are in no file, as a pipe has them: `name` stands for the file in errors, and files that the scene names are
+/// looked for beside it.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_piped_scene(name: &Path, bytes: &[u8], mode: RunMode) -> Result<Scene, SceneError> {
+    let text = text_of(name, bytes.to_vec())?;
+    let (relocated, parts) = (Relocated::new(), PartsInMemory::default());
+    let source =
+        Source { path: name, text: &text, relocated: &relocated, parts: &parts, mover: DeviceMover::Nobody };
+    read_source(&source, mode)
+}
+
 /// Reads a scene from a text, for a program that may move its devices: one without a path is where the program says in every step, or
 /// exerts the force that it says. Files are looked for beside `path`, which errors name, unless they are in memory.
 ///
@@ -96,6 +109,10 @@ fn read_source(source: &Source, mode: RunMode) -> Result<Scene, SceneError> {
 pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError> {
     let bytes = palpate_mesh::read_regular_file(stored)
         .map_err(|error| SceneError::io("read the scene", path, &error))?;
+    text_of(path, bytes)
+}
+
+fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|_| {
         let message = "it is not a text file; a scene is TOML (docs/scene.md)";
         SceneError::of_file(SceneErrorKind::Syntax, path, message)

@@ -24,6 +24,7 @@
 mod accounting;
 mod clamps;
 mod depenetration;
+mod net_forces;
 mod output;
 mod prescribed_forces;
 mod sleep;

@@ -1,5 +1,6 @@
 //! Output of a step.
 
+use super::net_forces;
 use crate::collision::OtherSide;
 use crate::device::PrescribedForce;
 use crate::io::{ClampOutput, ContactOutput, Input};
@@ -9,7 +10,8 @@ use glam::DVec3;
 
 /// Write the output of a step from the state at its end.
 pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, clamps, contacts, couplings, workspace, output, .. } = state;
+    let State { steps, objects, devices, obstacles, clamps, contacts, couplings, workspace, output, .. } =
+        state;
     let (sleepers, resting) = (&state.sleepers, &state.resting);
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;
@@ -23,6 +25,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         }
         out.energy = own.ledger;
         out.penetration_m = 0.0;
+        (out.force, out.torque) = (DVec3::ZERO, DVec3::ZERO);
     }
     output.energy = resting.scene_energy(couplings, objects, sleepers);
     for (number, out) in output.devices.iter_mut().enumerate() {
@@ -33,6 +36,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
             let (own, point) = (&objects[object], objects[object].points.of(slot));
             out.force_on_hand = -point.force;
             out.proxy = own.rigid.pose.position + point.end_arm;
+            net_forces::add(&mut output.objects[object], point.force, out.proxy);
         } else if device.active {
             out.proxy = device.proxy;
         } else if let Some(given) = input.devices.get(number).filter(|given| given.position.is_finite()) {
@@ -45,6 +49,7 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
         let own = &objects[contact.object()];
         let point = own.rigid.pose.position + own.points.of(contact.slot).end_arm;
         let carries_force = contact.force != DVec3::ZERO;
+        net_forces::add(&mut output.objects[contact.object()], contact.force, point);
         if let OtherSide::Clamp { number, .. } = contact.other {
             let out = &mut output.clamps[number];
             out.force -= contact.force;
@@ -59,6 +64,9 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
             for object in [Some(contact.object()), other].into_iter().flatten() {
                 let out = &mut output.objects[object];
                 out.penetration_m = out.penetration_m.max(penetration);
+            }
+            if let Some(other) = other {
+                net_forces::add(&mut output.objects[other], -contact.force, point);
             }
         }
         if let (true, true, OtherSide::Device(device)) = (carries_force, contact.is_held(), contact.other) {
@@ -79,4 +87,5 @@ pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
             });
         }
     }
+    net_forces::write_obstacles(output, resting, obstacles);
 }

@@ -7,7 +7,7 @@
 //!
 //! Equations: docs/theory.md (C84).
 
-use super::{accepts_gravity, collision_context, predict_object, usable, usable_base};
+use super::{accepts_gravity, collision_context, net_forces, predict_object, usable, usable_base};
 use crate::collision::OtherSide;
 use crate::io::{DeviceMode, Input};
 use crate::object::{Object, ObjectState};
@@ -61,7 +61,7 @@ pub(super) fn wake_near(model: &Model, state: &mut State) {
 
 /// Wake the groups that were disturbed: their contacts go on with the forces that they had.
 fn wake(state: &mut State) {
-    let State { steps, sleepers, resting, contacts, levels, output, objects, .. } = state;
+    let State { steps, sleepers, resting, contacts, levels, output, objects, obstacles, .. } = state;
     let wakes = sleepers.wake(|at| {
         levels.keep_for_now(at, *steps);
         contacts.append(&mut resting.contacts[at]);
@@ -74,6 +74,7 @@ fn wake(state: &mut State) {
         output.contacts.truncate(resting.outputs);
         output.contacts.retain(|contact| !sleepers.is_awake(contact.object));
         resting.outputs = output.contacts.len();
+        net_forces::update_resting(resting, &output.contacts, obstacles);
     }
 }
 
@@ -81,7 +82,7 @@ fn wake(state: &mut State) {
 pub(super) fn fall_asleep(model: &Model, state: &mut State) {
     let Some(steps) = model.parameters.steps_until_sleep() else { return };
     let rules = model.step_rules(state.gravity);
-    let State { sleepers, objects, contacts, levels, resting, couplings, output, .. } = state;
+    let State { sleepers, objects, obstacles, contacts, levels, resting, couplings, output, .. } = state;
     let mut could_sleep = false;
     for index in 0..sleepers.awake().len() {
         let at = sleepers.awake()[index] as usize;
@@ -121,6 +122,8 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
         .sort_unstable_by_key(|contact| (sleepers.is_awake(contact.object), contact.against, contact.object));
     resting.outputs = output.contacts.partition_point(|contact| !sleepers.is_awake(contact.object));
     output.contacts[..resting.outputs].iter_mut().for_each(|contact| contact.slip_speed = 0.0);
+    net_forces::update_resting(resting, &output.contacts, obstacles);
+    net_forces::write_obstacles(output, resting, obstacles);
     resting.update_energy(objects, sleepers);
     output.energy = resting.scene_energy(couplings, objects, sleepers);
 }

@@ -61,7 +61,7 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
     let bytes = recording.to_bytes()?;
     write_atomically(&recording_path, &bytes)?;
     print("An elastic cube, 10 cm and 110 g, as soft as jelly:\n\n")?;
-    inspect::print_as_text(&recording, &recording_path, bytes.len())?;
+    inspect::print_as_text(&recording, &recording_path, bytes.len(), false)?;
 
     for (name, side) in [("left", -1.0), ("right", 1.0)] {
         write_atomically(&output.join(format!("{name}.csv")), shake_path(side).as_bytes())?;

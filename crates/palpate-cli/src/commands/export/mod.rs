@@ -5,6 +5,7 @@ mod recording;
 
 use crate::failure::Failure;
 use crate::log_kind::{has_ending, is_log};
+use crate::standard_streams::{FOLDER, LOG_INPUT, SEEKS, refuse};
 use crate::terminal::{print, print_json, size_text};
 use clap::{ArgGroup, Args};
 use palpate_export::WrittenFile;
@@ -60,8 +61,18 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Reason against rows on standard output.
+const LISTED: &str = "the files are listed there; palpate replay writes rows to standard output";
+
 /// Runs the command.
 pub fn export(arguments: &Arguments) -> Result<(), Failure> {
+    refuse(&[
+        ("the log or recording", Some(&arguments.source), LOG_INPUT),
+        ("--vtu", arguments.vtu.as_deref(), FOLDER),
+        ("--gltf", arguments.gltf.as_deref(), SEEKS),
+        ("--csv", arguments.csv.as_deref(), LISTED),
+        ("--contacts", arguments.contacts.as_deref(), LISTED),
+    ])?;
     if is_log(&arguments.source) {
         if arguments.modes.is_some() {
             return Err(misplaced("--modes", "a recording", &arguments.source));

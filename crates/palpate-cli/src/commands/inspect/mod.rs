@@ -6,6 +6,7 @@ mod stability;
 use crate::failure::Failure;
 use crate::log_kind::is_log;
 use crate::progress::Bars;
+use crate::standard_streams::{STANDARD_INPUT, is_stream, read_input, report};
 use crate::terminal::{print, print_json, size_text};
 use clap::Args;
 use glam::DVec3;
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
   palpate inspect cube.palp --device omega.3 --rate 4000 --grip firm --point 0,0.05,0
   palpate inspect cube.palp --device touch --delay 0.02      # over a link, 20 ms there and back")]
 pub struct Arguments {
-    /// The recording, the log (.mcap), or the store: a folder or s3://BUCKET/PREFIX
+    /// The recording (`-` for standard input), the log (.mcap), or the store: a folder or s3://BUCKET/PREFIX
     file: PathBuf,
     /// Don't read a store's shards to check them
     #[arg(long)]
@@ -47,6 +48,12 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
+    if is_stream(&arguments.file) {
+        let bytes = read_input()?;
+        let refused = |error| Failure(format!("{STANDARD_INPUT}: {error}; a log or a store needs a path"));
+        let recording = Recording::from_bytes(&bytes).map_err(refused)?;
+        return inspect_recording(arguments, &recording, bytes.len());
+    }
     let text = arguments.file.to_string_lossy();
     if arguments.file.is_dir() || text.contains("://") {
         return inspect_store(arguments, &Location::parse(&text));
@@ -55,14 +62,20 @@ pub fn inspect(arguments: &Arguments) -> Result<(), Failure> {
         return log::inspect(&arguments.file, arguments.json);
     }
     let recording = read_recording(&arguments.file)?;
-    if arguments.stability.print_if_given(&recording, arguments.json)? {
+    let bytes = std::fs::metadata(&arguments.file).map_or(0, |m| m.len() as usize);
+    inspect_recording(arguments, &recording, bytes)
+}
+
+fn inspect_recording(arguments: &Arguments, recording: &Recording, bytes: usize) -> Result<(), Failure> {
+    if arguments.stability.print_if_given(recording, arguments.json)? {
         return Ok(());
     }
     if arguments.json {
-        return print_as_json(&recording);
+        return print_as_json(recording);
     }
-    let bytes = std::fs::metadata(&arguments.file).map_or(0, |m| m.len() as usize);
-    print_as_text(&recording, &arguments.file, bytes)
+    let is_piped = is_stream(&arguments.file);
+    let name = if is_piped { Path::new(STANDARD_INPUT) } else { &arguments.file };
+    print_as_text(recording, name, bytes, false)
 }
 
 fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failure> {
@@ -241,8 +254,13 @@ pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
 }
 
 /// Prints a recording as text.
-pub fn print_as_text(recording: &Recording, path: &Path, bytes: usize) -> Result<(), Failure> {
-    print(&describe(recording, path, bytes).map_err(|e| Failure(e.to_string()))?)
+pub fn print_as_text(
+    recording: &Recording,
+    path: &Path,
+    bytes: usize,
+    output_is_taken: bool,
+) -> Result<(), Failure> {
+    report(&describe(recording, path, bytes).map_err(|e| Failure(e.to_string()))?, output_is_taken)
 }
 
 fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, std::fmt::Error> {

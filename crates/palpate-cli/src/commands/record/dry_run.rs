@@ -3,20 +3,16 @@
 use super::Arguments;
 use crate::failure::Failure;
 use crate::terminal::{print, print_json};
-use palpate_fem::{Estimate, RecordParameters, available_memory, estimate};
-use palpate_mesh::Mesh;
-use palpate_scene::source_name;
+use palpate_fem::{Estimate, available_memory, estimate};
+use palpate_scene::PreparedBody;
 use serde_json::json;
 
 /// Prints the cost of a recording; fails if it needs more memory than is free.
-pub fn print_estimate(
-    arguments: &Arguments,
-    mesh: Mesh,
-    parameters: &RecordParameters,
-) -> Result<(), Failure> {
-    let source = source_name(&arguments.source);
+pub fn print_estimate(arguments: &Arguments, body: PreparedBody) -> Result<(), Failure> {
+    let PreparedBody { mesh, parameters, .. } = body;
+    let source = parameters.source.clone();
     let failed = |error: palpate_fem::RecordError| Failure(format!("{source}: {error}"));
-    let cost = estimate(mesh, parameters).map_err(failed)?;
+    let cost = estimate(mesh, &parameters).map_err(failed)?;
     if arguments.json {
         print_json(&as_json(&cost))?;
     } else {

@@ -1,21 +1,18 @@
 //! `palpate record`: from a mesh to a recording.
 
 mod dry_run;
-mod material_choice;
 mod table;
 
 use crate::commands::inspect;
 use crate::failure::Failure;
 use crate::progress::Bars;
+use crate::standard_streams::{FOLDER, STANDARD_INPUT, read_input, refuse, takes_output, write_output};
 use clap::Args;
-use material_choice::{damping, materials};
+use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
-use palpate_fem::{
-    ElementOrder, ErrorTarget, Precision, Progress, RecordExtent, RecordParameters, RecordedBody,
-    ResidualChoice,
-};
-use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Repair};
-use palpate_scene::{read_body, read_supports, source_name};
+use palpate_fem::{ElementOrder, ErrorTarget, Precision, Progress, RecordExtent, ResidualChoice};
+use palpate_mesh::{MergeNodes, PieceChoice, Repair};
+use palpate_scene::{BodySource, MaterialChoice, RecordOptions};
 use std::path::{Path, PathBuf};
 use table::{TableArguments, TableCommand};
 
@@ -46,9 +43,9 @@ In place of young and poisson a table may have name = \"liver\", or for anisotro
   stiffness = [21 numbers]          # upper triangle by rows; xx, yy, zz, yz, xz, xy; Pa
   axes = [[1, 0, 0], [0, 1, 0]]     # the material's first and second axis in the mesh")]
 pub struct Arguments {
-    /// A mesh file of solid elements (Gmsh, VTK, VTU, TetGen, MEDIT, Vega, Abaqus) or of a closed surface (STL, OBJ, PLY, OFF, glTF), see `palpate mesh --help`; box:LXxLYxLZ/NXxNYxNZ (metres / cells; five tetrahedra per cell, or six with /6 after it: for thin plates), or sphere:RADIUS/N
+    /// A mesh file (`-` for standard input) of solid elements (Gmsh, VTK, VTU, TetGen, MEDIT, Vega, Abaqus) or of a closed surface (STL, OBJ, PLY, OFF, glTF), see `palpate mesh --help`; box:LXxLYxLZ/NXxNYxNZ (metres / cells; five tetrahedra per cell, or six with /6 after it: for thin plates), or sphere:RADIUS/N
     pub source: String,
-    /// The recording to write; may be left out with --dense
+    /// The recording to write, `-` for standard output; may be left out with --dense
     #[arg(short, long, value_name = "OUT.palp", required_unless_present_any = ["dense", "dry_run"])]
     pub output: Option<PathBuf>,
     /// Young's modulus [Pa]; may be left out with its two fellows where the mesh file gives materials
@@ -188,38 +185,36 @@ fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
 
 /// Runs the command.
 pub fn record(arguments: &Arguments) -> Result<(), Failure> {
+    let output = arguments.output.as_deref();
+    refuse(&[("--dense", arguments.dense.dense.as_deref().map(Path::new), FOLDER)])?;
+    let output_is_taken = takes_output(&[("-o", output)], arguments.json)?;
     let inputs: Vec<&Path> =
         [Some(Path::new(&arguments.source)), arguments.materials.as_deref()].into_iter().flatten().collect();
-    if let Some(output) = &arguments.output {
+    if let Some(output) = output.filter(|_| !output_is_taken) {
         check_writable(output, &inputs)?;
     }
     let mut progress = Bars::new();
-    let meshing = MeshingParameters { cell_size: arguments.cell_size };
-    let mut mesh = read_body(&arguments.source, arguments.scale, &meshing, &mut progress)?;
-    let repair =
-        Repair { merge_nodes: arguments.merge_nodes.into(), piece: arguments.piece.unwrap_or_default() };
-    mesh.repair(&repair).map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
-    if arguments.order == 2 {
-        mesh.add_mid_edge_nodes();
-    }
-    let table = TableCommand::new(&arguments.dense, &mesh)?;
-    let extent = table.as_ref().map_or(RecordExtent::Full, |table| table.extent(arguments.output.is_some()));
-    let parameters = parameters(arguments, extent, &mesh)?;
+    let piped = if arguments.source == "-" { Some(read_input()?) } else { None };
+    let source = piped
+        .as_ref()
+        .map_or(BodySource::Text(&arguments.source), |bytes| BodySource::Bytes(bytes, STANDARD_INPUT));
+    let mut body = options(arguments)?.prepare(source, &mut progress)?;
+    let table = TableCommand::new(&arguments.dense, &body.mesh)?;
+    body.parameters.extent =
+        table.as_ref().map_or(RecordExtent::Full, |table| table.extent(arguments.output.is_some()));
     if arguments.dry_run {
-        return dry_run::print_estimate(arguments, mesh, &parameters);
+        return dry_run::print_estimate(arguments, body);
     }
-    let target = ErrorTarget { force_error: arguments.force_error, bandwidth_hz: arguments.bandwidth };
-    let recorded = if target == ErrorTarget::default() {
-        RecordedBody::new(mesh, &parameters, &mut progress)
-    } else {
-        RecordedBody::within(&mesh, &parameters, &target, &mut progress)
-    };
-    let recorded = recorded.map_err(|e| Failure(format!("{}: {e}", source_name(&arguments.source))))?;
+    let recorded = body.record(&mut progress)?;
     let mut written = None;
     if let Some(output) = &arguments.output {
         progress.begin("writing", 1);
         let bytes = recorded.recording.to_bytes()?;
-        write_atomically(output, &bytes)?;
+        if output_is_taken {
+            write_output(&bytes)?;
+        } else {
+            write_atomically(output, &bytes)?;
+        }
         written = Some((output, bytes.len()));
     }
     progress.finish();
@@ -229,30 +224,55 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         (None, Some(store)) if arguments.json => inspect::print_store_as_json(&store, &[]),
         (written, store) => {
             if let Some((output, bytes)) = written {
-                inspect::print_as_text(&recorded.recording, output, bytes)?;
+                inspect::print_as_text(&recorded.recording, output, bytes, output_is_taken)?;
             }
             store.map_or(Ok(()), |store| inspect::print_store_as_text(&store, &[]))
         }
     }
 }
 
-fn parameters(arguments: &Arguments, extent: RecordExtent, mesh: &Mesh) -> Result<RecordParameters, Failure> {
-    let (materials, named_damping) = materials(arguments, mesh)?;
-    let damping = damping(arguments, named_damping)?;
-    let (fixed_nodes, supports) = read_supports(mesh, &arguments.fix, &arguments.spring)?;
-    Ok(RecordParameters {
-        materials,
-        order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
+/// Options of the library, by the arguments.
+fn options(arguments: &Arguments) -> Result<RecordOptions, Failure> {
+    Ok(RecordOptions {
+        materials: materials(arguments)?,
+        damping: damping(arguments)?,
         modes: arguments.modes,
-        damping,
+        target: ErrorTarget { force_error: arguments.force_error, bandwidth_hz: arguments.bandwidth },
+        order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
+        scale: arguments.scale,
+        cell_size: arguments.cell_size,
+        repair: Repair {
+            merge_nodes: arguments.merge_nodes.into(),
+            piece: arguments.piece.unwrap_or_default(),
+        },
+        fix: arguments.fix.clone(),
+        spring: arguments.spring.clone(),
         residual: arguments.residual,
         precision: match (arguments.precision, &arguments.dense.dense) {
             (Some(PrecisionOption::Compact), _) | (None, None) => Precision::Compact,
             (Some(PrecisionOption::Full), _) | (None, Some(_)) => Precision::Full,
         },
-        fixed_nodes,
-        supports,
-        source: source_name(&arguments.source),
-        extent,
     })
+}
+
+fn materials(arguments: &Arguments) -> Result<MaterialChoice, Failure> {
+    if !arguments.material.is_empty() {
+        return Ok(MaterialChoice::Named(arguments.material.clone()));
+    }
+    match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
+        (Some(path), ..) => Ok(MaterialChoice::File(path.clone())),
+        (None, Some(young), Some(poisson), Some(density)) => {
+            Ok(MaterialChoice::Uniform(Material::isotropic(young, poisson, density)))
+        }
+        (None, None, None, None) => Ok(MaterialChoice::OfMesh),
+        _ => Err(Failure("give --young, --poisson and --density, or --material, or --materials".into())),
+    }
+}
+
+fn damping(arguments: &Arguments) -> Result<Option<Damping>, Failure> {
+    match (arguments.rayleigh.as_deref(), arguments.damping_ratio) {
+        (Some(&[alpha, beta]), _) => Ok(Some(Damping::Rayleigh { alpha, beta })),
+        (Some(other), _) => Err(Failure(format!("--rayleigh is {other:?}, expected two numbers ALPHA,BETA"))),
+        (None, ratio) => Ok(ratio.map(Damping::Ratio)),
+    }
 }

@@ -7,16 +7,19 @@ mod summary;
 mod warnings;
 
 use crate::failure::Failure;
-use crate::terminal::{notify, print, print_json};
+use crate::standard_streams::{
+    FOLDER, LOG_OUTPUT, STANDARD_INPUT, is_stream, read_input, refuse, report, takes_output,
+};
+use crate::terminal::{notify, print_json};
 use clap::Args;
 use indicatif::ProgressBar;
 pub use outputs::{OutputArguments, Outputs};
 use palpate::{State, step};
-use palpate_scene::{RunMode, Scene, SceneDevice, read_scene};
+use palpate_scene::{RunMode, Scene, SceneDevice, read_piped_scene, read_scene};
 pub use realtime::{RealtimeArguments, read_secret};
 pub use realtime_report::{device_line, percentiles, safety, timing};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 pub use summary::Summary;
 
@@ -47,7 +50,7 @@ pub use summary::Summary;
   sphere = { radius = 0.02 }        # or box, capsule, mesh
   position = [0.0, 0.2, 0.0]        # or path = { file = \"ball.csv\" }")]
 pub struct Arguments {
-    /// Scene file
+    /// Scene file; `-` for standard input, with the files that it names in the current folder
     pub scene: PathBuf,
     /// Duration [s]; by default to the end of the longest path, in real time with real or linked devices until Ctrl-C
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -82,7 +85,23 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         (false, true) => RunMode::Reference,
         (false, false) => RunMode::Offline,
     };
-    let scene = read_scene(&arguments.scene, mode)?;
+    let outputs = &arguments.outputs;
+    refuse(&[
+        ("--vtu", outputs.vtu.as_deref(), FOLDER),
+        ("--log", arguments.realtime.log.as_deref(), LOG_OUTPUT),
+    ])?;
+    let output_is_taken = takes_output(
+        &[("--csv", outputs.csv.as_deref()), ("--contacts", outputs.contacts.as_deref())],
+        outputs.json,
+    )?;
+    let scene = if is_stream(&arguments.scene) {
+        if arguments.realtime.log.is_some() {
+            return Err(Failure("a log keeps the scene's file: write the scene to one for --log".into()));
+        }
+        read_piped_scene(Path::new(STANDARD_INPUT), &read_input()?, mode)?
+    } else {
+        read_scene(&arguments.scene, mode)?
+    };
     scene.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
     scene.choices.iter().for_each(|choice| notify(choice));
     warnings::refuse(arguments.strict, &scene.warnings)?;
@@ -94,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.outputs.json {
         print_json(&summary.json(&scene))?;
     } else {
-        print(&summary.text(&scene))?;
+        report(&summary.text(&scene), output_is_taken)?;
     }
     warnings::refuse(arguments.strict, &summary.warnings(&scene))
 }

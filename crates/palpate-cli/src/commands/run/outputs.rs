@@ -12,10 +12,10 @@ use std::time::Duration;
 /// Outputs of a run.
 #[derive(Args, Debug, Clone)]
 pub struct OutputArguments {
-    /// Write every step: device positions, forces and proxies, object poses and velocities, energies
+    /// Write every step: device positions, forces and proxies, object poses and velocities, net forces, energies; `-` for standard output
     #[arg(long, value_name = "OUT.csv")]
     pub csv: Option<PathBuf>,
-    /// Write every contact of every step: what touches what, where, with which force, gap and slip
+    /// Write every contact of every step: what touches what, where, with which force, gap and slip; `-` for standard output
     #[arg(long, value_name = "OUT.csv")]
     pub contacts: Option<PathBuf>,
     /// Write objects, obstacles, contacts and devices for ParaView (VTU files and scene.pvd)

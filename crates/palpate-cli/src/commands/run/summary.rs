@@ -19,7 +19,8 @@ pub struct Summary {
     /// Force on the hand by device and step [N].
     pub forces: Vec<Vec<DVec3>>,
     last: Output,
-    /// Largest force [N] and torque [N·m] on each clamp.
+    /// Largest force [N] and torque [N·m] on each plane and obstacle, and on each clamp.
+    obstacle_maxima: Vec<[f64; 2]>,
     clamp_maxima: Vec<[f64; 2]>,
     /// Readings of the probes at the end.
     probes: Vec<ProbeReading>,
@@ -52,6 +53,7 @@ impl Summary {
             steps,
             forces: vec![Vec::with_capacity(steps); scene.devices.len()],
             last: start.clone(),
+            obstacle_maxima: vec![[0.0; 2]; scene.obstacles.len()],
             clamp_maxima: vec![[0.0; 2]; scene.clamps.len()],
             probes: Vec::new(),
             status: StepStatus::default(),
@@ -79,10 +81,9 @@ impl Summary {
         for (largest, object) in self.penetration.iter_mut().zip(&output.objects) {
             *largest = largest.max(object.penetration_m);
         }
-        for (largest, clamp) in self.clamp_maxima.iter_mut().zip(&output.clamps) {
-            let now = [clamp.force.length(), clamp.torque.length()];
-            *largest = [0, 1].map(|at| largest[at].max(now[at]));
-        }
+        let obstacles = output.obstacles.iter().map(|obstacle| [obstacle.force, obstacle.torque]);
+        raise(&mut self.obstacle_maxima, obstacles);
+        raise(&mut self.clamp_maxima, output.clamps.iter().map(|clamp| [clamp.force, clamp.torque]));
         for contact in &output.contacts {
             if let Collider::Device(number) = contact.against {
                 self.touched[number].0 = true;
@@ -180,9 +181,23 @@ impl Summary {
                     "orientation": [q.w, q.x, q.y, q.z],
                     "velocity_m_s": object.twist.linear.to_array(),
                     "angular_velocity_rad_s": object.twist.angular.to_array(),
+                    "force_last_xyz_n": object.force.to_array(),
+                    "torque_last_xyz_nm": object.torque.to_array(),
                     "displacement_max_m": deformation,
                     "largest_penetration_m": penetration,
                     "is_asleep": object.is_asleep,
+                })
+            })
+            .collect();
+        let obstacles = scene.obstacles.iter().zip(&self.last.obstacles).zip(&self.obstacle_maxima);
+        let obstacles: Vec<Value> = obstacles
+            .map(|((obstacle, last), [force_max, torque_max])| {
+                json!({
+                    "name": obstacle.name,
+                    "force_last_xyz_n": last.force.to_array(),
+                    "torque_last_xyz_nm": last.torque.to_array(),
+                    "force_max_n": force_max,
+                    "torque_max_nm": torque_max,
                 })
             })
             .collect();
@@ -220,6 +235,7 @@ impl Summary {
             "step_s": scene.model.parameters().step_s,
             "devices": devices,
             "objects": objects,
+            "obstacles": obstacles,
             "clamps": clamps,
             "probes": probes,
             "contacts": { "count_max": self.max_contacts, "force_max_n": self.max_contact_force },
@@ -283,6 +299,9 @@ impl Summary {
                 1000.0 * deformation,
                 if object.is_asleep { ", asleep" } else { "" }
             );
+        }
+        for (obstacle, last) in scene.obstacles.iter().zip(&self.last.obstacles) {
+            out += &format!("  {:<12} carries {:.5} N at the end\n", obstacle.name, last.force.length());
         }
         for (clamp, last) in scene.clamps.iter().zip(&self.last.clamps) {
             out += &format!(
@@ -399,6 +418,13 @@ impl Summary {
             energy.input,
             energy.defect.abs()
         )
+    }
+}
+
+/// Raise largest forces and torques to those of a step.
+fn raise(maxima: &mut [[f64; 2]], now: impl Iterator<Item = [DVec3; 2]>) {
+    for (largest, now) in maxima.iter_mut().zip(now) {
+        *largest = [0, 1].map(|at| largest[at].max(now[at].length()));
     }
 }
 

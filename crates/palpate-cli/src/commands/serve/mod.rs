@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::interrupt::stop_on_interrupt;
 use crate::log_kind::is_log;
 use crate::progress::CountBar;
+use crate::standard_streams::{LOG_OUTPUT, SERVED, refuse};
 use crate::terminal::warn_of_cut;
 use access::AccessOptions;
 use clap::Args;
@@ -75,6 +76,8 @@ const PRIORITY: u8 = 80;
 /// Runs the command.
 pub fn serve(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { files, scene, serving } = arguments;
+    let given = files.iter().map(|file| ("what is served", Some(file.as_path()), SERVED));
+    refuse(&given.chain([("--log", serving.log.as_deref(), LOG_OUTPUT)]).collect::<Vec<_>>())?;
     match files.as_slice() {
         [] => serve_built_in(serving, scene.as_deref().unwrap_or(BUILT_IN_SCENES[0].id)),
         logs if logs.iter().all(|file| is_log(file)) => match &serving.log {

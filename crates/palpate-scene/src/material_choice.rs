@@ -1,53 +1,57 @@
-//! Materials and damping of a recording: by numbers, by name, from a material file or from the mesh file.
+//! Materials of the regions of a mesh: by numbers, by name, from a material file or from the mesh file.
 
-use super::Arguments;
-use crate::failure::Failure;
+use crate::error::{SceneError, SceneErrorKind};
 use palpate::{Damping, Material};
 use palpate_fem::{LibraryMaterial, library_material, materials_from_toml};
 use palpate_mesh::{Mesh, Region, read_regular_text};
+use std::path::PathBuf;
 
-/// Materials of the regions, and the damping that is given with them.
-pub fn materials(arguments: &Arguments, mesh: &Mesh) -> Result<(Vec<Material>, Option<Damping>), Failure> {
-    if !arguments.material.is_empty() {
-        return by_name(&arguments.material, mesh);
-    }
-    let materials = match (&arguments.materials, arguments.young, arguments.poisson, arguments.density) {
-        (Some(path), ..) => {
-            let text = read_regular_text(path).map_err(|e| Failure::file("read the materials", path, &e))?;
-            materials_from_toml(&text, mesh).map_err(|e| Failure(format!("{}: {e}", path.display())))?
-        }
-        (None, Some(young), Some(poisson), Some(density)) => {
-            vec![Material::isotropic(young, poisson, density); mesh.regions.len()]
-        }
-        (None, None, None, None) => mesh.regions.iter().map(of_file).collect::<Result<_, _>>()?,
-        _ => {
-            return Err(Failure(
-                "give --young, --poisson and --density, or --material, or --materials".into(),
-            ));
-        }
-    };
-    Ok((materials, None))
+/// Choice of the materials of a body.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[expect(clippy::large_enum_variant, reason = "there is one per recording")]
+pub enum MaterialChoice {
+    /// Those of the mesh file.
+    #[default]
+    OfMesh,
+    /// One for all regions.
+    Uniform(Material),
+    /// Materials of the library by `NAME` and `REGION=NAME`, as `--material`; other regions take that of the mesh file.
+    Named(Vec<String>),
+    /// A material file, as `--materials`.
+    File(PathBuf),
 }
 
-/// Damping of the options, or else of the named material.
-pub fn damping(arguments: &Arguments, named: Option<Damping>) -> Result<Damping, Failure> {
-    match (arguments.rayleigh.as_deref(), arguments.damping_ratio) {
-        (Some(&[alpha, beta]), _) => Ok(Damping::Rayleigh { alpha, beta }),
-        (Some(other), _) => Err(Failure(format!("--rayleigh is {other:?}, expected two numbers ALPHA,BETA"))),
-        (None, Some(ratio)) => Ok(Damping::Ratio(ratio)),
-        (None, None) => Ok(named.unwrap_or(Damping::Ratio(0.0))),
+impl MaterialChoice {
+    /// Materials of the regions, and the damping that comes with their names.
+    pub(crate) fn of(&self, mesh: &Mesh) -> Result<(Vec<Material>, Option<Damping>), SceneError> {
+        let materials = match self {
+            Self::Named(choices) => return by_name(choices, mesh),
+            Self::OfMesh => mesh.regions.iter().map(of_file).collect::<Result<_, _>>()?,
+            Self::Uniform(material) => vec![material.clone(); mesh.regions.len()],
+            Self::File(path) => {
+                let text =
+                    read_regular_text(path).map_err(|e| SceneError::io("read the materials", path, &e))?;
+                let refused = |e| refused(format!("{}: {e}", path.display()));
+                materials_from_toml(&text, mesh).map_err(refused)?
+            }
+        };
+        Ok((materials, None))
     }
+}
+
+fn refused(message: impl std::fmt::Display) -> SceneError {
+    SceneError::new(SceneErrorKind::Mesh, message)
 }
 
 /// Materials of the library by `NAME` and `REGION=NAME`; other regions take that of the mesh file. Damping is that of the material if all
 /// regions have the same.
-fn by_name(choices: &[String], mesh: &Mesh) -> Result<(Vec<Material>, Option<Damping>), Failure> {
+fn by_name(choices: &[String], mesh: &Mesh) -> Result<(Vec<Material>, Option<Damping>), SceneError> {
     let mut chosen: Vec<Option<&LibraryMaterial>> = vec![None; mesh.regions.len()];
     let (mut of_all, mut of_region) = (None, vec![None; mesh.regions.len()]);
     for choice in choices {
         let (label, name) =
             choice.split_once('=').map_or((None, choice.as_str()), |(r, n)| (Some(r.trim()), n.trim()));
-        let found = library_material(name).map_err(|error| Failure(format!("--material: {error}")))?;
+        let found = library_material(name).map_err(|error| refused(format!("--material: {error}")))?;
         let slots: Vec<&mut Option<_>> = match label {
             None => vec![&mut of_all],
             Some(label) => {
@@ -62,14 +66,14 @@ fn by_name(choices: &[String], mesh: &Mesh) -> Result<(Vec<Material>, Option<Dam
         };
         if slots.is_empty() {
             let regions: Vec<String> = mesh.regions.iter().map(Region::label).collect();
-            return Err(Failure(format!(
+            return Err(refused(format!(
                 "--material {choice}: the mesh has no such region; it has {}",
                 regions.join(", ")
             )));
         }
         for slot in slots {
             if slot.replace(found).is_some() {
-                return Err(Failure(format!("--material {choice}: there is a material for that already")));
+                return Err(refused(format!("--material {choice}: there is a material for that already")));
             }
         }
     }
@@ -92,10 +96,10 @@ fn by_name(choices: &[String], mesh: &Mesh) -> Result<(Vec<Material>, Option<Dam
 }
 
 /// Material that the mesh file gives to a region.
-fn of_file(region: &Region) -> Result<Material, Failure> {
+fn of_file(region: &Region) -> Result<Material, SceneError> {
     let label = region.label();
     let Some(found) = &region.material else {
-        return Err(Failure(format!(
+        return Err(refused(format!(
             "region '{label}' has no material in the mesh file: give --young, --poisson and --density, --material, or --materials"
         )));
     };
@@ -115,7 +119,7 @@ mod tests {
 
     fn chosen(choices: &[&str], mesh: &Mesh) -> Result<Vec<(String, f64)>, String> {
         let choices: Vec<String> = choices.iter().map(ToString::to_string).collect();
-        let (materials, _) = by_name(&choices, mesh).map_err(|failure| failure.0)?;
+        let (materials, _) = by_name(&choices, mesh).map_err(|error| error.message)?;
         Ok(materials.into_iter().map(|one| (one.region, one.density_kg_m3)).collect())
     }
 
@@ -144,7 +148,7 @@ mod tests {
     fn damping_comes_with_a_material_of_the_whole_body() {
         let damping = |choices: &[&str]| {
             let choices: Vec<String> = choices.iter().map(ToString::to_string).collect();
-            by_name(&choices, &mesh()).map(|(_, damping)| damping).map_err(|failure| failure.0)
+            by_name(&choices, &mesh()).map(|(_, damping)| damping).map_err(|error| error.message)
         };
         assert_eq!(damping(&["paper"]), Ok(Some(Damping::Rayleigh { alpha: 2.0, beta: 2e-4 })));
         assert_eq!(damping(&["core=paper", "steel"]), Ok(None));

@@ -1,0 +1,218 @@
+//! Recording of a body with the options of `palpate record`: mesh, repair, materials, supports, modes.
+//!
+//! ```text
+//! RecordOptions, BodySource → prepare → PreparedBody { mesh, parameters } → record → Recording
+//! ```
+
+use crate::error::{SceneError, SceneErrorKind};
+use crate::material_choice::MaterialChoice;
+use crate::mesh_source::{read_body, read_body_bytes, source_name};
+use crate::supports::read_supports;
+use palpate::{Damping, Recording};
+use palpate_fem::{
+    ElementOrder, ErrorTarget, Precision, Progress, RecordParameters, RecordedBody, ResidualChoice,
+};
+use palpate_mesh::{Mesh, MeshingParameters, Repair};
+use std::fmt::Display;
+
+/// Options of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordOptions {
+    /// Materials.
+    pub materials: MaterialChoice,
+    /// Damping of the modes; none for that of the named material, or else no damping.
+    pub damping: Option<Damping>,
+    /// Number of modes to keep.
+    pub modes: usize,
+    /// Errors that the certificate has to keep, instead of a number of modes.
+    pub target: ErrorTarget,
+    /// Order of the elements.
+    pub order: ElementOrder,
+    /// Metres per unit of the mesh.
+    pub scale: f64,
+    /// Side of the cells that a surface is filled with [m]; none for about 2,000 nodes.
+    pub cell_size: Option<f64>,
+    /// Repairs of the mesh.
+    pub repair: Repair,
+    /// Fixed nodes, as `--fix`.
+    pub fix: Vec<String>,
+    /// Faces on springs, as `--spring`.
+    pub spring: Vec<String>,
+    /// Part of the residual compliance to keep.
+    pub residual: ResidualChoice,
+    /// Precision of the numbers to keep.
+    pub precision: Precision,
+}
+
+impl Default for RecordOptions {
+    /// Options of `palpate record` without any: materials of the mesh file, no damping, 200 modes, quadratic elements, metres, a free body,
+    /// compact.
+    fn default() -> Self {
+        Self {
+            materials: MaterialChoice::OfMesh,
+            damping: None,
+            modes: 200,
+            target: ErrorTarget::default(),
+            order: ElementOrder::Quadratic,
+            scale: 1.0,
+            cell_size: None,
+            repair: Repair::default(),
+            fix: Vec::new(),
+            spring: Vec::new(),
+            residual: ResidualChoice::Automatic,
+            precision: Precision::Compact,
+        }
+    }
+}
+
+/// Source of a body's mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BodySource<'a> {
+    /// Primitive (`box:0.1x0.1x0.1/6x6x6`, `sphere:0.05/4`) or path of a mesh file.
+    Text(&'a str),
+    /// Content of a mesh file, with a name for messages and the recording.
+    Bytes(&'a [u8], &'a str),
+    /// Mesh, with a name for messages and the file.
+    Mesh(Mesh, &'a str),
+}
+
+/// Body that is ready to be recorded.
+#[derive(Debug, Clone)]
+pub struct PreparedBody {
+    /// Repaired mesh [m]; with its mid-edge nodes where elements are quadratic.
+    pub mesh: Mesh,
+    /// Parameters of the recording.
+    pub parameters: RecordParameters,
+    /// Errors that the certificate has to keep.
+    pub target: ErrorTarget,
+}
+
+impl RecordOptions {
+    /// Reads or takes the mesh, repairs it, and finds materials and supports.
+    ///
+    /// # Errors
+    /// When the mesh cannot be read or repaired, a region has no material, or a support selects no node.
+    pub fn prepare(
+        &self,
+        source: BodySource<'_>,
+        progress: &mut dyn Progress,
+    ) -> Result<PreparedBody, SceneError> {
+        let (mut mesh, name) = match source {
+            BodySource::Text(text) => {
+                let meshing = MeshingParameters { cell_size: self.cell_size };
+                (read_body(text, self.scale, &meshing, progress)?, source_name(text))
+            }
+            BodySource::Bytes(bytes, name) => {
+                let meshing = MeshingParameters { cell_size: self.cell_size };
+                (read_body_bytes((name, bytes), self.scale, &meshing, progress)?, name.to_string())
+            }
+            BodySource::Mesh(mut mesh, name) => {
+                mesh.scale(self.scale).map_err(|error| SceneError::new(SceneErrorKind::Mesh, error))?;
+                (mesh, name.to_string())
+            }
+        };
+        mesh.repair(&self.repair).map_err(|error| refused(SceneErrorKind::Mesh, &name, error))?;
+        if self.order == ElementOrder::Quadratic {
+            mesh.add_mid_edge_nodes();
+        }
+        let (materials, named_damping) = self.materials.of(&mesh)?;
+        let damping = self.damping.or(named_damping).unwrap_or(Damping::Ratio(0.0));
+        let (fixed_nodes, supports) = read_supports(&mesh, &self.fix, &self.spring)?;
+        let parameters = RecordParameters {
+            residual: self.residual,
+            precision: self.precision,
+            fixed_nodes,
+            supports,
+            source: name,
+            ..RecordParameters::new(materials, self.order, self.modes, damping)
+        };
+        Ok(PreparedBody { mesh, parameters, target: self.target })
+    }
+
+    /// Records a body.
+    ///
+    /// # Errors
+    /// As [`Self::prepare`] and [`PreparedBody::record`].
+    pub fn record(
+        &self,
+        source: BodySource<'_>,
+        progress: &mut dyn Progress,
+    ) -> Result<Recording, SceneError> {
+        self.prepare(source, progress)?.record(progress).map(|body| body.recording)
+    }
+}
+
+impl PreparedBody {
+    /// Records the body, and keeps its finite element model, for tables.
+    ///
+    /// # Errors
+    /// When it cannot be recorded, or the listener interrupts.
+    pub fn record(self, progress: &mut dyn Progress) -> Result<RecordedBody, SceneError> {
+        let Self { mesh, parameters, target } = self;
+        let recorded = if target == ErrorTarget::default() {
+            RecordedBody::new(mesh, &parameters, progress)
+        } else {
+            RecordedBody::within(&mesh, &parameters, &target, progress)
+        };
+        recorded.map_err(|error| refused(SceneErrorKind::Record, &parameters.source, error))
+    }
+}
+
+fn refused(kind: SceneErrorKind, name: &str, error: impl Display) -> SceneError {
+    SceneError::new(kind, format!("{name}: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::{Material, Support};
+    use palpate_fem::SilentProgress;
+    use palpate_mesh::box_mesh;
+
+    fn options() -> RecordOptions {
+        let material = Material::isotropic(2e4, 0.3, 1000.0);
+        RecordOptions {
+            materials: MaterialChoice::Uniform(material),
+            modes: 6,
+            order: ElementOrder::Linear,
+            ..RecordOptions::default()
+        }
+    }
+
+    #[test]
+    fn text_and_mesh_of_one_body_give_one_recording() {
+        let text = "box:0.2x0.1x0.1/2x2x2";
+        let by_text = options().record(BodySource::Text(text), &mut SilentProgress).expect("a recording");
+        // In millimetres.
+        let mesh = box_mesh([200.0, 100.0, 100.0], [2; 3]).expect("a box");
+        let scaled = RecordOptions { scale: 1e-3, ..options() };
+        let by_mesh =
+            scaled.record(BodySource::Mesh(mesh, "mine"), &mut SilentProgress).expect("a recording");
+        assert_eq!((by_text.modes.len(), by_mesh.modes.len()), (6, 6));
+        let difference = (by_text.mass() - by_mesh.mass()).abs();
+        assert!(difference < 1e-12 * by_text.mass(), "{difference}");
+        let sources = [by_text, by_mesh].map(|recording| recording.metadata.provenance.source);
+        assert_eq!(sources, [text, "mine"]);
+    }
+
+    #[test]
+    fn supports_damping_and_targets_are_kept() {
+        let fixed = RecordOptions {
+            fix: vec!["x<-0.099".into()],
+            damping: Some(Damping::Ratio(0.1)),
+            target: ErrorTarget { bandwidth_hz: Some(1.0), ..ErrorTarget::default() },
+            ..options()
+        };
+        let recording = fixed
+            .record(BodySource::Text("box:0.2x0.1x0.1/2x2x2"), &mut SilentProgress)
+            .expect("a recording");
+        assert_eq!(recording.metadata.support, Support::Fixed);
+        assert_eq!(recording.metadata.damping, Damping::Ratio(0.1));
+        // The first number of modes that is tried, in place of the given one.
+        assert_eq!(recording.modes.len(), 25);
+        let without = RecordOptions { materials: MaterialChoice::OfMesh, ..options() };
+        let error =
+            without.prepare(BodySource::Text("box:1x1x1/1x1x1"), &mut SilentProgress).expect_err("none");
+        assert!(error.message.starts_with("region '0' has no material in the mesh file: "), "{error}");
+    }
+}
