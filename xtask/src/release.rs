@@ -52,7 +52,7 @@ pub fn build() -> Result<(), String> {
     finish(&dist)
 }
 
-/// The program with its licences, and completions and manual pages where it writes them.
+/// The program with its licences, completions and manual pages.
 fn command_line(dist: &Path, name: &str) -> Result<(), String> {
     // All features: `cargo build` of a user has them, too.
     cargo(&["build", "--release", "--locked", "--package", "palpate-cli"])?;
@@ -63,15 +63,21 @@ fn command_line(dist: &Path, name: &str) -> Result<(), String> {
         copy(&root().join(name), &folder.join(name))?;
     }
     for shell in SHELLS {
-        let written = Command::new(&palpate).args(["completions", shell]).output();
-        if let Ok(output) = written
-            .map(|output| output.stdout)
-            .and_then(|text| if text.is_empty() { Err(std::io::Error::other("none")) } else { Ok(text) })
-        {
-            write(&folder.join("completions").join(format!("palpate.{shell}")), &output)?;
-        }
+        let text = output_of(Command::new(&palpate).args(["completions", shell]))?;
+        write(&folder.join("completions").join(format!("palpate.{shell}")), &text)?;
     }
+    output_of(Command::new(&palpate).args(["man", "--output"]).arg(folder.join("man")))?;
     pack(&folder)
+}
+
+/// Output of a program that succeeds.
+fn output_of(command: &mut Command) -> Result<Vec<u8>, String> {
+    let output = command.output().map_err(|error| format!("{}: {error}", command.get_program().display()))?;
+    if output.status.success() {
+        Ok(output.stdout)
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
 }
 
 /// Packages of the crates, as `cargo publish` would send them. It builds each of them once more, so it is not done here.
@@ -91,10 +97,9 @@ fn crates(dist: &Path, version: &str) -> Result<(), String> {
 
 fn write_bill(path: &Path) -> Result<(), String> {
     let arguments = ["metadata", "--format-version", "1", "--locked"];
-    let output = cargo_command().args(arguments).current_dir(root()).output();
-    let output = output.map_err(|error| format!("cargo metadata can't be started: {error}"))?;
+    let metadata = output_of(cargo_command().args(arguments).current_dir(root()))?;
+    let metadata = String::from_utf8_lossy(&metadata);
     let read = |name: &str| fs::read_to_string(root().join(name)).map_err(|error| format!("{name}: {error}"));
-    let metadata = String::from_utf8_lossy(&output.stdout);
     let bill = bill_of_materials::bill(&metadata, &read("Cargo.lock")?, &read("viewer/package-lock.json")?)?;
     write(path, format!("{bill:#}\n").as_bytes())
 }
@@ -105,12 +110,8 @@ fn finish(dist: &Path) -> Result<(), String> {
     all.extend(files(&dist.join("crates"))?);
     all.sort();
     let names: Vec<_> = all.iter().filter_map(|path| path.strip_prefix(dist).ok()).collect();
-    let sums = Command::new("sha256sum").args(&names).current_dir(dist).output();
-    let sums = sums.map_err(|error| format!("sha256sum can't be started: {error}"))?;
-    if !sums.status.success() {
-        return Err(String::from_utf8_lossy(&sums.stderr).into_owned());
-    }
-    write(&dist.join("SHA256SUMS"), &sums.stdout)?;
+    let sums = output_of(Command::new("sha256sum").args(&names).current_dir(dist))?;
+    write(&dist.join("SHA256SUMS"), &sums)?;
     for (path, name) in all.iter().zip(&names) {
         let bytes = fs::metadata(path).map_err(|error| format!("{}: {error}", path.display()))?.len();
         println!("{:>9.1} kB  {DIST}/{}", bytes as f64 / 1e3, name.display());
@@ -136,8 +137,8 @@ fn pack(folder: &Path) -> Result<(), String> {
 
 /// Target of this machine, as `x86_64-unknown-linux-gnu`.
 fn host() -> Result<String, String> {
-    let output = Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc: {error}"))?;
-    let text = String::from_utf8_lossy(&output.stdout);
+    let text = output_of(Command::new("rustc").arg("-vV"))?;
+    let text = String::from_utf8_lossy(&text);
     let host = text.lines().find_map(|line| line.strip_prefix("host: "));
     host.map(str::to_string).ok_or_else(|| "rustc -vV names no host".into())
 }
