@@ -15,6 +15,7 @@ mod errors;
 mod log;
 mod motion;
 mod progress;
+mod readings;
 mod record;
 mod recording;
 mod run_length;

@@ -1,17 +1,14 @@
 //! `palpate.record`: from a mesh to a recording, with the options of `palpate record`.
 
 use crate::arrays::{Numbers, check_finite, read_integers};
-use crate::errors::{Class, catch_panic, exception, file_error, input_error, internal_error, scene_error};
+use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
 use glam::DVec3;
 use palpate::{Damping, Material};
-use palpate_fem::{
-    ElementOrder, ErrorTarget, Precision, Progress, RecordParameters, RecordedBody, ResidualChoice,
-    library_material, materials_from_toml,
-};
-use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Region, Repair, read_regular_text};
-use palpate_scene::{SceneError, SceneErrorKind, read_body, read_supports, source_name};
+use palpate_fem::{ElementOrder, ErrorTarget, Precision, ResidualChoice, library_material};
+use palpate_mesh::{MergeNodes, Mesh, PieceChoice, Region, Repair};
+use palpate_scene::{BodySource, MaterialChoice, RecordOptions, SceneError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -23,23 +20,21 @@ enum Source {
     Arrays(Mesh),
 }
 
-/// Options of a recording, as the command line has them.
-struct Options {
-    material: Option<Material>,
-    /// Materials by region, as the text of a material file, and its name in errors.
-    materials: Option<(String, String)>,
-    damping: Damping,
-    modes: usize,
-    target: ErrorTarget,
-    order: ElementOrder,
-    scale: f64,
-    cell_size: Option<f64>,
-    fix: Vec<String>,
-    spring: Vec<String>,
-    residual: ResidualChoice,
-    precision: Precision,
-    repair: Repair,
-}
+/// Keywords whose options of the command line stand in messages.
+const KEYWORDS: [&str; 12] = [
+    "young",
+    "poisson",
+    "density",
+    "material",
+    "modes",
+    "order",
+    "scale",
+    "cell_size",
+    "fix",
+    "spring",
+    "merge_nodes",
+    "piece",
+];
 
 /// Recording of a mesh by finite elements, with the options of `palpate record` (docs/recording.md).
 ///
@@ -122,21 +117,13 @@ pub fn record(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Recording> {
     let refused = |message: String| input_error(py, message);
-    let (material, named) = read_material((young, poisson, density), material).map_err(refused)?;
-    if materials.is_some() && material.is_some() {
-        return Err(refused(
-            "give materials, or material, or young, poisson and density: one of them".into(),
-        ));
-    }
     let damping = match (rayleigh, damping_ratio) {
         (Some(_), Some(_)) => return Err(refused("give rayleigh or damping_ratio, not both".into())),
-        (Some([alpha, beta]), None) => Damping::Rayleigh { alpha, beta },
-        (None, Some(ratio)) => Damping::Ratio(ratio),
-        (None, None) => named.unwrap_or(Damping::Ratio(0.0)),
+        (Some([alpha, beta]), None) => Some(Damping::Rayleigh { alpha, beta }),
+        (None, ratio) => ratio.map(Damping::Ratio),
     };
-    let options = Options {
-        material,
-        materials: materials.map(read_materials).transpose()?,
+    let options = RecordOptions {
+        materials: read_materials(py, (young, poisson, density), material, materials)?,
         damping,
         modes: usize::try_from(modes)
             .map_err(|_| refused(format!("modes is {modes}, expected at least 1")))?,
@@ -174,106 +161,66 @@ pub fn record(
     };
     let source = read_source(mesh)?;
     let mut progress = PythonProgress::new(progress);
-    let recorded = py.detach(|| catch_panic(|| options.record(source, &mut progress)));
+    let recorded = py.detach(|| {
+        let source = match source {
+            Source::Text(ref text) => BodySource::Text(text),
+            Source::Arrays(mesh) => BodySource::Mesh(mesh, "arrays"),
+        };
+        catch_panic(|| options.record(source, &mut progress))
+    });
     // An exception of the callback, or a signal, is the cause of whatever came after it.
     if let Some(error) = progress.failure() {
         return Err(error);
     }
     let recorded = recorded.map_err(|text| internal_error(py, &text))?;
-    recorded.map(Recording::new).map_err(|error| scene_error(py, &error))
+    recorded.map(Recording::new).map_err(|error| scene_error(py, &with_keywords(error)))
 }
 
-impl Options {
-    fn record(&self, source: Source, progress: &mut dyn Progress) -> Result<palpate::Recording, SceneError> {
-        let (mut mesh, name) = match source {
-            Source::Text(text) => {
-                let meshing = MeshingParameters { cell_size: self.cell_size };
-                (read_body(&text, self.scale, &meshing, progress)?, source_name(&text))
-            }
-            Source::Arrays(mut mesh) => {
-                mesh.scale(self.scale).map_err(|error| SceneError::new(SceneErrorKind::Mesh, error))?;
-                (mesh, "arrays".to_string())
-            }
-        };
-        let refused = |kind| {
-            let name = name.clone();
-            move |error: String| SceneError::new(kind, format!("{name}: {error}"))
-        };
-        let mesh_error = refused(SceneErrorKind::Mesh);
-        mesh.repair(&self.repair).map_err(|error| mesh_error(error.to_string()))?;
-        if self.order == ElementOrder::Quadratic {
-            mesh.add_mid_edge_nodes();
+/// Error whose message has keywords in place of options: `cell_size` for `--cell-size`.
+fn with_keywords(mut error: SceneError) -> SceneError {
+    // A path may have two hyphens inside.
+    let mut message = format!(" {}", error.message);
+    for keyword in KEYWORDS {
+        let option = format!("--{}", keyword.replace('_', "-"));
+        for before in [" ", "("] {
+            message = message.replace(&format!("{before}{option}"), &format!("{before}{keyword}"));
         }
-        let materials = match &self.materials {
-            Some((text, file)) => materials_from_toml(text, &mesh)
-                .map_err(|error| SceneError::new(SceneErrorKind::Record, format!("{file}: {error}")))?,
-            None => mesh.regions.iter().map(|region| self.material_of(region)).collect::<Result<_, _>>()?,
-        };
-        let (fixed_nodes, supports) = read_supports(&mesh, &self.fix, &self.spring)?;
-        let parameters = RecordParameters {
-            residual: self.residual,
-            precision: self.precision,
-            fixed_nodes,
-            supports,
-            source: name.clone(),
-            ..RecordParameters::new(materials, self.order, self.modes, self.damping)
-        };
-        let recorded = if self.target == ErrorTarget::default() {
-            RecordedBody::new(mesh, &parameters, progress)
-        } else {
-            RecordedBody::within(&mesh, &parameters, &self.target, progress)
-        };
-        let record_error = refused(SceneErrorKind::Record);
-        recorded.map(|body| body.recording).map_err(|error| record_error(error.to_string()))
     }
-
-    /// Material of a region: the given one, or that of the mesh file.
-    fn material_of(&self, region: &Region) -> Result<Material, SceneError> {
-        if let Some(material) = &self.material {
-            return Ok(material.clone());
-        }
-        let Some(found) = &region.material else {
-            let message = format!(
-                "region '{}' has no material in the mesh: give young, poisson and density, material or materials",
-                region.label()
-            );
-            return Err(SceneError::new(SceneErrorKind::Mesh, message));
-        };
-        let material = Material::isotropic(found.young_pa, found.poisson, found.density_kg_m3);
-        Ok(Material { region: region.label(), ..material })
-    }
+    error.message = message.split_off(1);
+    error
 }
 
-/// Material by numbers or by name, with the damping of the name; none for that of the mesh file.
-fn read_material(
+/// Materials: by numbers, by name, by region, or those of the mesh file.
+fn read_materials(
+    py: Python<'_>,
     numbers: (Option<f64>, Option<f64>, Option<f64>),
     name: Option<&str>,
-) -> Result<(Option<Material>, Option<Damping>), String> {
-    match (numbers, name) {
-        ((None, None, None), None) => Ok((None, None)),
+    by_region: Option<&Bound<'_, PyAny>>,
+) -> PyResult<MaterialChoice> {
+    let refused = |message: &str| Err(input_error(py, message));
+    let whole = match (numbers, name) {
+        ((None, None, None), None) => None,
         ((None, None, None), Some(name)) => {
-            let found = library_material(name).map_err(|error| format!("material: {error}"))?;
-            Ok((Some(found.material()), found.damping))
+            library_material(name).map_err(|error| input_error(py, format!("material: {error}")))?;
+            Some(MaterialChoice::Named(vec![name.into()]))
         }
         ((Some(young), Some(poisson), Some(density)), None) => {
-            Ok((Some(Material::isotropic(young, poisson, density)), None))
+            Some(MaterialChoice::Uniform(Material::isotropic(young, poisson, density)))
         }
-        _ => Err("give young, poisson and density together, or material alone".into()),
-    }
-}
-
-/// Text of a material file, and its name: from the file, or from its tables.
-fn read_materials(given: &Bound<'_, PyAny>) -> PyResult<(String, String)> {
-    let py = given.py();
+        _ => return refused("give young, poisson and density together, or material alone"),
+    };
+    let given = match (whole, by_region) {
+        (Some(_), Some(_)) => {
+            return refused("give materials, or material, or young, poisson and density: one of them");
+        }
+        (whole, None) => return Ok(whole.unwrap_or_default()),
+        (None, Some(given)) => given,
+    };
     if let Ok(path) = given.extract::<PathBuf>() {
-        let text = read_regular_text(&path).map_err(|error| {
-            let message = format!("cannot read the materials {}: {error}", path.display());
-            file_error(py, &path, error.raw_os_error(), &message)
-        })?;
-        return Ok((text, path.display().to_string()));
+        return Ok(MaterialChoice::File(path));
     }
     let text = py.import("palpate._toml")?.call_method1("material_tables", (given,))?.extract()?;
-    Ok((text, "materials".into()))
+    Ok(MaterialChoice::Text(text, "materials".into()))
 }
 
 /// Piece of a mesh: "largest", or its number.

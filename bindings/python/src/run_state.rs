@@ -20,7 +20,6 @@ const STEPS_PER_LOOK: usize = 16;
 pub struct RunState {
     pub state: State,
     pub input: Input,
-    pub steps: u64,
     /// Modes of the devices: those of the scene, until one grasps, lets go or leaves.
     pub modes: Vec<DeviceMode>,
     /// Text of a panic in a step: what is left of the state is of no use.
@@ -66,7 +65,7 @@ impl RunState {
 
     fn with(scene: &palpate_scene::Scene, state: State) -> Self {
         let modes = scene.devices.iter().map(|device| device.mode).collect();
-        Self { state, input: scene.input_at(0.0), steps: 0, modes, panic: None }
+        Self { state, input: scene.input_at(0.0), modes, panic: None }
     }
 
     /// State at the start of the scene, its objects placed and moving as given; those with fixed nodes or on a table as the scene says.
@@ -102,8 +101,7 @@ impl RunState {
 
     /// Move what has a path in the scene to its place at the end of the next step.
     pub fn follow_paths(&mut self, scene: &palpate_scene::Scene) {
-        let end_s = (self.steps + 1) as f64 * scene.model.parameters().step_s;
-        scene.follow_paths(end_s, &mut self.input);
+        scene.follow_next_step(&self.state, &mut self.input);
         for (own, mode) in self.input.devices.iter_mut().zip(&self.modes) {
             // A force of the scene's course, or of the last step.
             if !matches!((own.mode, mode), (DeviceMode::Force(_), DeviceMode::Force(_))) {
@@ -124,7 +122,6 @@ impl RunState {
             step(&scene.model, &mut self.state, &self.input);
             scene.check_step(&self.input, &self.state)
         });
-        self.steps += 1;
         match stepped {
             Ok(checked) => checked.map_err(StepFailure::Motion),
             Err(text) => {

@@ -2,6 +2,7 @@
 
 use crate::arrays::{array, pose_row, twist_row};
 use crate::contacts::ContactLayout;
+use glam::DVec3;
 use palpate::{Input, State};
 use palpate_scene::Scene;
 use pyo3::prelude::*;
@@ -18,6 +19,9 @@ pub struct Series {
     poses: Vec<f64>,
     velocities: Vec<f64>,
     penetration: Vec<f64>,
+    /// Forces and torques.
+    object_loads: [Vec<f64>; 2],
+    obstacle_loads: [Vec<f64>; 2],
     clamps: [Vec<f64>; 3],
     probes: [Vec<f64>; 2],
     /// Terms of the ledger, in its order.
@@ -32,7 +36,7 @@ impl Series {
     pub fn new(scene: &Scene, steps: usize, with_contacts: bool) -> Result<Self, TryReserveError> {
         let room = |width: usize| with_room(steps.saturating_mul(width));
         let (devices, objects) = (scene.devices.len(), scene.object_names.len());
-        let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
+        let (obstacles, clamps, probes) = (scene.obstacles.len(), scene.clamps.len(), scene.probes.len());
         let mut energy = [(); 10].map(|()| Vec::new());
         energy.iter_mut().try_for_each(|terms| terms.try_reserve_exact(steps))?;
         Ok(Self {
@@ -44,6 +48,8 @@ impl Series {
             poses: room(7 * objects)?,
             velocities: room(6 * objects)?,
             penetration: room(objects)?,
+            object_loads: [room(3 * objects)?, room(3 * objects)?],
+            obstacle_loads: [room(3 * obstacles)?, room(3 * obstacles)?],
             clamps: [room(7 * clamps)?, room(3 * clamps)?, room(3 * clamps)?],
             probes: [room(3 * probes)?, room(3 * probes)?],
             energy,
@@ -55,9 +61,10 @@ impl Series {
     /// Memory of a step [bytes], without contacts.
     pub fn bytes_per_step(scene: &Scene) -> f64 {
         let (devices, objects) = (scene.devices.len(), scene.object_names.len());
-        let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
+        let (obstacles, clamps, probes) = (scene.obstacles.len(), scene.clamps.len(), scene.probes.len());
         let energies = 10;
-        8.0 * (2 + energies + 9 * devices + 14 * objects + 13 * clamps + 6 * probes) as f64
+        let parts = 9 * devices + 20 * objects + 6 * obstacles + 13 * clamps + 6 * probes;
+        8.0 * (2 + energies + parts) as f64
     }
 
     /// Append the last step of a state.
@@ -83,6 +90,10 @@ impl Series {
             self.poses.extend(pose_row(&object.pose));
             self.velocities.extend(twist_row(&object.twist));
             self.penetration.push(object.penetration_m);
+            append_load(&mut self.object_loads, object.force, object.torque);
+        }
+        for obstacle in &output.obstacles {
+            append_load(&mut self.obstacle_loads, obstacle.force, obstacle.torque);
         }
         let [frames, forces, torques] = &mut self.clamps;
         for (frame, clamp) in input.clamps.iter().zip(&output.clamps) {
@@ -120,7 +131,7 @@ impl Series {
             dict.set_item(name, array(py, numbers, &[&[steps], extents].concat())?)
         };
         let (devices, objects) = (scene.devices.len(), scene.object_names.len());
-        let (clamps, probes) = (scene.clamps.len(), scene.probes.len());
+        let (obstacles, clamps, probes) = (scene.obstacles.len(), scene.clamps.len(), scene.probes.len());
         set("time", self.time, &[])?;
         set("positions", self.positions, &[devices, 3])?;
         set("forces", self.forces, &[devices, 3])?;
@@ -128,6 +139,12 @@ impl Series {
         set("poses", self.poses, &[objects, 7])?;
         set("velocities", self.velocities, &[objects, 6])?;
         set("penetration", self.penetration, &[objects])?;
+        let [forces, torques] = self.object_loads;
+        set("object_forces", forces, &[objects, 3])?;
+        set("object_torques", torques, &[objects, 3])?;
+        let [forces, torques] = self.obstacle_loads;
+        set("obstacle_forces", forces, &[obstacles, 3])?;
+        set("obstacle_torques", torques, &[obstacles, 3])?;
         let [frames, forces, torques] = self.clamps;
         set("clamp_frames", frames, &[clamps, 7])?;
         set("clamp_forces", forces, &[clamps, 3])?;
@@ -146,6 +163,11 @@ impl Series {
         }
         Ok(dict)
     }
+}
+
+fn append_load([forces, torques]: &mut [Vec<f64>; 2], force: DVec3, torque: DVec3) {
+    forces.extend(force.to_array());
+    torques.extend(torque.to_array());
 }
 
 /// Empty list with room for a number of items.

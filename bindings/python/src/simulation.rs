@@ -7,14 +7,14 @@ use crate::contacts::ContactLayout;
 use crate::device_mode::{ModeChange, mode_name};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error};
 use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
+use crate::readings::{energy_by_name, load_row, status_by_name, surface, write_forces};
 use crate::run_length::count_steps;
 use crate::run_state::{RunState, StepFailure, held_points, run_part};
 use crate::scene::Scene;
 use crate::series::Series;
 use crate::snapshot::Snapshot;
 use crate::starts::Starts;
-use glam::DVec3;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2};
 use palpate::Output;
 use palpate_fem::check_memory;
 use pyo3::exceptions::PyMemoryError;
@@ -79,21 +79,7 @@ impl Simulation {
 
     /// Write the forces on the hands into the array that steps return.
     fn write_forces(&self, py: Python<'_>, output: &Output) -> PyResult<()> {
-        let refused = |error: String| {
-            exception(
-                py,
-                Class::Palpate,
-                format!(
-                    "the array of forces cannot be written to ({error}): it is the simulation's own; use a copy"
-                ),
-            )
-        };
-        let mut forces = self.forces.bind(py).try_readwrite().map_err(|error| refused(error.to_string()))?;
-        let forces = forces.as_slice_mut().map_err(|error| refused(error.to_string()))?;
-        for (row, device) in forces.chunks_exact_mut(3).zip(&output.devices) {
-            row.copy_from_slice(&device.force_on_hand.to_array());
-        }
-        Ok(())
+        write_forces(self.forces.bind(py), output)
     }
 
     fn change(&self, py: Python<'_>, change: ModeChange) -> PyResult<()> {
@@ -187,7 +173,8 @@ impl Simulation {
     /// -------
     /// dict of numpy.ndarray
     ///     By step: `time` (steps,) [s]; `positions`, `forces`, `proxies` (steps, devices, 3) [m, N, m]; `poses` (steps, objects, 7);
-    ///     `velocities` (steps, objects, 6) [m/s, rad/s]; `penetration` (steps, objects) [m]; `clamp_frames` (steps, clamps, 7), `clamp_forces`,
+    ///     `velocities` (steps, objects, 6) [m/s, rad/s]; `penetration` (steps, objects) [m]; `object_forces`, `object_torques` (steps, objects, 3) and
+    ///     `obstacle_forces`, `obstacle_torques` (steps, obstacles, 3) [N, N·m], as the attributes; `clamp_frames` (steps, clamps, 7), `clamp_forces`,
     ///     `clamp_torques` (steps, clamps, 3) [N, N·m]; `probe_positions`, `probe_displacements` (steps, probes, 3) [m]; `unsolved_islands` (steps,);
     ///     `energy`, a dict of (steps,) [J]; with `contacts=True` the structured array `contacts`, a row per contact and step.
     ///
@@ -216,8 +203,9 @@ impl Simulation {
         contacts: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = SeriesMotion::read(py, &self.inner, &Arguments { positions, obstacles, clamps })?;
-        let count = count_steps(&self.inner, self.lock(py)?.steps, motion.steps, (steps, duration))
-            .map_err(|text| input_error(py, text))?;
+        let count =
+            count_steps(&self.inner, self.lock(py)?.state.step_count(), motion.steps, (steps, duration))
+                .map_err(|text| input_error(py, text))?;
         check_memory(count as f64 * Series::bytes_per_step(&self.inner)).map_err(|error| {
             input_error(py, format!("the series of {count} steps: {error}; run fewer at a time"))
         })?;
@@ -290,12 +278,35 @@ impl Simulation {
     #[getter]
     fn clamp_loads<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, |output| {
-            let row = |clamp: &palpate::ClampOutput| {
-                let (f, t) = (clamp.force, clamp.torque);
-                [f.x, f.y, f.z, t.x, t.y, t.z]
-            };
-            output.clamps.iter().map(row).collect()
+            output.clamps.iter().map(|clamp| load_row(clamp.force, clamp.torque)).collect()
         })
+    }
+
+    /// Net forces of the objects on the planes and obstacles in the last step, sums over their contacts [N, world]: float64 of shape (obstacles, 3).
+    #[getter]
+    fn obstacle_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, |output| output.obstacles.iter().map(|own| own.force.to_array()).collect())
+    }
+
+    /// Torques of these forces about the positions of the planes' and obstacles' poses at the end of the step [N·m, world]: float64 of shape
+    /// (obstacles, 3).
+    #[getter]
+    fn obstacle_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, |output| output.obstacles.iter().map(|own| own.torque.to_array()).collect())
+    }
+
+    /// Net forces of contacts, hands, clamps and prescribed forces on the objects in the last step [N, world], without their weights and without
+    /// what their supports carry: float64 of shape (objects, 3).
+    #[getter]
+    fn object_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, |output| output.objects.iter().map(|own| own.force.to_array()).collect())
+    }
+
+    /// Torques of these forces about the objects' centres of mass, the positions of `poses`, at the end of the step [N·m, world]: float64 of shape
+    /// (objects, 3).
+    #[getter]
+    fn object_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rows(py, |output| output.objects.iter().map(|own| own.torque.to_array()).collect())
     }
 
     /// Whether each object is asleep: bool of shape (objects,).
@@ -321,25 +332,13 @@ impl Simulation {
     /// Energy ledger of the scene [J], by name (docs/scene.md).
     #[getter]
     fn energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let energy = PyDict::new(py);
-        for (name, value) in self.lock(py)?.state.output().energy.named() {
-            energy.set_item(name, value)?;
-        }
-        Ok(energy)
+        energy_by_name(py, &self.lock(py)?.state.output().energy)
     }
 
     /// Status of the last step: residual of the solver [m], iterations, unsolved islands, dropped contacts.
     #[getter]
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let status = self.lock(py)?.state.output().status;
-        let dict = PyDict::new(py);
-        dict.set_item("solver_residual", status.solver_residual_m)?;
-        dict.set_item("iterations", status.iterations)?;
-        dict.set_item("dependent_rows", status.dependent_rows)?;
-        dict.set_item("unsolved_islands", status.unsolved_islands)?;
-        dict.set_item("islands_out_of_budget", status.islands_out_of_budget)?;
-        dict.set_item("dropped_contacts", status.dropped_contacts)?;
-        Ok(dict)
+        status_by_name(py, &self.lock(py)?.state.output().status)
     }
 
     /// Deformed surface of an object.
@@ -355,16 +354,7 @@ impl Simulation {
     ///     Positions of its surface nodes [m, world], float64 of shape (nodes, 3), for the triangles `scene.triangles(object)`.
     fn surface<'py>(&self, py: Python<'py>, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let at = Scene::object(&self.inner, object)?;
-        let run = self.lock(py)?;
-        let (model, state) = (&self.inner.model, &run.state);
-        let rest = model.recordings().nth(at).map_or(&[][..], |own| &own.surface.positions);
-        let pose = state.output().objects[at].pose;
-        let mut displacement = vec![DVec3::ZERO; rest.len()];
-        catch_panic(|| state.surface_displacement(model, at, &mut displacement))
-            .map_err(|text| internal_error(py, &text))?;
-        let positions =
-            rest.iter().zip(&displacement).map(|(rest, moved)| pose.world_from_body(*rest + *moved));
-        array(py, flat(positions), &[rest.len(), 3])
+        surface(py, &self.inner, &self.lock(py)?.state, at)
     }
 
     /// Points that devices hold or exert forces on [m, world]: float64 of shape (devices, 3), NaN for tips. Start a hand there.

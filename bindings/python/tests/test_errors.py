@@ -247,6 +247,17 @@ def test_options_of_a_recording_are_checked(options, kind, text):
     assert text in refusal(kind, lambda: palpate.record(BOX, **{**BODY, **options}))
 
 
+def test_messages_name_keywords_and_not_options(tmp_path):
+    text = refusal(palpate.MeshError, lambda: palpate.record(BOX))
+    assert text == "region '0' has no material in the mesh file: give young, poisson and density, material, or materials"
+    text = refusal(palpate.InputError, lambda: palpate.record(BOX, material="cheese"))
+    assert text.startswith('material: there is no material "cheese"')
+    assert refusal(palpate.MeshError, lambda: palpate.record(BOX, fix="q<1", **BODY)).startswith('fix "q<1" is neither')
+    assert refusal(palpate.MeshError, lambda: palpate.record(BOX, cell_size=0.1, **BODY)).endswith("leave cell_size out")
+    file = tmp_path / "no--order.msh"
+    assert str(file) in refusal(palpate.MeshError, lambda: palpate.record(file, **BODY))
+
+
 def test_tables_of_materials_are_checked():
     for materials, kind, text in [
         ({"young": 1}, palpate.InputError, "materials is {'young': 1}, expected a file, or a list of dicts"),

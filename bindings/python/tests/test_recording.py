@@ -113,7 +113,7 @@ $EndElements
 """
 
 
-def test_pieces_and_materials_of_regions_are_chosen_as_on_the_command_line(tmp_path):
+def test_pieces_and_materials_of_regions_are_chosen_as_on_the_command_line(tmp_path, palpate_run):
     mesh = tmp_path / "three.msh"
     mesh.write_text(MESH)
     materials = [
@@ -129,6 +129,9 @@ def test_pieces_and_materials_of_regions_are_chosen_as_on_the_command_line(tmp_p
     file = tmp_path / "materials.toml"
     file.write_text('[[material]]\nregion = "2"\nyoung = 1e6\npoisson = 0.3\ndensity = 2000.0\n')
     assert palpate.record(mesh, materials=file, piece=1, **options).to_bytes() == largest.to_bytes()
+    other = tmp_path / "other.palp"
+    palpate_run("record", mesh, "--material", "liver", "--piece", "2", "--modes", "3", "--order", "1", "-o", other)
+    assert palpate.record(mesh, material="liver", piece=2, **options).to_bytes() == other.read_bytes()
 
 
 def test_nodes_on_one_point_are_merged_when_asked():

@@ -7,6 +7,7 @@ import palpate
 import pytest
 
 GRAVITY = 9.81  # m/s²
+TORQUE = 1e-12  # N·m: round-off of sums of some newtons at some centimetres
 SCENE = """gravity = [0.0, 0.0, -9.81]
 [[object]]
 name = "cube"
@@ -69,6 +70,10 @@ def test_a_press_has_the_numbers_of_palpate_run_to_the_bit(command_line):
         "proxies": [f"finger.proxy_{axis}" for axis in axes],
         "poses": [f"cube.{name}" for name in ["px", "py", "pz", "qw", "qx", "qy", "qz"]],
         "velocities": [f"cube.{name}" for name in ["vx", "vy", "vz", "wx", "wy", "wz"]],
+        "object_forces": [f"cube.f{axis}" for axis in axes],
+        "object_torques": [f"cube.t{axis}" for axis in axes],
+        "obstacle_forces": [f"floor.f{axis}" for axis in axes],
+        "obstacle_torques": [f"floor.t{axis}" for axis in axes],
         "probe_positions": [f"top.{axis}" for axis in axes],
         "probe_displacements": [f"top.u{axis}" for axis in axes],
     }
@@ -137,6 +142,43 @@ def test_a_floor_carries_the_weight(on_floor, cube):
     assert np.allclose(impulse + weight, momentum, atol=1e-9)
     # It rests: what swings still is some per cent of the weight.
     assert np.allclose(floor / len(series["time"]), -cube.mass * on_floor.gravity, atol=1e-3)
+
+
+def test_net_forces_are_the_sums_over_contacts(cube, press):
+    scene = scene_with_finger(cube)
+    simulation = palpate.Simulation(scene)
+    series = simulation.run(press[:200], contacts=True)
+    at_end = series["contacts"][series["contacts"]["time"] == simulation.time]
+    floor = at_end[at_end["against"] == "floor"]
+    assert len(floor) > 1 and set(at_end["against"]) == {"floor", "finger"}
+    # The torque on the floor is about its point, that on the cube about its centre of mass at rest.
+    for forces, torques, rows, origin, sign in [
+        ("obstacle_forces", "obstacle_torques", floor, [0, 0, -0.05], -1),
+        ("object_forces", "object_torques", at_end, simulation.poses[0, :3], 1),
+    ]:
+        force, torque = getattr(simulation, forces), getattr(simulation, torques)
+        assert force.shape == torque.shape == (1, 3) and np.abs(torque).max() > 1e-3
+        assert np.allclose(force[0], sign * rows["force"].sum(axis=0), atol=1e-12)
+        moments = np.cross(rows["point"] - origin, rows["force"])
+        assert np.allclose(torque[0], sign * moments.sum(axis=0), atol=TORQUE)
+        assert np.array_equal(force, series[forces][-1]) and np.array_equal(torque, series[torques][-1])
+    # Force and weight are the change of momentum.
+    impulse = (series["object_forces"][:, 0] + cube.mass * scene.gravity).sum(axis=0) * scene.step
+    assert np.allclose(impulse, cube.mass * simulation.velocities[0, :3], atol=1e-9)
+
+
+def test_a_resting_cube_loads_the_floor_with_its_weight(cube):
+    simulation = palpate.Simulation(scene_with_finger(cube))
+    away = np.tile([0, 0, 0.2], (4000, 1, 1))
+    series = simulation.run(away)
+    loads = {name: series[name][-2000:, 0].mean(axis=0) for name in ["obstacle_forces", "obstacle_torques", "object_forces"]}
+    # A sleeping cube would keep the forces of its last step. What swings still has hardly a mean: its momentum is small beside that of two seconds' weight.
+    assert not simulation.is_asleep[0]
+    weight = cube.mass * GRAVITY
+    assert np.allclose(loads["obstacle_forces"], [0, 0, -weight], atol=1e-3 * weight)
+    assert np.allclose(loads["object_forces"], -loads["obstacle_forces"], atol=1e-12)
+    # The cube stands over the floor's point, to a thousandth of its side.
+    assert np.abs(loads["obstacle_torques"]).max() < 1e-3 * weight * 0.1
 
 
 def test_forces_on_a_free_cube_are_its_change_of_momentum(held, cube):

@@ -4,6 +4,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use palpate::{Damping, Material};
 use palpate_fem::{LibraryMaterial, library_material, materials_from_toml};
 use palpate_mesh::{Mesh, Region, read_regular_text};
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// Choice of the materials of a body.
@@ -19,6 +20,8 @@ pub enum MaterialChoice {
     Named(Vec<String>),
     /// A material file, as `--materials`.
     File(PathBuf),
+    /// Text of a material file, with a name for messages.
+    Text(String, String),
 }
 
 impl MaterialChoice {
@@ -31,15 +34,21 @@ impl MaterialChoice {
             Self::File(path) => {
                 let text =
                     read_regular_text(path).map_err(|e| SceneError::io("read the materials", path, &e))?;
-                let refused = |e| refused(format!("{}: {e}", path.display()));
-                materials_from_toml(&text, mesh).map_err(refused)?
+                of_text(&text, path.display(), mesh)?
             }
+            Self::Text(text, name) => of_text(text, name, mesh)?,
         };
         Ok((materials, None))
     }
 }
 
-fn refused(message: impl std::fmt::Display) -> SceneError {
+/// Materials of a material file's text.
+fn of_text(text: &str, name: impl Display, mesh: &Mesh) -> Result<Vec<Material>, SceneError> {
+    let refused = |error| SceneError::new(SceneErrorKind::Record, format!("{name}: {error}"));
+    materials_from_toml(text, mesh).map_err(refused)
+}
+
+fn refused(message: impl Display) -> SceneError {
     SceneError::new(SceneErrorKind::Mesh, message)
 }
 
@@ -142,6 +151,18 @@ mod tests {
             let error = chosen(choices, &mesh()).expect_err("a mistake");
             assert!(error.starts_with(expected), "{error}");
         }
+    }
+
+    #[test]
+    fn text_of_a_material_file_is_read() {
+        let choose = |text: &str| MaterialChoice::Text(text.into(), "tables".into()).of(&mesh());
+        let text = "[[material]]\nregion = \"core\"\nname = \"steel\"\n[[material]]\nregion = \"hull\"\nname = \"rubber\"\n";
+        let (materials, damping) = choose(text).expect("two materials");
+        let densities: Vec<f64> = materials.iter().map(|one| one.density_kg_m3).collect();
+        assert_eq!((densities, damping), (vec![7850.0, 1100.0], None));
+        let error = choose("[[material]]\nname = \"cheese\"\n").expect_err("a mistake");
+        assert_eq!(error.kind, SceneErrorKind::Record);
+        assert!(error.message.starts_with("tables: "), "{error}");
     }
 
     #[test]
