@@ -24,6 +24,7 @@ from palpate._errors import (
 )
 from palpate._palpate import Batch, Log, Recording, Simulation, Snapshot, __version__, record
 from palpate._scene import Clamp, Device, Object, Obstacle, Plane, Probe, Scene
+from palpate._viewer import Viewer, view
 
 __all__ = [
     "Batch",
@@ -48,6 +49,8 @@ __all__ = [
     "Simulation",
     "Snapshot",
     "StepError",
+    "Viewer",
     "__version__",
     "record",
+    "view",
 ]

@@ -30,6 +30,7 @@ def reader(tmp_path, monkeypatch, palpate_run):
     """Folder of a reader who has an STL file, a scene and a log."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setattr("webbrowser.open_new_tab", lambda url: True)
     ball = palpate.record("sphere:0.04/3", material="liver", modes=5, order=1)
     write_stl("liver.stl", ball, 1000)
     return tmp_path

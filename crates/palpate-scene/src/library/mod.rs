@@ -11,10 +11,11 @@ use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::Scene;
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
-use palpate::{Coupling, Damping, Material};
+use palpate::{Coupling, Damping, Material, ModelObject};
 use palpate_export::TemporaryFolder;
 use palpate_fem::ElementOrder;
 use palpate_fem::Progress;
+use pointers::with_pointers;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -142,17 +143,18 @@ impl SceneLibrary {
 
     /// Reads the text of a scene, adds pointers if it has none, and makes it the current scene.
     fn open_text(&self, mut current: Current, text: String) -> Result<OpenedScene, SceneError> {
-        let given = text.clone();
-        let (mut scene, text) =
-            read_edited_scene(&current.path, text, RunMode::RealTime, pointers::with_pointers)?;
+        let mut added = Vec::new();
+        let edit = |text: &str, objects: &[ModelObject]| {
+            let edited = with_pointers(text, objects)?;
+            added = edited.added;
+            Some(edited.text)
+        };
+        let (mut scene, text) = read_edited_scene(&current.path, text, RunMode::RealTime, edit)?;
         current.text = text.parse().map_err(|error| {
             SceneError::of_file(SceneErrorKind::Syntax, &current.path, format!("{error}"))
         })?;
         // Nobody has chosen the size of added pointers.
-        if text != given {
-            let Scene { devices, warnings, .. } = &mut scene;
-            warnings.retain(|warning| !devices.iter().any(|d| d.pointer && d.name == warning.part));
-        }
+        scene.warnings.retain(|warning| !added.contains(&warning.part));
         let recordable = current.add_recipes(&scene);
         let opened = OpenedScene {
             id: current.id.clone(),

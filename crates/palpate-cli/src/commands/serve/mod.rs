@@ -27,7 +27,7 @@ use std::sync::atomic::AtomicBool;
 /// Show a scene in the browser and touch it with mouse, pen or fingers
 ///
 /// The scene runs in real time, as `palpate run --realtime` does; the page shows it at display rate and its pointers are
-/// devices. Scenes without `pointer = true` get four pointers of a size that suits their objects. Without a scene file
+/// devices: tips that nothing else moves, or, in scenes without any, four of a size that suits their objects. Without a scene file
 /// there are built-in scenes. Logs of `palpate run --realtime --log`, and of `--log` here, are shown with a time line; two of them
 /// side by side.
 #[derive(Args, Debug, Clone)]

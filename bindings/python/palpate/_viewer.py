@@ -1,0 +1,170 @@
+"""The page of `palpate serve` from Python."""
+
+from __future__ import annotations
+
+import atexit
+import collections
+import html
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import webbrowser
+from typing import TYPE_CHECKING, Union
+
+from palpate._errors import FileError, PalpateError
+from palpate._scene import Scene
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    PathLike = Union[str, "os.PathLike[str]"]
+
+#: Lines of the server that an error repeats.
+_LINES = 20
+#: Time that a server may take to end in good order, before it is killed [s].
+_PATIENCE = 5
+
+
+class Viewer:
+    """A page that shows a scene or a log, served by a process of `palpate serve` until :meth:`close`, or until Python ends.
+
+    In a notebook it shows its address as a link. It is a context manager, which closes it at the end.
+
+    Attributes
+    ----------
+    url : str
+        Address of the page, on this machine only.
+    """
+
+    def __init__(self, shown: Union[Scene, PathLike], program: str, log: PathLike | None, listen: str) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-view-")
+        self._said: collections.deque[str] = collections.deque(maxlen=_LINES)
+        self._found = threading.Event()
+        self.url = ""
+        path = os.fspath(shown) if not isinstance(shown, Scene) else os.path.join(self._folder.name, "scene.toml")
+        try:
+            if isinstance(shown, Scene):
+                shown.save(path)
+            logged = [] if log is None else ["--log", os.fspath(log)]
+            arguments = [program, "serve", path, "--no-browser", "--listen", listen, *logged]
+            self._process = subprocess.Popen(
+                arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+            )
+        except BaseException:
+            self._folder.cleanup()
+            raise
+        atexit.register(self.close)
+        self._reader = threading.Thread(target=self._read, name="palpate viewer", daemon=True)
+        self._reader.start()
+        try:
+            # Ends with the server, too: a large scene may take its time.
+            self._found.wait()
+        except BaseException:
+            self.close()
+            raise
+        if not self.url:
+            self.close()
+            raise PalpateError("palpate serve ended at once:\n" + "\n".join(self._said))
+
+    def _read(self) -> None:
+        """Read what the server says, so that it never waits for a reader, and find its address."""
+        stream = self._process.stdout
+        for line in stream or ():
+            self._said.append(line.rstrip())
+            address = re.search(r"https?://\S+", line)
+            if address is not None and not self.url:
+                self.url = address.group()
+                self._found.set()
+        self._found.set()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the page is still served."""
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """End the server, and its log in good order. Closing again does nothing."""
+        atexit.unregister(self.close)
+        if self.is_open:
+            # As Ctrl-C in a terminal does; Windows has no such signal for another process.
+            self._process.send_signal(signal.SIGINT if os.name == "posix" else signal.SIGTERM)
+            try:
+                self._process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+        self._process.wait()
+        self._reader.join()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        self._folder.cleanup()
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<palpate.Viewer at {self.url}>" if self.is_open else "<palpate.Viewer, closed>"
+
+    def _repr_html_(self) -> str:
+        if not self.is_open:
+            return "palpate's viewer is closed"
+        address = html.escape(self.url)
+        return f'palpate shows the scene at <a href="{address}" target="_blank" rel="noopener">{address}</a>'
+
+
+def view(
+    scene: Union[Scene, PathLike],
+    *,
+    open_browser: bool = True,
+    log: PathLike | None = None,
+    program: PathLike | None = None,
+    listen: str = "127.0.0.1:0",
+) -> Viewer:
+    """Show a scene in the browser, in real time, to touch it with mouse, pen or fingers; or a log with a time line.
+
+    The scene runs in a process of its own, which `palpate serve` is: what is touched there does not change a :class:`Simulation` here.
+
+    Parameters
+    ----------
+    scene : Scene or path
+        Scene, or a file: a scene (TOML) or a log (MCAP).
+    open_browser : bool
+        Open the page in a new tab; without it only :attr:`Viewer.url` tells where it is.
+    log : path, optional
+        File for a log of what is touched, for :class:`Log`.
+    program : path, optional
+        The command line's program; without it the environment variable PALPATE, or `palpate` on the path.
+    listen : str
+        Address and port of the page; port 0 is one that is free.
+
+    Returns
+    -------
+    Viewer
+        Keep it: the page ends with :meth:`Viewer.close`, or with Python.
+
+    Raises
+    ------
+    FileError
+        If the program is not found, or the scene cannot be written.
+    PalpateError
+        If the server ends at once, with what it said.
+
+    Examples
+    --------
+    >>> viewer = palpate.view(scene)  # doctest: +SKIP
+    >>> viewer.close()  # doctest: +SKIP
+    """
+    named = os.environ.get("PALPATE", "palpate") if program is None else os.fspath(program)
+    found = shutil.which(named)
+    if found is None:
+        raise FileError(f"the program {named!r} is not found, and palpate.view needs it: `cargo install --path crates/palpate-cli`, or give program=")
+    viewer = Viewer(scene, found, log, listen)
+    if open_browser:
+        webbrowser.open_new_tab(viewer.url)
+    return viewer
