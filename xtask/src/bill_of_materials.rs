@@ -88,7 +88,7 @@ fn linked(dependencies: &Value) -> Vec<&str> {
 
 /// Package URL.
 fn purl(kind: &str, name: &str, version: &str) -> String {
-    format!("pkg:{kind}/{name}@{version}")
+    format!("pkg:{kind}/{name}@{}", version.replace('+', "%2B"))
 }
 
 fn component(package: &Value, reference: &str, sha256: Option<&str>) -> Value {

@@ -5,14 +5,22 @@ use std::path::{Path, PathBuf};
 
 /// A folder with nothing in it.
 pub fn empty(folder: &Path) -> Result<(), String> {
-    let _ = fs::remove_dir_all(folder);
-    fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))
+    let told = |error: std::io::Error| format!("{}: {error}", folder.display());
+    if folder.exists() {
+        fs::remove_dir_all(folder).map_err(told)?;
+    }
+    fs::create_dir_all(folder).map_err(told)
 }
 
 /// Files right below a folder.
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    Ok(entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).collect())
+    Ok(entries(folder)?.into_iter().filter(|path| path.is_file()).collect())
+}
+
+/// What stands right below a folder.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let read = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+    read.map_err(|error| format!("{}: {error}", folder.display()))
 }
 
 /// Write a file, with its folder.
@@ -31,8 +39,7 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
 
 /// Copy a folder.
 pub fn copy_tree(from: &Path, to: &Path) -> Result<(), String> {
-    let entries = fs::read_dir(from).map_err(|error| format!("{}: {error}", from.display()))?;
-    for path in entries.flatten().map(|entry| entry.path()) {
+    for path in entries(from)? {
         let to = to.join(path.file_name().unwrap_or_default());
         if path.is_dir() { copy_tree(&path, &to)? } else { copy(&path, &to)? }
     }

@@ -82,10 +82,11 @@ fn output_of(command: &mut Command) -> Result<Vec<u8>, String> {
 
 /// Packages of the crates, as `cargo publish` would send them. It builds each of them once more, so it is not done here.
 fn crates(dist: &Path, version: &str) -> Result<(), String> {
-    let exclude = NOT_CRATES.iter().flat_map(|name| ["--exclude", name]);
-    let package = ["package", "--workspace", "--locked", "--no-verify", "--allow-dirty", "--quiet"];
-    cargo(&package.into_iter().chain(exclude).collect::<Vec<_>>())?;
     let folder = root().join("target/package");
+    empty(&folder)?;
+    let exclude = NOT_CRATES.iter().flat_map(|name| ["--exclude", name]);
+    let package = ["package", "--workspace", "--locked", "--no-verify", "--quiet"];
+    cargo(&package.into_iter().chain(exclude).collect::<Vec<_>>())?;
     let ending = format!("-{version}.crate");
     for path in files(&folder)? {
         if path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(&ending)) {

@@ -30,7 +30,7 @@ _PATIENCE = 5
 
 
 class Viewer:
-    """A page that shows a scene or a log, served by a process of `palpate serve` until :meth:`close`, or until Python ends.
+    """A page that shows a scene or a log, served by a process of `palpate serve` until :meth:`close`, or until Python ends; only where Python is killed it goes on.
 
     In a notebook it shows its address as a link. It is a context manager, which closes it at the end.
 
@@ -52,7 +52,14 @@ class Viewer:
             logged = [] if log is None else ["--log", os.fspath(log)]
             arguments = [program, "serve", path, "--no-browser", "--listen", listen, *logged]
             self._process = subprocess.Popen(
-                arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                errors="replace",
+                # An interrupt of Python's work, as Ctrl-C, is none of the page.
+                start_new_session=os.name == "posix",
             )
         except BaseException:
             self._folder.cleanup()

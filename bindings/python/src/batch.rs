@@ -5,7 +5,7 @@
 use crate::arrays::array;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::{BatchOutputs, Part};
-use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, fill_rows, make_rows, no_threads};
+use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, fill_rows, make_rows};
 use crate::batch_series::BatchSeries;
 use crate::contacts::ContactLayout;
 use crate::device_mode::ModeChange;
@@ -16,7 +16,7 @@ use crate::scene::Scene;
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
 use crate::starts::Starts;
-use crate::workers::Workers;
+use crate::workers::{Workers, no_threads};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;

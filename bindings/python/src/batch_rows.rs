@@ -3,7 +3,7 @@
 use crate::arrays::shown;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::fill_row;
-use crate::errors::{Class, catch_panic, exception, input_error};
+use crate::errors::{catch_panic, input_error};
 use crate::run_state::{RunState, StepFailure};
 use crate::workers::Workers;
 use palpate_fem::check_memory;
@@ -107,11 +107,6 @@ pub fn chosen_rows(len: usize, rows: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<
         Ok(at)
     };
     numbers.into_iter().map(number).collect()
-}
-
-/// Exception when the system gives no threads.
-pub fn no_threads(py: Python<'_>, error: &rayon::ThreadPoolBuildError) -> PyErr {
-    exception(py, Class::Palpate, format!("the threads of the batch cannot be started: {error}"))
 }
 
 /// Memory of this process [bytes], if the system states it.

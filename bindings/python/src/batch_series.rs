@@ -2,9 +2,9 @@
 
 use crate::batch_motion::BatchMotion;
 use crate::batch_rows::Row;
+use palpate_fem::check_memory;
 use palpate_scene::Scene;
 use rayon::prelude::*;
-use std::collections::TryReserveError;
 
 /// Number of steps that a row makes at once: a thousand rows take some hundredths of a second for them, after which Python is asked for signals.
 const STEPS_AT_ONCE: usize = 16;
@@ -21,10 +21,14 @@ pub struct BatchSeries {
 
 impl BatchSeries {
     /// Series with room for a number of steps of a number of rows.
-    pub fn new(rows: usize, steps: usize, length: usize) -> Result<Self, TryReserveError> {
+    ///
+    /// # Errors
+    /// Text, if there is no memory for it.
+    pub fn new(rows: usize, steps: usize, length: usize) -> Result<Self, String> {
         let count = rows.saturating_mul(steps).saturating_mul(length);
+        check_memory(size_of::<f64>() as f64 * count as f64).map_err(|error| error.to_string())?;
         let mut numbers = Vec::new();
-        numbers.try_reserve_exact(count)?;
+        numbers.try_reserve_exact(count).map_err(|error| error.to_string())?;
         numbers.resize(count, 0.0);
         Ok(Self { numbers, steps, length, done: 0 })
     }

@@ -96,15 +96,26 @@ pub fn write_step(
     if arguments.positions.is_none() {
         check_paths(py, scene)?;
     }
-    for Part { kind, given, rows } in parts(arguments, scene) {
-        let Some(given) = given else { continue };
-        let (name, columns) = (kind.name(), kind.columns());
-        let numbers = Numbers::read(given, name, &[Some(rows), Some(columns)])?;
-        let numbers = numbers.as_slice()?;
-        check_finite(py, name, numbers, columns)?;
-        write(kind, numbers, input).map_err(|error| input_error(py, error))?;
+    // All are checked before the first is written: what is refused leaves the input as it was.
+    let [devices, obstacles, clamps] = parts(arguments, scene).map(|part| read_part(py, part));
+    for (kind, numbers) in [devices?, obstacles?, clamps?].into_iter().flatten() {
+        write(kind, numbers.as_slice()?, input).map_err(|error| input_error(py, error))?;
     }
     Ok(())
+}
+
+/// Numbers of a step for a kind of parts, checked; none where none are given.
+fn read_part<'py>(py: Python<'py>, part: Part<'_, 'py>) -> PyResult<Option<(Kind, Numbers<'py>)>> {
+    let Part { kind, given, rows } = part;
+    let Some(given) = given else { return Ok(None) };
+    let (name, columns) = (kind.name(), kind.columns());
+    let numbers = Numbers::read(given, name, &[Some(rows), Some(columns)])?;
+    let checked = numbers.as_slice()?;
+    check_finite(py, name, checked, columns)?;
+    if kind != Kind::Devices {
+        check_poses(py, name, checked)?;
+    }
+    Ok(Some((kind, numbers)))
 }
 
 /// Motions of a series of steps, copied: other threads may write to Python's arrays meanwhile.

@@ -4,13 +4,16 @@ use crate::arrays::{Numbers, check_finite, read_integers};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
+use crate::workers::{Workers, no_threads};
 use glam::DVec3;
 use palpate::{Damping, Material};
 use palpate_fem::{ElementOrder, ErrorTarget, Precision, ResidualChoice, library_material};
 use palpate_mesh::{MergeNodes, Mesh, PieceChoice, Region, Repair};
 use palpate_scene::{BodySource, MaterialChoice, RecordOptions, SceneError};
 use pyo3::prelude::*;
+use std::num::NonZero;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 /// Mesh of an argument.
 enum Source {
@@ -19,6 +22,9 @@ enum Source {
     /// Nodes and tetrahedra.
     Arrays(Mesh),
 }
+
+/// Process that recorded first: the threads of the numerics live in it.
+static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
 
 /// Keywords whose options of the command line stand in messages.
 const KEYWORDS: [&str; 12] = [
@@ -161,13 +167,22 @@ pub fn record(
     };
     let source = read_source(mesh)?;
     let mut progress = PythonProgress::new(progress);
-    let recorded = py.detach(|| {
+    let record = || {
         let source = match source {
             Source::Text(ref text) => BodySource::Text(text),
             Source::Arrays(mesh) => BodySource::Mesh(mesh, "arrays"),
         };
         catch_panic(|| options.record(source, &mut progress))
+    };
+    let recorded = py.detach(|| {
+        if *FIRST_PROCESS.get_or_init(std::process::id) == std::process::id() {
+            return Ok(record());
+        }
+        // A fork has none of the threads that its parent records with: multiprocessing.
+        let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+        Workers::new(threads)?.run(record)
     });
+    let recorded = recorded.map_err(|error| no_threads(py, &error))?;
     // An exception of the callback, or a signal, is the cause of whatever came after it.
     if let Some(error) = progress.failure() {
         return Err(error);

@@ -9,7 +9,6 @@ use palpate::{DeviceMode, Grasp, Input, State, Support, Twist, step};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use std::collections::TryReserveError;
-
 use std::time::Instant;
 
 /// Number of steps between looks at the clock.

@@ -1,8 +1,10 @@
-//! Threads of a batch, which last as long as it does.
+//! Threads of its own for a batch, or for a recording in a forked process.
 
+use crate::errors::{Class, exception};
+use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Threads of a batch.
+/// Threads that work together.
 pub struct Workers {
     pool: ThreadPool,
     /// Process that they live in.
@@ -12,7 +14,7 @@ pub struct Workers {
 impl Workers {
     /// A number of threads.
     pub fn new(threads: usize) -> Result<Self, ThreadPoolBuildError> {
-        let name = |at| format!("palpate-batch-{at}");
+        let name = |at| format!("palpate-{at}");
         let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()?;
         Ok(Self { pool, process: std::process::id() })
     }
@@ -31,4 +33,9 @@ impl Workers {
         }
         Ok(self.pool.install(work))
     }
+}
+
+/// Exception when the system gives no threads.
+pub fn no_threads(py: Python<'_>, error: &ThreadPoolBuildError) -> PyErr {
+    exception(py, Class::Palpate, format!("threads cannot be started: {error}"))
 }

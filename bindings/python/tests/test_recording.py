@@ -1,5 +1,6 @@
 """Recordings as arrays, against the finite element model's identities, and against the file."""
 
+import multiprocessing
 import pickle
 
 import numpy as np
@@ -154,3 +155,18 @@ def test_progress_is_told_by_stage():
     for shares in stages.values():
         told = [share for share in shares if share is not None]
         assert told == sorted(told) and len(told) <= 101 and all(0 <= share <= 1 for share in told)
+
+
+def _record_after_fork(queue):
+    queue.put(palpate.record("box:0.1x0.1x0.1/3x3x3", material="paper", modes=5).to_bytes())
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_records_too():
+    here = palpate.record("box:0.1x0.1x0.1/3x3x3", material="paper", modes=5).to_bytes()
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=_record_after_fork, args=(queue,), daemon=True)
+    child.start()
+    assert queue.get(timeout=120) == here
+    child.join(timeout=60)

@@ -378,3 +378,19 @@ def test_grasps_that_cannot_be_are_refused(cube):
     fixed = palpate.Simulation(palpate.Scene([palpate.Object("bar", bar)], devices=[palpate.Device("hand")]))
     with pytest.raises(palpate.InputError, match='of "bar" cannot be held'):
         fixed.grasp("hand", "bar", [-0.1, 0, 0])
+
+
+def test_a_refused_step_leaves_all_inputs_as_they_were(cube):
+    ball = palpate.Obstacle(sphere={"radius": 0.02}, position=[0, 0, 0.08])
+    jaw = palpate.Clamp("jaw", "cube", face={"point": [0, 0, -0.05]})
+    scene = palpate.Scene([palpate.Object("cube", cube)], obstacles=[ball], clamps=[jaw])
+    simulation, untouched = palpate.Simulation(scene), palpate.Simulation(scene)
+    inside = [[0, 0, 0.069, 1, 0, 0, 0]]
+    no_rotation = [[0, 0, -0.05, 0, 0, 0, 0]]
+    with pytest.raises(palpate.InputError, match="clamps"):
+        simulation.step(obstacles=inside, clamps=no_rotation)
+    for _ in range(3):
+        simulation.step()
+        untouched.step()
+    assert len(simulation.contacts) == 0
+    assert np.array_equal(simulation.poses, untouched.poses)

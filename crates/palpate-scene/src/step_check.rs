@@ -16,14 +16,17 @@ impl Scene {
 }
 
 fn check_step(scene: &Scene, input: &Input, state: &State) -> Result<(), String> {
+    // A program may have let go of a point that the scene holds.
+    let touches = |device: &DeviceInput| device.mode == DeviceMode::Touch;
+    let can_touch = scene.can_touch() || input.devices.iter().any(touches);
     let output = state.output();
     let moves = output.objects.iter().all(|o| o.energy.stored().is_finite() && o.pose.position.is_finite());
     let finite = moves && output.devices.iter().all(|d| d.force_on_hand.is_finite() && d.proxy.is_finite());
-    let solved = output.status.unsolved_islands == 0 || scene.can_touch();
+    let solved = output.status.unsolved_islands == 0 || can_touch;
     if solved && output.status.rejected_inputs == 0 && finite {
         return Ok(());
     }
-    if scene.can_touch() {
+    if can_touch {
         return Err(format!(
             "at {:.6} s the numbers are not finite any more, or a device or an obstacle is where it can't be. Use a \
              shorter step than {} s, and check that paths are in metres",

@@ -66,6 +66,12 @@ fn meshes_and_recordings_go_through_pipes() {
     let (text, _) = streams(&workplace, &["inspect", "-"], &recording);
     let text = String::from_utf8(text).expect("text");
     assert!(text.starts_with("standard input (") && text.contains("6 elastic"), "{text}");
+    // A table beside it is told of elsewhere.
+    let dense = ["--dense", "table.zarr", "--step", "0.001", "--duration", "0.005", "--precision", "compact"];
+    let with_table = [&["record", "-", "-o", "-"], &body[..], &dense].concat();
+    let (beside_table, told) = streams(&workplace, &with_table, &mesh);
+    assert_eq!(beside_table, recording);
+    assert!(told.contains("touchable"), "{told}");
     // The same bytes as those of files.
     workplace.write("standard input", &mesh);
     workplace.succeed(&[&["record", "standard input", "-o", "bar.palp"], &body[..]].concat());

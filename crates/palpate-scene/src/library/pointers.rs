@@ -23,6 +23,9 @@ pub(super) fn with_pointers(text: &str, objects: &[ModelObject]) -> Option<WithP
     let mut is_changed = false;
     let devices = scene.get_mut("device").and_then(Value::as_array_mut).into_iter().flatten();
     for device in devices.filter_map(Value::as_table_mut).filter(|device| is_unmoved_tip(device)) {
+        for denied in MOVERS {
+            device.remove(denied);
+        }
         device.insert("pointer".into(), Value::Boolean(true));
         is_changed = true;
     }
@@ -110,7 +113,7 @@ mod tests {
     #[test]
     fn tips_that_nothing_moves_become_pointers() {
         let objects = [object_at(&free_block(), DVec3::ZERO, DVec3::ZERO)];
-        let text = "[[device]]\nname = \"tip\"\nmode = \"touch\"\ntip_radius = 0.01\n\
+        let text = "[[device]]\nname = \"tip\"\nmode = \"touch\"\nlinked = false\ntip_radius = 0.01\n\
                     [[device]]\nname = \"far\"\nmode = \"touch\"\nlinked = true\n\
                     [[device]]\nname = \"hand\"\nmode = \"held\"\n";
         let WithPointers { text, added } = with_pointers(text, &objects).expect("a pointer");
@@ -120,6 +123,7 @@ mod tests {
         let pointer = |at: usize| devices[at].get("pointer").and_then(Value::as_bool);
         assert_eq!([pointer(0), pointer(1), pointer(2)], [Some(true), None, None]);
         assert_eq!(devices[0]["tip_radius"].as_float(), Some(0.01));
+        assert_eq!(devices[0].get("linked"), None, "a pointer is not linked");
         assert!(with_pointers(&text, &objects).is_none(), "there is one");
     }
 }

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::log_kind::is_log;
 use crate::progress::Bars;
 use crate::standard_streams::{STANDARD_INPUT, is_stream, read_input, report};
-use crate::terminal::{print, print_json, size_text};
+use crate::terminal::{print_json, size_text};
 use clap::Args;
 use glam::DVec3;
 use palpate::{Damping, Material, Recording, ResidualCompliance, Support};
@@ -95,7 +95,7 @@ fn inspect_store(arguments: &Arguments, location: &Location) -> Result<(), Failu
     let printed = if arguments.json {
         print_store_as_json(&store, &damaged)
     } else {
-        print_store_as_text(&store, &damaged)
+        print_store_as_text(&store, &damaged, false)
     };
     match damaged.into_iter().next() {
         Some((_, what)) => Err(Failure(what)),
@@ -128,10 +128,15 @@ pub fn print_store_as_json(store: &TableStore, damaged: &[(usize, String)]) -> R
     }))
 }
 
-/// Prints a store as text.
-pub fn print_store_as_text(store: &TableStore, damaged: &[(usize, String)]) -> Result<(), Failure> {
+/// Prints a store as text, on standard error where standard output is data.
+pub fn print_store_as_text(
+    store: &TableStore,
+    damaged: &[(usize, String)],
+    output_is_taken: bool,
+) -> Result<(), Failure> {
     let present = store.present()?;
-    print(&describe_store(store, &present, damaged).map_err(|e| Failure(e.to_string()))?)
+    let text = describe_store(store, &present, damaged).map_err(|e| Failure(e.to_string()))?;
+    report(&text, output_is_taken)
 }
 
 fn describe_store(

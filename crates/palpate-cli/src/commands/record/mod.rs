@@ -226,7 +226,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
             if let Some((output, bytes)) = written {
                 inspect::print_as_text(&recorded.recording, output, bytes, output_is_taken)?;
             }
-            store.map_or(Ok(()), |store| inspect::print_store_as_text(&store, &[]))
+            store.map_or(Ok(()), |store| inspect::print_store_as_text(&store, &[], output_is_taken))
         }
     }
 }
