@@ -17,7 +17,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(entries(folder)?.into_iter().filter(|path| path.is_file()).collect())
 }
 
-/// What stands right below a folder.
+/// Paths right below a folder.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let read = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
     read.map_err(|error| format!("{}: {error}", folder.display()))

@@ -20,7 +20,7 @@ class Texts:
 
     def recording(self, recording: _palpate.Recording, part: str) -> str:
         """Name of a recording."""
-        name = f"<recording of {part}>"
+        name = _unused(self.recordings, f"recording of {part}")
         self.recordings[name] = recording
         return name
 
@@ -29,9 +29,18 @@ class Texts:
         entry = dict(path) if isinstance(path, Mapping) else {"file": path}
         rows = entry.get("file")
         if rows is not None and not isinstance(rows, (str, os.PathLike)):
-            entry["file"] = f"<path of {part}>"
+            entry["file"] = _unused(self.paths, f"path of {part}")
             self.paths[entry["file"]] = _csv(rows, part)
         return entry
+
+
+def _unused(taken: Mapping[str, Any], text: str) -> str:
+    """Name in angle brackets that no other part has: an unnamed part 1 and one that is named "1" are two."""
+    name, count = f"<{text}>", 1
+    while name in taken:
+        count += 1
+        name = f"<{text} ({count})>"
+    return name
 
 
 def _csv(rows: Any, part: str) -> str:

@@ -82,9 +82,9 @@ class Viewer:
         stream = self._process.stdout
         for line in stream or ():
             self._said.append(line.rstrip())
-            address = re.search(r"https?://\S+", line)
+            address = re.match(r"open (https?://\S+)", line)
             if address is not None and not self.url:
-                self.url = address.group()
+                self.url = address.group(1)
                 self._found.set()
         self._found.set()
 

@@ -172,6 +172,8 @@ class SoftBody:
         if abs(model.opt.timestep - self.coupling.step) > 1e-12:
             raise InputError(f"the model's timestep is {model.opt.timestep} s, and was {self.coupling.step} s at the start: make a new SoftBody")
         mujoco.mj_step1(model, data)
+        if data.time < self._time:
+            raise InputError(f"MuJoCo reset itself at {self._time} s, since its state was not finite or too fast (its warnings say more): call reset()")
         mujoco.mj_getState(model, data, self._state, _STATE)
         velocity, others = data.qvel.copy(), data.xfrc_applied.copy()
         bodies, is_first = self._bodies, True

@@ -163,3 +163,14 @@ def test_parts_are_those_classes_and_their_heirs(cube):
 
     with pytest.raises(palpate.InputError, match="devices has .*Device.*, expected palpate.Device"):
         palpate.Scene([palpate.Object("cube", cube)], devices=[Device("finger")])
+
+
+def test_a_part_named_as_the_number_of_another_keeps_its_own_path(cube):
+    def slab(name, height):
+        path = [[0, 0, 0, height, 1, 0, 0, 0], [1, 0, 0, height, 1, 0, 0, 0]]
+        return palpate.Plane(normal=[0, 0, 1], name=name, path=path)
+
+    scene = palpate.Scene([palpate.Object("cube", cube)], planes=[slab("1", -0.0499), slab(None, -0.2)], gravity=[0, 0, -9.81])
+    simulation = palpate.Simulation(scene)
+    simulation.run(steps=40)
+    assert set(simulation.contacts["against"]) == {"1"}
