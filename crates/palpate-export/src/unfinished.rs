@@ -49,11 +49,63 @@ pub fn remove_unfinished<T>(then: impl FnOnce() -> T) -> T {
             let _ = match removal {
                 Removal::File => std::fs::remove_file(path),
                 Removal::EmptyFolder => std::fs::remove_dir(path),
-                Removal::WholeFolder => std::fs::remove_dir_all(path),
+                Removal::WholeFolder => remove_folder(path),
             };
         }
     }
     let done = then();
     drop(unfinished);
     done
+}
+
+/// Attempts to remove a folder that another thread fills meanwhile.
+const ATTEMPTS: u32 = 100;
+
+/// Removes a folder with all that is in it. A file that another thread puts there between the removal of the others and that of the folder
+/// is removed in the next attempt.
+fn remove_folder(path: &Path) -> io::Result<()> {
+    let mut removed = std::fs::remove_dir_all(path);
+    for _ in 1..ATTEMPTS {
+        match &removed {
+            Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => {}
+            _ => break,
+        }
+        removed = std::fs::remove_dir_all(path);
+    }
+    removed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    #[test]
+    fn a_folder_that_is_being_filled_is_removed() {
+        for _ in 0..40 {
+            let parent = tempfile::tempdir().expect("a folder");
+            let folder = parent.path().join("filled");
+            std::fs::create_dir(&folder).expect("a folder");
+            let [has_begun, has_ended] = [const { AtomicBool::new(false) }; 2];
+            let removed = std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    let mut numbers = 0..;
+                    while !has_ended.load(Ordering::Relaxed) {
+                        let file = folder.join(numbers.next().unwrap_or(0).to_string());
+                        // It fails when the folder is gone.
+                        let _ = std::fs::write(file, "of a log");
+                        has_begun.store(true, Ordering::Relaxed);
+                    }
+                });
+                while !has_begun.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+                let removed = remove_folder(&folder);
+                has_ended.store(true, Ordering::Relaxed);
+                removed
+            });
+            removed.expect("it is removed");
+            assert!(!folder.exists());
+        }
+    }
 }

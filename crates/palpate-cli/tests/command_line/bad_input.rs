@@ -151,14 +151,21 @@ fn a_hand_in_millimetres_ends_the_run_and_leaves_no_output() {
     let workplace = Workplace::with_scene();
     workplace.write("left.csv", "0,-50,0,0\n0.05,-45,3,0\n");
     let before = workplace.files();
-    let error = workplace.fail(&["run", "scene.toml", "--csv", "out.csv"]);
-    assert!(
+    let free = workplace.text("scene.toml");
+    // A body that could touch something is let go of as little.
+    let above_a_floor =
+        format!("{free}\n[[plane]]\nname = \"floor\"\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\n");
+    for scene in [above_a_floor, free] {
+        workplace.write("scene.toml", &scene);
+        let error = workplace.fail(&["run", "scene.toml", "--csv", "out.csv"]);
+        assert!(
         error.starts_with(
             "at 0.001000 s the held points can't be met: a hand moves, or a body turns, too far in one step of 0.001 s; \
              the hand of \"left\" is "
         ) && error.ends_with(". Use a shorter step, and check that paths are in metres"),
         "{error}"
     );
+    }
     assert_eq!(workplace.files(), before);
 }
 
