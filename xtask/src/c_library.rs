@@ -1,5 +1,6 @@
 //! The C library as users install it, and programs that are built with it: by pkg-config, CMake, and in C#.
 
+use crate::files::{copy, write};
 use crate::machine::{install, runs};
 use crate::process::{cargo, root, run_in};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
@@ -63,7 +64,7 @@ fn lay_out(libraries: &str, to: &str) -> Result<PathBuf, String> {
         let file = from.join("packaging").join(name);
         let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
         let text = values.iter().fold(text, |text, (key, value)| text.replace(key, value));
-        write(&to.join(folder).join(name), &text)?;
+        write(&to.join(folder).join(name), text.as_bytes())?;
     }
     Ok(to)
 }
@@ -147,21 +148,4 @@ fn in_c_sharp(prefix: &Path, work: &Path) -> Result<Option<Command>, String> {
     let mut program = Command::new("mono");
     program.arg("Press.exe");
     Ok(Some(program))
-}
-
-fn copy(from: &Path, to: &Path) -> Result<(), String> {
-    make_parent(to)?;
-    std::fs::copy(from, to)
-        .map(drop)
-        .map_err(|error| format!("{} to {}: {error}", from.display(), to.display()))
-}
-
-fn write(to: &Path, text: &str) -> Result<(), String> {
-    make_parent(to)?;
-    std::fs::write(to, text).map_err(|error| format!("{}: {error}", to.display()))
-}
-
-fn make_parent(file: &Path) -> Result<(), String> {
-    let made = file.parent().map_or(Ok(()), std::fs::create_dir_all);
-    made.map_err(|error| format!("{}: {error}", file.display()))
 }

@@ -32,7 +32,7 @@ pub fn write(path: &Path, content: &[u8]) -> Result<(), String> {
 
 /// Copy a file, with the folder that it goes to.
 pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
-    let told = |error: std::io::Error| format!("{}: {error}", from.display());
+    let told = |error: std::io::Error| format!("{} to {}: {error}", from.display(), to.display());
     to.parent().map_or(Ok(()), fs::create_dir_all).map_err(told)?;
     fs::copy(from, to).map(|_| ()).map_err(told)
 }

@@ -18,7 +18,7 @@ const NOT_CRATES: &[&str] = &["palpate-attack", "palpate-c", "palpate-python", "
 /// Files of the repository that every archive holds.
 const LEGAL: &[&str] = &["LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md"];
 
-/// Shells that `palpate completions` knows.
+/// Shells whose completions are packed.
 const SHELLS: &[&str] = &["bash", "zsh", "fish"];
 
 /// Build all of it.

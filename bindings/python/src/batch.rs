@@ -9,7 +9,7 @@ use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, fill_rows, make_rows
 use crate::batch_series::BatchSeries;
 use crate::contacts::ContactLayout;
 use crate::device_mode::ModeChange;
-use crate::errors::{Class, catch_panic, exception, input_error, internal_error};
+use crate::errors::{catch_panic, input_error, internal_error, lock_at_once};
 use crate::motion::{Arguments, check_devices};
 use crate::run_state::{RunState, held_points};
 use crate::scene::Scene;
@@ -22,7 +22,7 @@ use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
-use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Largest number of rows.
 const MAX_ROWS: i64 = 1_000_000;
@@ -58,16 +58,9 @@ pub struct Batch {
 
 impl Batch {
     fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Rows>> {
-        match self.rows.try_lock() {
-            Ok(guard) => Ok(guard),
-            // A panic is caught before it passes the guard.
-            Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) => Err(exception(
-                py,
-                Class::Palpate,
-                "the batch is in use by another thread: wait for its step to end, or give each thread a batch",
-            )),
-        }
+        let in_use =
+            "the batch is in use by another thread: wait for its step to end, or give each thread a batch";
+        lock_at_once(py, &self.rows, in_use)
     }
 
     /// Change the chosen rows on all threads, by their place among the chosen ones, and write their numbers into the arrays. A row whose change fails

@@ -3,12 +3,10 @@
 use crate::arrays::{Numbers, pose_of};
 use crate::errors::input_error;
 use crate::motion::{Arguments, Kind, Part, check_paths, copy, parts, write};
+use crate::run_length::MAX_STEPS;
 use palpate::Input;
 use palpate_scene::Scene;
 use pyo3::prelude::*;
-
-/// Largest number of steps of one run: a day at 1 kHz.
-const MAX_STEPS: i64 = 100_000_000;
 
 /// Motions of all rows, copied: the rows are stepped without the interpreter's lock. Buffers are made once.
 pub struct BatchMotion {
@@ -81,7 +79,7 @@ impl BatchMotion {
             (Some(steps), None) => Ok(steps),
             (Some(_), Some(_)) => Err("the motions have a row per step: leave steps out".into()),
             (None, None) => Err("give positions, or steps".into()),
-            (None, Some(steps)) if (0..=MAX_STEPS).contains(&steps) => Ok(steps as usize),
+            (None, Some(steps)) if (0..=i64::from(MAX_STEPS)).contains(&steps) => Ok(steps as usize),
             (None, Some(steps)) => Err(format!("steps is {steps}, expected 0 to {MAX_STEPS}")),
         }
     }

@@ -7,6 +7,7 @@ use std::any::Any;
 use std::fmt::{Debug, Display};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, TryLockError};
 
 /// Class of an exception, by its name in `palpate._errors`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,4 +113,18 @@ pub fn internal_error(py: Python<'_>, text: &str) -> PyErr {
 fn panic_text(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a panic without text").to_string()
+}
+
+/// Guard of a mutex that no other thread may have meanwhile; else an exception with this text.
+pub fn lock_at_once<'m, T>(
+    py: Python<'_>,
+    mutex: &'m Mutex<T>,
+    in_use: &'static str,
+) -> PyResult<MutexGuard<'m, T>> {
+    match mutex.try_lock() {
+        Ok(guard) => Ok(guard),
+        // A panic is caught before it passes the guard.
+        Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => Err(exception(py, Class::Palpate, in_use)),
+    }
 }

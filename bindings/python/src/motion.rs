@@ -97,25 +97,31 @@ pub fn write_step(
         check_paths(py, scene)?;
     }
     // All are checked before the first is written: what is refused leaves the input as it was.
-    let [devices, obstacles, clamps] = parts(arguments, scene).map(|part| read_part(py, part));
+    let read = |Part { kind, given, rows }| {
+        let shape = [Some(rows), Some(kind.columns())];
+        given.map(|given| Ok::<_, PyErr>((kind, read_numbers(py, kind, given, &shape)?))).transpose()
+    };
+    let [devices, obstacles, clamps] = parts(arguments, scene).map(read);
     for (kind, numbers) in [devices?, obstacles?, clamps?].into_iter().flatten() {
         write(kind, numbers.as_slice()?, input).map_err(|error| input_error(py, error))?;
     }
     Ok(())
 }
 
-/// Numbers of a step for a kind of parts, checked; none where none are given.
-fn read_part<'py>(py: Python<'py>, part: Part<'_, 'py>) -> PyResult<Option<(Kind, Numbers<'py>)>> {
-    let Part { kind, given, rows } = part;
-    let Some(given) = given else { return Ok(None) };
-    let (name, columns) = (kind.name(), kind.columns());
-    let numbers = Numbers::read(given, name, &[Some(rows), Some(columns)])?;
+/// Numbers of a shape for a kind of parts, checked.
+fn read_numbers<'py>(
+    py: Python<'py>,
+    kind: Kind,
+    given: &Bound<'py, PyAny>,
+    shape: &[Option<usize>],
+) -> PyResult<Numbers<'py>> {
+    let numbers = Numbers::read(given, kind.name(), shape)?;
     let checked = numbers.as_slice()?;
-    check_finite(py, name, checked, columns)?;
+    check_finite(py, kind.name(), checked, kind.columns())?;
     if kind != Kind::Devices {
-        check_poses(py, name, checked)?;
+        check_poses(py, kind.name(), checked)?;
     }
-    Ok(Some((kind, numbers)))
+    Ok(numbers)
 }
 
 /// Motions of a series of steps, copied: other threads may write to Python's arrays meanwhile.
@@ -135,20 +141,12 @@ impl SeriesMotion {
         let mut series = Self { parts: Vec::new(), steps: None };
         for Part { kind, given, rows } in parts(arguments, scene) {
             let Some(given) = given else { continue };
-            let (name, columns) = (kind.name(), kind.columns());
-            let numbers = Numbers::read(given, name, &[series.steps, Some(rows), Some(columns)])?;
+            let shape = [series.steps, Some(rows), Some(kind.columns())];
+            let numbers = read_numbers(py, kind, given, &shape)?;
             series.steps = numbers.shape().first().copied();
-            let numbers = numbers.as_slice()?;
-            check_finite(py, name, numbers, columns)?;
-            if kind != Kind::Devices {
-                check_poses(py, name, numbers)?;
-            }
             let mut copied = Vec::new();
-            copied
-                .try_reserve_exact(numbers.len())
-                .map_err(|error| PyMemoryError::new_err(format!("{name}: {error}")))?;
-            copied.extend_from_slice(numbers);
-            series.parts.push((kind, copied, rows * columns));
+            copy(kind.name(), numbers.as_slice()?, &mut copied)?;
+            series.parts.push((kind, copied, rows * kind.columns()));
         }
         Ok(series)
     }

@@ -3,7 +3,7 @@
 use palpate_scene::Scene;
 
 /// Largest number of steps of one `run`: a day at 1 kHz.
-const MAX_STEPS: f64 = 1e8;
+pub const MAX_STEPS: u32 = 100_000_000;
 
 /// Number of steps by the motions, by the number of steps or the duration [s] that are given, or to the end of the scene's paths.
 ///
@@ -29,7 +29,7 @@ pub fn count_steps(
             return Err("the scene has no path that ends: give positions, steps or duration".into());
         }
     };
-    if (0.0..=MAX_STEPS).contains(&count) {
+    if (0.0..=f64::from(MAX_STEPS)).contains(&count) {
         Ok(count as usize)
     } else {
         Err(format!("the run has {count} steps of {step_s} s, expected 0 to {MAX_STEPS}"))

@@ -5,7 +5,7 @@
 use crate::arrays::{array, flat, pose_row, twist_row};
 use crate::contacts::ContactLayout;
 use crate::device_mode::{ModeChange, mode_name};
-use crate::errors::{Class, catch_panic, exception, input_error, internal_error};
+use crate::errors::{catch_panic, input_error, internal_error, lock_at_once};
 use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
 use crate::readings::{energy_by_name, load_row, status_by_name, surface, write_forces};
 use crate::run_length::count_steps;
@@ -21,7 +21,7 @@ use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::TryReserveError;
-use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Simulation of a scene: its state, stepped from Python.
 ///
@@ -65,16 +65,8 @@ impl Simulation {
 
     /// State, also one that a panic has left.
     fn lock_any(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, RunState>> {
-        match self.run.try_lock() {
-            Ok(guard) => Ok(guard),
-            // A panic is caught before it passes the guard.
-            Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) => Err(exception(
-                py,
-                Class::Palpate,
-                "the simulation is in use by another thread: wait for its run to end, or give each thread a copy()",
-            )),
-        }
+        let in_use = "the simulation is in use by another thread: wait for its run to end, or give each thread a copy()";
+        lock_at_once(py, &self.run, in_use)
     }
 
     /// Write the forces on the hands into the array that steps return.
