@@ -247,7 +247,7 @@ class RigidCoupling:
                 force, point, body = -on["force"], on["point"], on["body"]
                 pressing = (force * on["normal"]).sum(axis=1, keepdims=True)
                 np.add.at(self._loads, on["shape"], np.concatenate([force, cross(point, force), pressing], axis=1))
-                # Where the bodies' points at the contacts came from.
+                # Travel of the bodies' points at the contacts.
                 turn = quaternion_product(start[:, 3:], poses[:, 3:] * [1, -1, -1, -1])
                 travel = point - start[body, :3] - rotated(turn[body], point - poses[body, :3])
                 np.add.at(self._step_work, body, -(force * travel).sum(axis=1))

@@ -3,7 +3,6 @@
 use crate::atomic_file::AtomicFile;
 use crate::error::ExportError;
 use crate::labels::{ProbeReading, SceneLabels};
-use glam::DVec3;
 use palpate::{Collider, Input, Model, Output, State};
 use std::io::{self, BufWriter, Stdout, Write};
 use std::path::{Path, PathBuf};
@@ -129,9 +128,8 @@ impl StepsCsv {
             numbers.extend(object.torque.to_array());
         }
         for obstacle in &output.obstacles {
-            // −0 + 0 = 0.
-            numbers.extend((obstacle.force + DVec3::ZERO).to_array());
-            numbers.extend((obstacle.torque + DVec3::ZERO).to_array());
+            numbers.extend(obstacle.force.to_array());
+            numbers.extend(obstacle.torque.to_array());
         }
         for (at, clamp) in output.clamps.iter().enumerate() {
             let frame = input.clamps.get(at).copied().unwrap_or(model.parameters().clamps[at].frame);
