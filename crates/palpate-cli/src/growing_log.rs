@@ -126,7 +126,8 @@ mod tests {
     use super::*;
     use glam::DVec3;
     use palpate::{Input, ModelParameters};
-    use palpate_haptics::log::{LogWriter, SceneNames};
+    use palpate_haptics::SceneNames;
+    use palpate_haptics::log::LogWriter;
     use palpate_testkit::{free_block, model_and_state, object_at};
     use std::collections::BTreeMap;
     use std::io::Cursor;

@@ -39,7 +39,6 @@ pub mod table;
 mod transient;
 
 pub use body::RecordedBody;
-pub use certificate::FORCE_ERROR_WARNING;
 pub use element::ElementOrder;
 pub use error_target::ErrorTarget;
 pub use estimate::{Estimate, estimate};

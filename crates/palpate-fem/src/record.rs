@@ -2,7 +2,7 @@
 
 use crate::assembly::Assembly;
 use crate::body::RecordedBody;
-use crate::certificate::{FORCE_ERROR_UNUSABLE, FORCE_ERROR_WARNING, certificate};
+use crate::certificate::{FORCE_ERROR_UNUSABLE, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
 use crate::material;
@@ -299,7 +299,7 @@ fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress
              certificate): keep the residual compliance and more modes",
             worst_at.x, worst_at.y, worst_at.z
         ));
-    } else if error > FORCE_ERROR_WARNING {
+    } else if error > Certificate::FORCE_ERROR_WARNING {
         progress.warn(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
              certificate): keep the residual compliance and more modes",

@@ -14,6 +14,8 @@
 //! The processes exchange values through triple buffers: no process waits for another. Times are in seconds since a common start, and
 //! a cycle is a function of time, so that a loop can also be closed in simulated time, without threads.
 //!
+//! Without the feature `real-time` the crate has what is a function of time, and no thread, clock, driver, link or log: WebAssembly runs that.
+//!
 //! | you want to | start with |
 //! |---|---|
 //! | run a scene with devices in real time | [`Session`] |
@@ -24,14 +26,23 @@
 //! | write, read or replay a log | [`log`] |
 //! | choose a stable virtual coupling | [`stability`] |
 
+// Parts that only drivers and links use.
+#![cfg_attr(not(feature = "real-time"), allow(dead_code))]
+
+#[cfg(feature = "real-time")]
 mod clock;
+#[cfg(feature = "real-time")]
+mod cycle_channel;
 mod deformation_process;
 pub mod device;
 pub mod error;
 mod force_process;
+#[cfg(feature = "real-time")]
 pub mod guardian;
 mod haptic_update;
+#[cfg(feature = "real-time")]
 pub mod link;
+#[cfg(feature = "real-time")]
 pub mod log;
 mod motion_check;
 mod motion_path;
@@ -40,13 +51,19 @@ mod playback;
 mod port;
 mod safety;
 mod safety_limits;
+mod scene_names;
+#[cfg(feature = "real-time")]
 mod scheduling;
+#[cfg(feature = "real-time")]
 mod session;
 mod snapshot;
 pub mod stability;
 pub mod timing;
 
+#[cfg(feature = "real-time")]
 pub use clock::Clock;
+#[cfg(feature = "real-time")]
+pub use cycle_channel::{CycleReceiver, CycleSender, cycle_channel};
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 #[doc(no_inline)]
 pub use error::{Error, LogError};
@@ -58,13 +75,14 @@ pub use playback::Playback;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};
 pub use safety::{Conditions, Reply, Safety, SafetyCounts};
 pub use safety_limits::{ImplausibleMotion, LimitError, MotionLimits, RefusedMotions, SafetyLimits};
+pub use scene_names::SceneNames;
+#[cfg(feature = "real-time")]
 pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
+#[cfg(feature = "real-time")]
 pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
 pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer};
 #[doc(no_inline)]
-pub use timing::{
-    Cycle, CycleReceiver, CycleSender, DurationHistogram, Percentiles, Timing, cycle_channel, percentile_us,
-};
+pub use timing::{Cycle, DurationHistogram, Overrun, Percentiles, Timing, percentile_us};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

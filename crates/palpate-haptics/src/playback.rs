@@ -54,7 +54,7 @@ impl Playback {
     ///
     /// # Real time
     /// No allocation, lock or system call.
-    pub(crate) fn is_due(&self, tick: u64) -> bool {
+    pub fn is_due(&self, tick: u64) -> bool {
         if self.is_paused() {
             let one_less = |left: u32| left.checked_sub(1);
             return self.requested_steps.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_less).is_ok();

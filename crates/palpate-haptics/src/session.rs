@@ -1,6 +1,7 @@
 //! Session: a run in real time, with the processes as threads.
 
 use crate::clock::Clock;
+use crate::cycle_channel::CycleSender;
 use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::{Error, SessionError};
 use crate::force_process::{ForceProcess, ObstacleTrajectory};
@@ -14,7 +15,7 @@ use crate::safety::Safety;
 use crate::safety_limits::{RefusedMotions, SafetyLimits};
 use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer};
-use crate::timing::{Cycle, CycleSender, DurationHistogram, Overrun, Timing};
+use crate::timing::{Cycle, DurationHistogram, Overrun, Timing};
 use palpate::{Collider, ContactOutput, DeviceMode, Model, State};
 use std::io::{Seek, Write};
 use std::sync::Arc;

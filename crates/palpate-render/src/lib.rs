@@ -4,18 +4,17 @@
 //! log → LogReplay → LogFramePlayer → LogFrames → viewer's server ⇄ page in a browser → PNG → GIF
 //! ```
 //!
-//! The same frames are what the viewer shows of a log; [`describe_scene`] is the description that its pages get.
+//! The same frames are what the viewer shows of a log.
 
 #![deny(missing_docs)]
 
 mod browser;
-mod description;
 mod error;
 mod gif;
 mod log_frames;
 
 pub use browser::{ImageSink, find_browser, program_runs, render_log};
-pub use description::describe_scene;
+
 pub use error::RenderError;
 pub use gif::write_gif;
 pub use log_frames::{FrameSpacing, LogFramePlayer};

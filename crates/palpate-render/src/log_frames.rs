@@ -1,10 +1,9 @@
 //! Frames of a log for the viewer: the log is replayed, and some of its steps become frames.
 
-use crate::description::describe_scene;
 use crate::error::RenderError;
 use palpate_haptics::Snapshot;
 use palpate_scene::{LogReplay, Progress, ReplayError};
-use palpate_viewer::{LogFrameBuilder, LogFrames};
+use palpate_viewer::{LogFrameBuilder, LogFrames, describe_scene};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

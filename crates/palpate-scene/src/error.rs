@@ -1,5 +1,6 @@
 //! Errors of scenes: kind, file, line, key and message.
 
+#[cfg(feature = "native")]
 use palpate_export::ExportError;
 use std::fmt;
 use std::io;
@@ -94,6 +95,7 @@ impl SceneError {
     }
 }
 
+#[cfg(feature = "native")]
 impl From<ExportError> for SceneError {
     fn from(error: ExportError) -> Self {
         let (file, os_error) = match &error {

@@ -6,51 +6,78 @@
 //! SceneLibrary      → built-in scenes, scene files and uploaded meshes, with changes of their settings
 //! ```
 //!
+//! Without the feature `native` there are scene files whose parts are in memory, and no files, recording, tables, logs and library: WebAssembly
+//! uses that.
+//!
 //! Errors are values: a [`SceneError`] has its kind, file, line, key and message. Nothing here prints or ends the process.
 
 #![deny(missing_docs)]
+// Keys of tables, meshes and probes are read everywhere.
+#![cfg_attr(not(feature = "native"), allow(dead_code, unused_imports))]
 
+#[cfg(feature = "native")]
 mod attach;
 mod devices;
 mod error;
 mod file;
+mod files;
 mod initial_checks;
 mod library;
+#[cfg(feature = "native")]
 mod material_choice;
+#[cfg(feature = "native")]
 mod mesh_source;
+#[cfg(feature = "native")]
 mod node_selection;
+#[cfg(feature = "native")]
 mod progress;
+#[cfg(feature = "native")]
 mod recipe;
+#[cfg(feature = "native")]
 mod record_options;
 mod recording_file;
+#[cfg(feature = "native")]
 mod replay;
 mod scene;
+#[cfg(feature = "native")]
 mod scene_log;
 mod step_check;
+#[cfg(feature = "native")]
 mod supports;
 mod warning;
 
+#[cfg(feature = "native")]
 pub use attach::{attach_path, attach_real};
 pub use devices::{ANY_HAND, MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
 pub use error::{SceneError, SceneErrorKind};
 pub use file::{
-    PartsInMemory, Relocated, RunMode, read_driven_scene, read_path, read_piped_scene, read_relocated_scene,
-    read_scene, read_scene_text,
+    PartsInMemory, Relocated, RunMode, named_files, read_driven_scene, read_path, read_piped_scene,
+    read_relocated_scene, read_scene, read_scene_text,
 };
-pub use library::{
-    BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, SettingsChange, paper_cube_recipe,
-};
+#[cfg(feature = "native")]
+pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
+pub use library::{SettingsChange, TouchableScene, read_touchable_scene};
+#[cfg(feature = "native")]
 pub use material_choice::MaterialChoice;
+#[cfg(feature = "native")]
 pub use mesh_source::{read_body, read_surface, source_name};
+#[cfg(feature = "native")]
 pub use node_selection::{NodeSelection, select_nodes, union_of_nodes};
+#[cfg(feature = "native")]
 pub use palpate_fem::{Progress, SilentProgress};
+#[cfg(feature = "native")]
 pub use progress::{ProgressFn, WithoutRemarks};
+#[cfg(feature = "native")]
 pub use recipe::{RecordingRecipe, cache_folder};
+#[cfg(feature = "native")]
 pub use record_options::{BodySource, PreparedBody, RecordOptions};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
+#[cfg(feature = "native")]
 pub use replay::{Difference, LogReplay, ReplayError, Replayed};
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
+#[cfg(feature = "native")]
 pub use scene_log::SceneLog;
+#[cfg(feature = "native")]
 pub use supports::read_supports;
 pub use warning::{Warning, WarningKind};
 

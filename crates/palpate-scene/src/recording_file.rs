@@ -1,8 +1,8 @@
 //! Recording files, and their certificates in words.
 
 use crate::error::{SceneError, SceneErrorKind};
+use crate::files::read_regular_file;
 use palpate::{Certificate, PeakForceError, Recording};
-use palpate_mesh::read_regular_file;
 use std::fmt::Write;
 use std::path::Path;
 

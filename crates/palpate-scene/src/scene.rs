@@ -4,9 +4,10 @@ use crate::devices::RealDevice;
 use crate::warning::Warning;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose, State};
+#[cfg(feature = "native")]
 use palpate_export::{DeviceLabel, ProbeLabel, SceneLabels};
+use palpate_haptics::SceneNames;
 use palpate_haptics::device::{DeviceSpec, Hand};
-use palpate_haptics::log::SceneNames;
 use palpate_haptics::{MotionLimits, MotionPath};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,6 +27,7 @@ pub struct Scene {
     /// Paths of the bases of objects with fixed nodes, in the order of the objects.
     pub bases: Vec<Option<MotionPath>>,
     /// Displacement probes.
+    #[cfg(feature = "native")]
     pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
     pub gravity: Option<MotionPath>,
@@ -135,6 +137,7 @@ impl Scene {
     }
 
     /// Names of all parts, as exports have them.
+    #[cfg(feature = "native")]
     pub fn labels(&self) -> SceneLabels {
         let label =
             |device: &SceneDevice| DeviceLabel { name: device.name.clone(), transient: device.pointer };

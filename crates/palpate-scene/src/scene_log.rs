@@ -3,7 +3,8 @@
 use crate::error::{SceneError, SceneErrorKind};
 use crate::scene::Scene;
 use palpate::{Input, Model, State};
-use palpate_haptics::log::{LogSender, LogWriter, SceneNames};
+use palpate_haptics::SceneNames;
+use palpate_haptics::log::{LogSender, LogWriter};
 use palpate_mesh::read_regular_file;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};

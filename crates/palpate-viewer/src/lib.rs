@@ -5,27 +5,48 @@
 //!      ← frames: modal coordinates, poses and residual displacements, 60 per second
 //! ```
 //!
+//! Without the feature `server` there is the protocol and a [`LocalScene`], which a page runs by itself, as in a Web Worker.
+//!
 //! `docs/viewer-protocol.md` defines the protocol with the page, `viewer/`, which is embedded here. A [`SceneProvider`]
 //! makes the scenes: the server knows neither scene files nor recording. No page can delay the force process: frames
 //! are encoded from its newest snapshot, and a slow page skips frames.
 
+// Parts that only the server uses.
+#![cfg_attr(not(feature = "server"), allow(dead_code))]
+
+mod current;
+mod describe;
 mod error;
+#[cfg(feature = "server")]
 mod live;
+mod local_scene;
+#[cfg(feature = "server")]
 mod log_frames;
+mod page_requests;
 mod pointers;
 mod protocol;
 mod scene_provider;
+mod scene_start;
+#[cfg(feature = "server")]
 mod server;
+mod static_data;
 
-pub use error::{SceneError, ServerError, TlsError, TokenError};
+pub use describe::describe_scene;
+pub use error::SceneError;
+#[cfg(feature = "server")]
+pub use error::{ServerError, TlsError, TokenError};
+pub use local_scene::{LocalRequest, LocalScene, PageMessage};
+#[cfg(feature = "server")]
 pub use log_frames::{LogFrameBuilder, LogFrames};
 pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
     MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,
     SceneDescription, SceneSummary, ShapeDescription, View, decodes,
 };
+#[cfg(feature = "server")]
+pub use scene_provider::{DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier};
 pub use scene_provider::{
-    DeviceOpener, JobControl, JobReport, LogFile, LogOpener, OpenLog, PageNotifier, SceneProvider,
-    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+    JobControl, JobReport, SceneProvider, SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
+#[cfg(feature = "server")]
 pub use server::{Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token};

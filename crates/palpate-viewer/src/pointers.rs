@@ -124,7 +124,8 @@ impl DeviceSlot {
     fn follow(&mut self, dt: f64) {
         let a = self.position - self.target;
         let b = self.velocity + a * TRACKING_FREQUENCY;
-        let decay = (-TRACKING_FREQUENCY * dt).exp();
+        // The same bits in a browser.
+        let decay = libm::exp(-TRACKING_FREQUENCY * dt);
         let offset = (a + b * dt) * decay;
         self.position = self.target + offset;
         self.velocity = b * decay - offset * TRACKING_FREQUENCY;

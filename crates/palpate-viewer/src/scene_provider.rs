@@ -2,9 +2,16 @@
 
 use crate::error::SceneError;
 use crate::protocol::{MaterialDescription, PhysicsSettings, SceneDescription, SceneSummary};
-use palpate::{DeviceMode, Model, Pose, State};
+#[cfg(feature = "server")]
+use palpate::State;
+use palpate::{DeviceMode, Model, Pose};
+#[cfg(feature = "server")]
+use palpate_haptics::AttachedDevice;
+use palpate_haptics::MotionPath;
+#[cfg(feature = "server")]
 use palpate_haptics::log::{LogSender, LogSummary, LogWriter};
-use palpate_haptics::{AttachedDevice, MotionPath};
+use palpate_scene::{Scene, SceneDevice};
+#[cfg(feature = "server")]
 use std::io::{Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,21 +20,26 @@ use std::sync::atomic::AtomicBool;
 pub type SharedTrajectory = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
 
 /// Opens a device; called at each start of the scene.
+#[cfg(feature = "server")]
 pub type DeviceOpener = Arc<dyn Fn() -> Result<AttachedDevice, SceneError> + Send + Sync>;
 
 /// Target of a log. What was flushed stays, however the process ends.
+#[cfg(feature = "server")]
 pub trait LogFile: Write + Seek + Send {
     /// Keeps the log: under its name if it is whole, or as far as it could be written.
     fn finish(self: Box<Self>, summary: LogSummary);
 }
 
 /// Sends an error text to all pages.
+#[cfg(feature = "server")]
 pub type PageNotifier = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// Sender and writer of an open log.
+#[cfg(feature = "server")]
 pub type OpenLog = (LogSender, LogWriter<Box<dyn LogFile>>);
 
 /// Opens a log that begins with a state; called at each start of the scene. The notifier reports later errors.
+#[cfg(feature = "server")]
 pub type LogOpener = Arc<dyn Fn(&State, PageNotifier) -> Result<OpenLog, SceneError> + Send + Sync>;
 
 /// Scene that can be started repeatedly.
@@ -48,7 +60,33 @@ pub struct ViewerScene {
     /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
     pub gravity: Option<MotionPath>,
     /// Log opener, if the scene is logged.
+    #[cfg(feature = "server")]
     pub log: Option<LogOpener>,
+}
+
+impl ViewerScene {
+    /// Scene without a log, whose devices `device` finds.
+    pub fn new(
+        scene: &Scene,
+        description: SceneDescription,
+        device: impl FnMut(&SceneDevice) -> ViewerDevice,
+    ) -> Self {
+        let movers = scene.obstacles.iter().map(|obstacle| {
+            let obstacle = obstacle.clone();
+            Arc::new(move |t: f64| obstacle.pose_at(t)) as SharedTrajectory
+        });
+        Self {
+            description,
+            model: scene.model.clone(),
+            devices: scene.devices.iter().map(device).collect(),
+            obstacle_trajectories: movers.collect(),
+            clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
+            base_paths: scene.bases.clone(),
+            gravity: scene.gravity.clone(),
+            #[cfg(feature = "server")]
+            log: None,
+        }
+    }
 }
 
 /// Input source of a device.
@@ -59,6 +97,7 @@ pub enum ViewerDevice {
     /// Path in simulation time.
     Path(MotionPath, DeviceMode),
     /// Device on this machine.
+    #[cfg(feature = "server")]
     Local(DeviceOpener),
 }
 

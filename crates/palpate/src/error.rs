@@ -48,6 +48,12 @@ pub enum RecordingError {
     /// Content with another hash than the file states.
     #[error("its content does not fit its hash: the file was damaged or changed after it was written")]
     HashMismatch,
+    /// Body whose recording in another material needs FEM.
+    #[error("this recording cannot be rescaled to another material: {reason}; record it again")]
+    NotRescalable {
+        /// Reason.
+        reason: String,
+    },
     /// Tensor that the file lacks.
     #[error("the tensor {name} is missing")]
     MissingTensor {

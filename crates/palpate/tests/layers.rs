@@ -52,7 +52,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-fem", &["palpate", "palpate-mesh"]),
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
-    ("palpate-viewer", &["palpate", "palpate-haptics"]),
+    ("palpate-viewer", &["palpate", "palpate-haptics", "palpate-scene"]),
     ("palpate-testkit", &["palpate", "palpate-fem", "palpate-mesh"]),
     (
         "palpate-verify",
@@ -96,6 +96,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
         ],
     ),
     ("palpate-c", &["palpate", "palpate-scene"]),
+    ("palpate-web", &["palpate", "palpate-scene", "palpate-viewer"]),
     (
         "palpate-python",
         &["palpate", "palpate-export", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene"],

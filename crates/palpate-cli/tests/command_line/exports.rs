@@ -10,7 +10,8 @@ use palpate::{
     Coupling, DeviceInput, DeviceMode, DeviceParameters, Input, Model, ModelParameters, Obstacle, Pose,
     Recording, Shape, State, step,
 };
-use palpate_haptics::log::{LogReader, LogWriter, SceneNames};
+use palpate_haptics::SceneNames;
+use palpate_haptics::log::{LogReader, LogWriter};
 use palpate_testkit::{GRAVITY_M_S2, finger, floor, object_at, wait_until};
 use std::collections::BTreeMap;
 use std::io::Cursor;

@@ -33,9 +33,6 @@ const GROUP: usize = 4;
 /// Sets of places of a group that hands hold at the same time.
 const HELD: [&[usize]; 9] = [&[0], &[1], &[2], &[3], &[0, 1], &[2, 3], &[0, 3], &[0, 1, 2], &[1, 2, 3]];
 
-/// Relative force error of a certificate above which [`record`](crate::record) warns.
-pub const FORCE_ERROR_WARNING: f64 = 0.05;
-
 /// Relative force error above which the warning says that the recording is unusable.
 pub(crate) const FORCE_ERROR_UNUSABLE: f64 = 10.0;
 

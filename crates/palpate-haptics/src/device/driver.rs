@@ -1,6 +1,9 @@
 //! Drivers of real devices: discovery and opening.
 
-use super::{Device, DeviceSpec, dhd, haply, openhaptics};
+use super::DeviceSpec;
+#[cfg(feature = "real-time")]
+use super::{Device, dhd, haply, openhaptics};
+#[cfg(feature = "real-time")]
 use crate::error::{DeviceError, Error};
 
 /// Driver of real devices.
@@ -55,7 +58,10 @@ impl Driver {
             Self::Haply => DeviceSpec::INVERSE_3,
         }
     }
+}
 
+#[cfg(feature = "real-time")]
+impl Driver {
     /// Environment variable with the file of the vendor's library, or the address of its service.
     pub fn variable(self) -> &'static str {
         match self {
@@ -114,11 +120,13 @@ impl Driver {
 }
 
 /// Devices of every driver, or the reason why it has none.
+#[cfg(feature = "real-time")]
 pub fn discover() -> Vec<(Driver, Result<Vec<DiscoveredDevice>, Error>)> {
     Driver::ALL.into_iter().map(|driver| (driver, driver.find(None))).collect()
 }
 
 /// Device with a serial number or an index.
+#[cfg(feature = "real-time")]
 pub(super) fn select<'f>(
     driver: &'static str,
     found: &'f [DiscoveredDevice],

@@ -3,16 +3,23 @@
 //! All quantities are in SI units and in the device frame: x to the right of the user, y up, z towards the user. A [`Mount`] places
 //! that frame in the world. A [`Driver`] talks to a real device through the vendor's software.
 
+#[cfg(feature = "real-time")]
 mod dhd;
 mod driver;
+#[cfg(feature = "real-time")]
 mod exchange;
+#[cfg(feature = "real-time")]
 mod haply;
+#[cfg(feature = "real-time")]
 mod library;
+#[cfg(feature = "real-time")]
 mod openhaptics;
 mod path;
 mod simulated;
 
-pub use driver::{DiscoveredDevice, Driver, discover};
+#[cfg(feature = "real-time")]
+pub use driver::discover;
+pub use driver::{DiscoveredDevice, Driver};
 pub use path::PathDevice;
 pub use simulated::{Hand, SimulatedDevice};
 

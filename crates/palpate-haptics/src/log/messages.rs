@@ -1,6 +1,7 @@
 //! Messages of a log, as JSON.
 
 use super::records::{FrameRecord, StepRecord};
+use crate::scene_names::SceneNames;
 use glam::{DQuat, DVec3};
 use palpate::{
     AppliedForce, Collider, DeviceMode, EnergyLedger, Grasp, ObjectSnapshot, OscillatorState, Pose,
@@ -12,19 +13,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Topic of the steps.
 pub(super) const STEP_TOPIC: &str = "/step";
-
-/// Names of a scene's parts, in the model's order.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct SceneNames {
-    /// Names of the objects.
-    pub objects: Vec<String>,
-    /// Names of the devices.
-    pub devices: Vec<String>,
-    /// Names of the planes and obstacles.
-    pub obstacles: Vec<String>,
-    /// Names of the clamps.
-    pub clamps: Vec<String>,
-}
 
 /// Frame of a clamp [m, world], and reaction force [N] and torque [N·m] on it.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]

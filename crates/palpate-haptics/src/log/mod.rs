@@ -25,7 +25,6 @@ mod schemas;
 mod summary;
 mod writer;
 
-pub use messages::SceneNames;
 pub use reader::{LogReader, LoggedDevice, LoggedStep};
 pub use records::{FrameRecord, StepRecord};
 pub use recovery::{Recovered, recover};

@@ -1,12 +1,13 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
-use super::messages::{DeviceMessage, EnergyMessage, SceneNames, StartMessage, StepMessage};
+use super::messages::{DeviceMessage, EnergyMessage, StartMessage, StepMessage};
 use super::record_layout;
 use super::record_reader::RecordReader;
 use super::scan::{Scan, unreadable};
 use super::summary::{step_channel, step_count, summary_of};
 use super::writer::START;
 use crate::error::{Error, LogError};
+use crate::scene_names::SceneNames;
 use glam::DVec3;
 use mcap::records::{AttachmentIndex, MetadataIndex, Record, op::MESSAGE};
 use mcap::{McapError, Summary};

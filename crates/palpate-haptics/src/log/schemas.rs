@@ -1,7 +1,7 @@
 //! Schemas of a log's messages (JSON Schema): the fields of a scene by the names of its parts, with units in their descriptions, as Foxglove
 //! shows them.
 
-use super::messages::SceneNames;
+use crate::scene_names::SceneNames;
 use serde_json::{Map, Value, json};
 
 /// Schema of `/step`.

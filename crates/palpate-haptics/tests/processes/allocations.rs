@@ -1,8 +1,9 @@
 //! A cycle allocates nothing.
 
 use super::scenes::{STEP_S, half_width, model, path, process};
+use palpate_haptics::SceneNames;
 use palpate_haptics::device::{DeviceSpec, Hand, Mount, SimulatedDevice};
-use palpate_haptics::log::{LogWriter, SceneNames};
+use palpate_haptics::log::LogWriter;
 use palpate_haptics::{
     Cycle, HapticUpdate, PassivityController, Safety, SafetyLimits, Snapshot, Timing, snapshot_buffer,
 };

@@ -3,7 +3,8 @@
 use super::scenes::{STEP_S, half_width, model, process_from};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, Model, State, step};
-use palpate_haptics::log::{LogReader, LogWriter, SceneNames, WrittenLog};
+use palpate_haptics::SceneNames;
+use palpate_haptics::log::{LogReader, LogWriter, WrittenLog};
 use palpate_haptics::{Error, Motion};
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -2,8 +2,9 @@
 
 use super::scenes::{half_width, model, path};
 use palpate::{DeviceMode, Input, Pose};
+use palpate_haptics::SceneNames;
 use palpate_haptics::device::{DeviceSpec, Hand, Mount, PathDevice, SimulatedDevice};
-use palpate_haptics::log::{LogReader, LogSender, LogSummary, LogWriter, SceneNames};
+use palpate_haptics::log::{LogReader, LogSender, LogSummary, LogWriter};
 use palpate_haptics::{
     AttachedDevice, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
 };

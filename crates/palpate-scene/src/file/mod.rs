@@ -9,8 +9,10 @@ mod objects;
 mod obstacles;
 mod places;
 mod source;
+mod tables;
 
 use crate::error::{SceneError, SceneErrorKind};
+use crate::files::read_regular_file;
 use crate::initial_checks::check_start;
 use crate::scene::Scene;
 use glam::DVec3;
@@ -107,8 +109,7 @@ fn read_source(source: &Source, mode: RunMode) -> Result<Scene, SceneError> {
 
 /// Reads the text of a scene file that is stored at `stored`.
 pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError> {
-    let bytes = palpate_mesh::read_regular_file(stored)
-        .map_err(|error| SceneError::io("read the scene", path, &error))?;
+    let bytes = read_regular_file(stored).map_err(|error| SceneError::io("read the scene", path, &error))?;
     text_of(path, bytes)
 }
 
@@ -125,12 +126,12 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, SceneError> {
 pub(crate) fn read_edited_scene(
     path: &Path,
     text: String,
+    parts: &PartsInMemory,
     mode: RunMode,
     change: impl FnOnce(&str, &[ModelObject]) -> Option<String>,
 ) -> Result<(Scene, String), SceneError> {
-    let (relocated, parts) = (Relocated::new(), PartsInMemory::default());
-    let source =
-        Source { path, text: &text, relocated: &relocated, parts: &parts, mover: DeviceMover::Nobody };
+    let relocated = Relocated::new();
+    let source = Source { path, text: &text, relocated: &relocated, parts, mover: DeviceMover::Nobody };
     let file = parse(&source)?;
     let objects = read_objects(&source, &file)?;
     let Some(changed) = change(&text, &objects) else {
@@ -220,10 +221,13 @@ fn assemble(
         devices.push(read?);
     }
     devices::check_grasps(source, &file.device, &devices)?;
-    let probe = |entry| places::read_probe(source, entry, &objects, &object_names);
-    let probes = file.probe.iter().map(probe).collect::<Result<_, _>>()?;
+    #[cfg(feature = "native")]
+    let probes = {
+        let probe = |entry| places::read_probe(source, entry, &objects, &object_names);
+        file.probe.iter().map(probe).collect::<Result<_, _>>()?
+    };
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
-    warnings.extend(objects::short_tables(&objects, &object_names));
+    warnings.extend(tables::short_tables(&objects, &object_names));
     let inputs = inputs(source, file);
     let mut scene = Scene {
         model: Arc::new(model),
@@ -232,14 +236,16 @@ fn assemble(
         obstacles,
         clamps: placed_clamps,
         bases,
+        #[cfg(feature = "native")]
         probes,
         gravity,
         warnings,
         choices,
         inputs,
     };
+    #[cfg(feature = "native")]
     if scene.can_touch() || !scene.clamps.is_empty() {
-        scene.warnings.extend(objects::prepare_tables(source, &file.object, &objects)?);
+        scene.warnings.extend(tables::prepare_tables(source, &file.object, &objects)?);
     }
     scene.warnings.extend(check_start(&scene, &objects));
     Ok(scene)
@@ -396,7 +402,24 @@ fn build(
     })
 }
 
-/// Files that a scene is read from.
+/// Files that a scene names, as it names them.
+///
+/// # Errors
+/// When the text is no scene.
+pub fn named_files(text: &str) -> Result<Vec<PathBuf>, SceneError> {
+    let (relocated, parts) = (Relocated::new(), PartsInMemory::default());
+    let source = Source {
+        path: Path::new(""),
+        text,
+        relocated: &relocated,
+        parts: &parts,
+        mover: DeviceMover::Caller,
+    };
+    let file = parse(&source)?;
+    Ok(inputs(&source, &file).split_off(1))
+}
+
+/// Files that a scene is read from, the scene file first.
 fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let recordings = file.object.iter().map(|object| &object.recording);
     let paths = file.device.iter().filter_map(|device| Some(&device.path.as_ref()?.file));

@@ -3,6 +3,7 @@
 use super::keys::{LARGEST, MeshEntry, Numbers, ObstacleEntry, PlaneEntry};
 use super::source::{Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
+#[cfg(feature = "native")]
 use crate::mesh_source;
 use crate::scene::SceneObstacle;
 use crate::warning::{Warning, WarningKind};
@@ -130,6 +131,7 @@ fn read_shape(
     }
 }
 
+#[cfg(feature = "native")]
 fn read_mesh(
     source: &Source,
     entry: &MeshEntry,
@@ -154,4 +156,17 @@ fn read_mesh(
     ObstacleMesh::new(mesh.positions, mesh.triangles).or_else(|error| {
         source.fail(span, SceneErrorKind::Mesh, "mesh", format!("{}: {error}", path.display()))
     })
+}
+
+/// Refusal of a mesh where there are no readers of meshes.
+#[cfg(not(feature = "native"))]
+fn read_mesh(
+    source: &Source,
+    entry: &MeshEntry,
+    name: &str,
+    _: &mut Vec<Warning>,
+) -> Result<ObstacleMesh, SceneError> {
+    let message =
+        format!("obstacle {name:?}: meshes of obstacles are not read here; use a sphere, box or capsule");
+    source.fail(entry.file.span(), SceneErrorKind::Mesh, "mesh", message)
 }

@@ -5,6 +5,7 @@ use super::source::Source;
 use crate::error::{SceneError, SceneErrorKind};
 use glam::DVec3;
 use palpate::{Grasp, ModelObject, ResponseForm};
+#[cfg(feature = "native")]
 use palpate_export::ProbeLabel;
 use toml::Spanned;
 
@@ -58,6 +59,7 @@ pub(super) fn surface_point(
 }
 
 /// Displacement probe of an entry.
+#[cfg(feature = "native")]
 pub(super) fn read_probe(
     source: &Source,
     probe: &ProbeEntry,

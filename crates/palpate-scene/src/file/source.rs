@@ -2,6 +2,7 @@
 
 use super::keys::{LARGEST, PathEntry};
 use crate::error::{SceneError, SceneErrorKind};
+use crate::files::read_regular_text;
 use palpate::Recording;
 use palpate_haptics::{Columns, MotionPath};
 use std::collections::HashMap;
@@ -160,8 +161,7 @@ const FRICTION: f64 = 0.5;
 /// # Errors
 /// When the file cannot be read, or is no path.
 pub fn read_path(path: &Path, columns: Columns) -> Result<MotionPath, SceneError> {
-    let text = palpate_mesh::read_regular_text(path)
-        .map_err(|error| SceneError::io("read the path", path, &error))?;
+    let text = read_regular_text(path).map_err(|error| SceneError::io("read the path", path, &error))?;
     MotionPath::parse(&text, columns).map_err(|what| {
         SceneError::of_file(SceneErrorKind::Path, path, format!("path {}: {what}", path.display()))
     })

@@ -1,9 +1,9 @@
 //! Channels between the manager, the running scene and the page sessions.
 
 use super::command_queue::CommandQueue;
-use super::current::CurrentScene;
 use super::frames::FramePublisher;
 use super::job::JobSlot;
+use crate::current::CurrentScene;
 use crate::pointers::SharedPointers;
 use palpate_haptics::Playback;
 use std::sync::Arc;

@@ -3,7 +3,6 @@
 mod channels;
 mod command;
 mod command_queue;
-mod current;
 mod frames;
 mod job;
 mod manager;
@@ -11,10 +10,11 @@ mod running;
 
 pub(crate) use command::Command;
 pub(crate) use command_queue::CommandQueue;
-pub(crate) use current::CurrentScene;
+
 pub(crate) use frames::Viewers;
 pub(crate) use job::JobSlot;
 
+use crate::current::CurrentScene;
 use crate::pointers::SharedPointers;
 use crate::scene_provider::{SceneProvider, ViewerScene};
 use axum::body::Bytes;

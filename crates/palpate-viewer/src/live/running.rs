@@ -4,8 +4,9 @@ use super::channels::SceneChannels;
 use crate::error::SceneError;
 use crate::pointers::{Pointers, SharedPointers, lock};
 use crate::protocol::{FrameEncoder, ProcessTiming, ServerMessage, Status};
-use crate::scene_provider::{OpenLog, SharedTrajectory, ViewerDevice, ViewerScene};
-use palpate::{DeviceInput, DeviceMode, Input, ObjectSnapshot, State};
+use crate::scene_provider::{OpenLog, ViewerDevice, ViewerScene};
+use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ};
+use palpate::{DeviceMode, ObjectSnapshot, State};
 use palpate_haptics::{
     Clock, CycleReceiver, DevicePort, ObstacleTrajectory, Playback, Report, Scheduling, Session,
     SessionDevice, Snapshot, Timing, cycle_channel, port,
@@ -15,39 +16,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{Builder, JoinHandle};
 use std::time::Instant;
 
-/// Frame rate [Hz].
-const FRAME_RATE_HZ: f64 = 60.0;
-
 /// Update rate of the pointers [Hz].
 const POINTER_RATE_HZ: f64 = 1000.0;
 
-/// Time without an input after which a device becomes inactive [s].
-const DEVICE_TIMEOUT_S: f64 = 0.1;
-
 /// Capacity of the channel of cycle records: some seconds at 4 kHz.
 const CYCLES: usize = 16_384;
-
-/// Whether a scene may resume from another state: no device follows a path, no obstacle moves, there is no clamp, and gravity does not
-/// change.
-pub(super) fn is_resumable(scene: &ViewerScene) -> bool {
-    let follows_path = |device: &ViewerDevice| matches!(device, ViewerDevice::Path(..));
-    let moves = |pose: &SharedTrajectory| pose(0.0) != pose(1.0) || pose(0.0) != pose(0.37);
-    let moves = scene.devices.iter().any(follows_path) || scene.obstacle_trajectories.iter().any(moves);
-    let moves = moves || scene.base_paths.iter().any(Option::is_some);
-    !moves && scene.gravity.is_none() && scene.model.parameters().clamps.is_empty()
-}
-
-/// Snapshot before the first step.
-pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
-    let input = Input {
-        devices: vec![DeviceInput::inactive(); scene.devices.len()],
-        obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-        bases: vec![None; scene.model.recordings().count()],
-        clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
-        ..Input::default()
-    };
-    Snapshot::new(&scene.model, state, &input)
-}
 
 /// Opened devices of a scene.
 pub(super) struct DeviceInputs {

@@ -11,8 +11,8 @@ pub use description::{
     ObstacleDescription, SceneDescription, ShapeDescription, View,
 };
 pub use frame::{FrameEncoder, FrameFormat};
+#[cfg(feature = "server")]
+pub(crate) use messages::LogEntry;
 pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, decodes};
-pub(crate) use messages::{
-    ClientMessage, Hello, LogEntry, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status,
-};
+pub(crate) use messages::{ClientMessage, Hello, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status};
 pub(crate) use surface::{mode_shapes_bytes, surface_bytes};

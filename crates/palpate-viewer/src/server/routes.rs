@@ -5,9 +5,9 @@ use super::client::Client;
 use super::headers::harden;
 use super::page;
 use super::session;
-use super::state::{ServerState, StaticDataKey};
+use super::state::ServerState;
 use super::upload;
-use crate::protocol::{mode_shapes_bytes, surface_bytes};
+use crate::static_data::StaticData;
 use axum::Extension;
 use axum::body::Body;
 use axum::extract::{Path, Query, Request, State};
@@ -16,7 +16,6 @@ use axum::middleware::{Next, from_fn_with_state, map_response};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
-use palpate::Shape;
 use serde::Deserialize;
 use std::sync::Arc;
 use std::time::Instant;
@@ -64,52 +63,29 @@ async fn blocking(work: impl FnOnce() -> Response + Send + 'static) -> Response 
 }
 
 /// Response with static data of a generation, from the cache.
-async fn static_data(
-    state: Arc<ServerState>,
-    key: StaticDataKey,
-    encode: impl FnOnce() -> Option<Vec<u8>> + Send + 'static,
-) -> Response {
+async fn static_data(state: Arc<ServerState>, generation: u32, data: StaticData) -> Response {
+    let Some(model) = state.model(generation) else { return not_found() };
     blocking(move || {
         let headers = [(header::CONTENT_TYPE, "application/octet-stream")];
-        state.cache.get(key, encode).map_or_else(not_found, |bytes| (headers, bytes).into_response())
+        let bytes = state.cache.get((generation, data), || data.encode(&model));
+        bytes.map_or_else(not_found, |bytes| (headers, bytes).into_response())
     })
     .await
 }
 
-async fn object_surface(
-    State(state): State<Arc<ServerState>>,
-    Path((generation, index)): Path<(u32, usize)>,
-) -> Response {
-    let Some(model) = state.model(generation) else { return not_found() };
-    let encode = move || {
-        let surface = &model.recordings().nth(index)?.surface;
-        Some(surface_bytes(&surface.positions, &surface.triangles))
-    };
-    static_data(state, (generation, "surface", index), encode).await
+async fn object_surface(State(state): State<Arc<ServerState>>, Path(part): Path<(u32, usize)>) -> Response {
+    static_data(state, part.0, StaticData::ObjectSurface(part.1)).await
 }
 
 async fn object_mode_shapes(
     State(state): State<Arc<ServerState>>,
-    Path((generation, index)): Path<(u32, usize)>,
+    Path(part): Path<(u32, usize)>,
 ) -> Response {
-    let Some(model) = state.model(generation) else { return not_found() };
-    let encode = move || {
-        let recording = model.recordings().nth(index)?;
-        Some(mode_shapes_bytes(&recording.modes, recording.surface.positions.len()))
-    };
-    static_data(state, (generation, "mode_shapes", index), encode).await
+    static_data(state, part.0, StaticData::ModeShapes(part.1)).await
 }
 
-async fn obstacle_surface(
-    State(state): State<Arc<ServerState>>,
-    Path((generation, index)): Path<(u32, usize)>,
-) -> Response {
-    let Some(model) = state.model(generation) else { return not_found() };
-    let encode = move || match &model.parameters().obstacles.get(index)?.shape {
-        Shape::Mesh(mesh) => Some(surface_bytes(&mesh.surface().positions, &mesh.surface().triangles)),
-        _ => None,
-    };
-    static_data(state, (generation, "obstacle", index), encode).await
+async fn obstacle_surface(State(state): State<Arc<ServerState>>, Path(part): Path<(u32, usize)>) -> Response {
+    static_data(state, part.0, StaticData::ObstacleSurface(part.1)).await
 }
 
 #[derive(Deserialize)]

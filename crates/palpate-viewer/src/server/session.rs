@@ -3,17 +3,14 @@
 use super::client::Client;
 use super::state::ServerState;
 use crate::live::{Command, LiveScene};
-use crate::pointers::{PointerId, lock};
-use crate::protocol::{
-    ClientMessage, FrameFormat, Hello, LogEntry, MaterialDescription, PROTOCOL, PressMode, ServerMessage,
-};
+use crate::page_requests::{Effect, SceneControls, SceneRequest, unreadable};
+use crate::pointers::lock;
+use crate::protocol::{FrameFormat, Hello, LogEntry, PROTOCOL};
 use axum::Extension;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::response::Response;
-use glam::DVec3;
-use palpate::{DeviceMode, Grasp, SurfacePoint};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -34,9 +31,6 @@ const MAX_VIEWERS: usize = 32;
 
 /// Interval of progress messages of logs.
 const LOG_PROGRESS_INTERVAL: Duration = Duration::from_millis(300);
-
-/// Largest distance of a pointer from the origin [m].
-const MAX_POINTER_DISTANCE_M: f64 = 1e4;
 
 /// Handler of `/session`.
 pub(super) async fn connect(
@@ -206,10 +200,6 @@ impl<'s> PageSession<'s> {
         }
     }
 
-    async fn send_message(&mut self, message: ServerMessage<'_>) -> Result<(), SessionEnd> {
-        self.send(Message::text(message.to_json())).await
-    }
-
     fn pings(&self) -> Interval {
         let mut pings = interval((self.state.limits.silence / 3).max(Duration::from_millis(1)));
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -245,109 +235,36 @@ impl<'s> PageSession<'s> {
 
     async fn receive(&mut self, live: &LiveScene, text: &str) -> Result<(), SessionEnd> {
         self.count_message().await?;
-        match serde_json::from_str(text) {
-            Ok(message) => self.execute(live, message).await,
-            Err(error) => {
-                let text = format!("the server cannot read a message of the page: {error}");
-                self.send_message(ServerMessage::Error { text: &text }).await
-            }
-        }
-    }
-
-    async fn execute(&mut self, live: &LiveScene, message: ClientMessage) -> Result<(), SessionEnd> {
-        let command = match message {
-            ClientMessage::Press { pointer, mode, position, object, triangle, weights } => {
-                return self.press(live, pointer, mode, position, (object, triangle, weights)).await;
-            }
-            ClientMessage::Move { pointers } => {
-                let mut slots = lock(&live.pointers);
-                for target in pointers {
-                    if let Some(position) = valid_position(target.position) {
-                        slots.set_target((self.viewer, target.pointer), position);
-                    }
-                }
-                return Ok(());
-            }
-            ClientMessage::Release { pointer } => {
-                lock(&live.pointers).release((self.viewer, pointer));
-                return Ok(());
-            }
-            ClientMessage::Stream { format, stride } => {
+        let message = match serde_json::from_str(text) {
+            Ok(message) => message,
+            Err(error) => return self.send(Message::text(unreadable(&error))).await,
+        };
+        let current = live.current.borrow().clone();
+        let (pointers, playback) = (&*live.pointers, &*live.playback);
+        let controls = SceneControls { model: &current.scene.model, pointers, playback };
+        match controls.apply(self.viewer, message) {
+            Effect::None => {}
+            Effect::Reply(text) => return self.send(Message::text(text)).await,
+            Effect::Stream(format, stride) => {
                 self.count_vertex_stream(live, format == FrameFormat::Vertices && stride > 0);
                 (self.format, self.stride) = (format, stride);
-                return Ok(());
             }
-            ClientMessage::Pause { paused } => {
-                live.playback.set_paused(paused);
-                Command::SendStatus
-            }
-            ClientMessage::SingleStep => {
-                live.playback.request_step();
-                return Ok(());
-            }
-            ClientMessage::SlowMotion { slowdown } => {
-                live.playback.set_slowdown(slowdown.clamp(1, 1000));
-                Command::SendStatus
-            }
-            ClientMessage::CancelJob => {
-                live.job_slot.cancel();
-                return Ok(());
-            }
-            ClientMessage::Reset => Command::Reset,
-            ClientMessage::OpenScene { scene } => Command::Open(scene, self.viewer),
-            ClientMessage::SetPhysics(settings) => Command::ChangePhysics(settings),
-            ClientMessage::SetMaterial { object, young, poisson, density } => {
-                let material = MaterialDescription { young, poisson, density };
-                Command::ChangeMaterial(object, material, self.viewer)
-            }
-        };
-        live.commands.push(command);
+            Effect::Scene(request) => self.request(live, request),
+        }
         Ok(())
     }
 
-    async fn press(
-        &mut self,
-        live: &LiveScene,
-        pointer: u64,
-        press_mode: PressMode,
-        position: [f64; 3],
-        grasp: (Option<usize>, Option<u32>, Option<[f64; 3]>),
-    ) -> Result<(), SessionEnd> {
-        let Some(position) = valid_position(position) else {
-            return self
-                .send_message(ServerMessage::Error {
-                    text: "the position of a pointer is three finite numbers [m]",
-                })
-                .await;
-        };
-        let mode = match press_mode {
-            PressMode::Touch => Some(DeviceMode::Touch),
-            PressMode::Hold => self.grasp(live, grasp).map(DeviceMode::Held),
-        };
-        let Some(mode) = mode else {
-            let text = "a hold needs an object, a triangle and barycentric weights, on nodes that can move";
-            return self.send_message(ServerMessage::Error { text }).await;
-        };
-        let id: PointerId = (self.viewer, pointer);
-        let device = lock(&live.pointers).press(id, mode, position);
-        self.send_message(ServerMessage::Assigned { pointer, device }).await
-    }
-
-    fn grasp(
-        &self,
-        live: &LiveScene,
-        (object, triangle, weights): (Option<usize>, Option<u32>, Option<[f64; 3]>),
-    ) -> Option<Grasp> {
-        let (object, triangle, weights) = (object?, triangle?, weights?);
-        let current = live.current.borrow();
-        let recording = current.scene.model.recordings().nth(object)?;
-        let sum: f64 = weights.iter().sum();
-        let valid = weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0) && sum > 0.0;
-        if !valid || triangle as usize >= recording.surface.triangles.len() {
-            return None;
-        }
-        let point = SurfacePoint { triangle, weights: weights.map(|weight| weight / sum) };
-        recording.is_movable(&point).then_some(Grasp { object, point })
+    fn request(&self, live: &LiveScene, request: SceneRequest) {
+        live.commands.push(match request {
+            SceneRequest::CancelJob => return live.job_slot.cancel(),
+            SceneRequest::Open(scene) => Command::Open(scene, self.viewer),
+            SceneRequest::Reset => Command::Reset,
+            SceneRequest::ChangePhysics(settings) => Command::ChangePhysics(settings),
+            SceneRequest::ChangeMaterial(object, material) => {
+                Command::ChangeMaterial(object, material, self.viewer)
+            }
+            SceneRequest::SendStatus => Command::SendStatus,
+        });
     }
 
     /// Updates the number of vertex streams; `wanted`: whether this page streams vertex frames from now on.
@@ -363,10 +280,4 @@ impl<'s> PageSession<'s> {
             _ => {}
         }
     }
-}
-
-/// Position within range [m, world].
-fn valid_position(position: [f64; 3]) -> Option<DVec3> {
-    let position = DVec3::from_array(position);
-    (position.is_finite() && position.length() < MAX_POINTER_DISTANCE_M).then_some(position)
 }

@@ -6,6 +6,7 @@ use super::limits::Limits;
 use crate::live::LiveScene;
 use crate::log_frames::LogFrames;
 use crate::protocol::SceneSummary;
+use crate::static_data::StaticData;
 use axum::body::Bytes;
 use palpate::Model;
 use std::collections::HashMap;
@@ -65,8 +66,8 @@ impl ServerState {
     }
 }
 
-/// Generation, kind of data, and index of the object or obstacle.
-pub(super) type StaticDataKey = (u32, &'static str, usize);
+/// Generation and data.
+type StaticDataKey = (u32, StaticData);
 
 /// Cache of encoded static data, shared by all pages.
 #[derive(Default)]

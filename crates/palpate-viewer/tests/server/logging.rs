@@ -3,8 +3,9 @@
 use super::client::{TestServer, mode_shapes, scene};
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, Input, State, step};
+use palpate_haptics::SceneNames;
 use palpate_haptics::Scheduling;
-use palpate_haptics::log::{LogReader, LogSummary, LogWriter, SceneNames};
+use palpate_haptics::log::{LogReader, LogSummary, LogWriter};
 use palpate_testkit::{GRAVITY_M_S2, free_block, half_extent};
 use palpate_viewer::{
     JobControl, Live, LogFile, LogOpener, MaterialDescription, PageNotifier, PhysicsSettings, SceneError,

@@ -257,6 +257,11 @@ pub struct Certificate {
     pub sample_levels: Vec<CertificateLevel>,
 }
 
+impl Certificate {
+    /// Relative force error from which a recording gets a warning: a smooth press is off by 5 %.
+    pub const FORCE_ERROR_WARNING: f64 = 0.05;
+}
+
 /// Peak error of the force of hands that move one, two and three places of the body, which moves as a whole as well:
 /// max|f − f_fem| / max|f_fem| over [`CertificateEvent::duration_s`], the largest over sets of places and directions. A hand moves by a
 /// cubic ramp of [`CertificateEvent::rise_s`]; f_fem is the mean over each step.

@@ -5,6 +5,7 @@ mod file;
 mod impulse_response;
 mod metadata;
 mod quantised;
+mod rescale;
 mod residual;
 mod sample_levels;
 mod validation;

@@ -5,14 +5,13 @@ use crate::commands::guard::attach_guarded;
 use crate::failure::Failure;
 use crate::terminal::notify;
 use palpate::{DeviceMode, Material};
-use palpate_render::describe_scene;
 use palpate_scene::{
     BUILT_IN_SCENES, MeshUpload, OpenedScene, Progress, ProgressFn, RealDevice, SceneDevice, SceneLibrary,
     SceneLog, SettingsChange, attach_path,
 };
 use palpate_viewer::{
     JobControl, JobReport, MaterialDescription, PhysicsSettings, SceneError, SceneProvider, SceneSummary,
-    SharedTrajectory, Upload, ViewerDevice, ViewerScene,
+    Upload, ViewerDevice, ViewerScene, describe_scene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -48,20 +47,7 @@ impl LibraryProvider {
         let description = describe_scene(&scene, (id, title, about), &recordable);
         let content = SceneLog::new(&scene, Some(text));
         let log = self.logs.as_ref().map(|logs| logs.opener(content)).transpose()?;
-        let movers = scene.obstacles.iter().map(|obstacle| {
-            let obstacle = obstacle.clone();
-            Arc::new(move |t: f64| obstacle.pose_at(t)) as SharedTrajectory
-        });
-        Ok(ViewerScene {
-            description,
-            model: scene.model.clone(),
-            devices: scene.devices.iter().map(viewer_device).collect(),
-            obstacle_trajectories: movers.collect(),
-            clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
-            base_paths: scene.bases.clone(),
-            gravity: scene.gravity.clone(),
-            log,
-        })
+        Ok(ViewerScene { log, ..ViewerScene::new(&scene, description, viewer_device) })
     }
 
     /// Scene of the viewer, with the provider's error.

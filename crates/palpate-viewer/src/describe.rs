@@ -1,7 +1,7 @@
 //! Description of a scene for the viewer's pages.
 
+use crate::protocol::{ObjectDescription, SceneDescription};
 use palpate_scene::{Scene, certificate_lines};
-use palpate_viewer::{ObjectDescription, SceneDescription};
 
 /// Description of a scene, with its identifier, title and description, and whether its objects can be recorded again.
 pub fn describe_scene(

@@ -1,0 +1,373 @@
+//! Functions that JavaScript calls, and those of JavaScript that are called.
+//!
+//! Texts and bytes are pairs of address and length in linear memory, which the caller allocates and frees. Results are sent by
+//! [`send`] before a function returns: an error as a text of kind [`ERROR`]. Handles are addresses; 0 is none.
+
+#![allow(missing_docs)]
+
+use crate::live_scene::{LiveScene, Titles};
+use crate::simulation::{Array, Simulation, energy_names};
+use crate::{describe_recording, describe_scene};
+use glam::DVec3;
+use palpate::Recording;
+use palpate_scene::{PartsInMemory, RunMode, Scene, named_files, read_scene_text};
+use palpate_viewer::{PageMessage, SceneSummary};
+use serde_json::{Value, json};
+use std::alloc::Layout;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Kinds of what is sent.
+const ERROR: u32 = 0;
+const JSON: u32 = 1;
+const TEXT: u32 = 2;
+const FRAME: u32 = 3;
+const DATA: u32 = 4;
+
+#[link(wasm_import_module = "palpate")]
+unsafe extern "C" {
+    /// Takes bytes of a kind, before it returns.
+    #[link_name = "send"]
+    fn host_send(kind: u32, address: *const u8, length: usize);
+    /// Reads a clock that never goes back [s].
+    #[link_name = "now"]
+    fn host_now() -> f64;
+}
+
+fn send(kind: u32, bytes: &[u8]) {
+    // SAFETY: JavaScript reads so many bytes there.
+    unsafe { host_send(kind, bytes.as_ptr(), bytes.len()) }
+}
+
+fn send_json(value: &Value) {
+    send(JSON, value.to_string().as_bytes());
+}
+
+fn send_message(message: PageMessage) {
+    match message {
+        PageMessage::Text(text) => send(TEXT, text.as_bytes()),
+        PageMessage::Frame(frame) => send(FRAME, &frame),
+    }
+}
+
+fn now() -> f64 {
+    // SAFETY: a function of JavaScript without effects.
+    unsafe { host_now() }
+}
+
+/// Result, or the default of its type after an error was sent.
+fn or_error<T: Default>(result: Result<T, String>) -> T {
+    result.unwrap_or_else(|text| {
+        send(ERROR, text.as_bytes());
+        T::default()
+    })
+}
+
+/// Bytes that JavaScript has written.
+unsafe fn bytes<'a>(address: *const u8, length: usize) -> &'a [u8] {
+    if length == 0 {
+        return &[];
+    }
+    // SAFETY: as promised by the caller of the export.
+    unsafe { std::slice::from_raw_parts(address, length) }
+}
+
+/// Text that JavaScript has written.
+unsafe fn text(address: *const u8, length: usize) -> String {
+    // SAFETY: as promised by the caller of the export.
+    String::from_utf8_lossy(unsafe { bytes(address, length) }).into_owned()
+}
+
+fn handle<T>(value: T) -> *mut T {
+    Box::into_raw(Box::new(value))
+}
+
+/// Layout of an allocation that JavaScript asks for.
+fn layout(length: usize) -> Layout {
+    Layout::from_size_align(length.max(1), 8).unwrap_or(Layout::new::<u64>())
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn allocate(length: usize) -> *mut u8 {
+    // SAFETY: the layout is not empty.
+    unsafe { std::alloc::alloc(layout(length)) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn deallocate(address: *mut u8, length: usize) {
+    // SAFETY: it was allocated with this length.
+    unsafe { std::alloc::dealloc(address, layout(length)) }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn describe_library() {
+    send_json(&json!({ "version": env!("CARGO_PKG_VERSION"), "energies": energy_names() }));
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_read(address: *const u8, length: usize) -> *mut Arc<Recording> {
+    // SAFETY: as promised by the caller.
+    let read = Recording::from_bytes(unsafe { bytes(address, length) });
+    match read {
+        Ok(recording) => handle(Arc::new(recording)),
+        Err(error) => {
+            send(ERROR, error.to_string().as_bytes());
+            std::ptr::null_mut()
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_free(recording: *mut Arc<Recording>) {
+    // SAFETY: a handle that is not used any more.
+    drop(unsafe { Box::from_raw(recording) });
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_describe(recording: &Arc<Recording>) {
+    send_json(&describe_recording(recording));
+}
+
+/// Positions of the surface's nodes at rest, rows of 3 [m, body].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_positions(recording: &Arc<Recording>) -> *const DVec3 {
+    recording.surface.positions.as_ptr()
+}
+
+/// Nodes of the surface's triangles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_triangles(recording: &Arc<Recording>) -> *const [u32; 3] {
+    recording.surface.triangles.as_ptr()
+}
+
+/// Recording of a body of the same shape and Poisson's ratio in another material [Pa, kg/m³].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_rescaled(
+    recording: &Arc<Recording>,
+    young: f64,
+    density: f64,
+) -> *mut Arc<Recording> {
+    match recording.rescaled(young, density) {
+        Ok(rescaled) => handle(Arc::new(rescaled)),
+        Err(error) => {
+            send(ERROR, error.to_string().as_bytes());
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Sends the files that a scene names.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn scene_files(address: *const u8, length: usize) {
+    // SAFETY: as promised by the caller.
+    let files = named_files(&unsafe { text(address, length) });
+    let files = or_error(files.map_err(|error| error.to_string()));
+    send_json(&files.iter().map(|file| file.display().to_string()).collect());
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn parts_new() -> *mut PartsInMemory {
+    handle(PartsInMemory::default())
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn parts_free(parts: *mut PartsInMemory) {
+    // SAFETY: a handle that is not used any more.
+    drop(unsafe { Box::from_raw(parts) });
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn parts_add_recording(
+    parts: &mut PartsInMemory,
+    name: *const u8,
+    name_length: usize,
+    recording: &Arc<Recording>,
+) {
+    // SAFETY: as promised by the caller.
+    let name = PathBuf::from(unsafe { text(name, name_length) });
+    parts.recordings.insert(name, Arc::clone(recording));
+}
+
+/// Adds a motion path as CSV text.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn parts_add_path(
+    parts: &mut PartsInMemory,
+    name: *const u8,
+    name_length: usize,
+    path: *const u8,
+    path_length: usize,
+) {
+    // SAFETY: as promised by the caller.
+    let (name, path) = unsafe { (text(name, name_length), text(path, path_length)) };
+    parts.paths.insert(PathBuf::from(name), path);
+}
+
+/// Reads a scene, whose description is sent. `is_reference`: every surface node is a contact.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn scene_read(
+    address: *const u8,
+    length: usize,
+    parts: &PartsInMemory,
+    is_reference: bool,
+) -> *mut Arc<Scene> {
+    let mode = if is_reference { RunMode::Reference } else { RunMode::Offline };
+    // SAFETY: as promised by the caller.
+    let scene_text = unsafe { text(address, length) };
+    match read_scene_text(Path::new("scene"), &scene_text, parts, mode) {
+        Ok(scene) => {
+            send_json(&describe_scene(&scene));
+            handle(Arc::new(scene))
+        }
+        Err(error) => {
+            send(ERROR, error.to_string().as_bytes());
+            std::ptr::null_mut()
+        }
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn scene_free(scene: *mut Arc<Scene>) {
+    // SAFETY: a handle that is not used any more.
+    drop(unsafe { Box::from_raw(scene) });
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_new(scene: &Arc<Scene>) -> *mut Simulation {
+    handle(Simulation::new(Arc::clone(scene)))
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_free(simulation: *mut Simulation) {
+    // SAFETY: a handle that is not used any more.
+    drop(unsafe { Box::from_raw(simulation) });
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_reset(simulation: &mut Simulation) {
+    simulation.reset();
+}
+
+/// Steps; false after an error was sent.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_step(simulation: &mut Simulation) -> bool {
+    or_error(simulation.step().map(|()| true))
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_time(simulation: &Simulation) -> f64 {
+    simulation.time_s()
+}
+
+/// Address of an array, by its place in [`Array::ALL`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_array(simulation: &Simulation, array: usize) -> *const f64 {
+    Array::ALL.get(array).map_or(std::ptr::null(), |array| simulation.array(*array).as_ptr())
+}
+
+/// Length of an array.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_array_length(simulation: &Simulation, array: usize) -> usize {
+    Array::ALL.get(array).map_or(0, |array| simulation.array(*array).len())
+}
+
+/// Address of the positions of an object's nodes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_surface(simulation: &mut Simulation, object: usize) -> *const f32 {
+    simulation.surface(object).as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_grasp(
+    simulation: &mut Simulation,
+    device: usize,
+    object: usize,
+    x: f64,
+    y: f64,
+    z: f64,
+) -> bool {
+    or_error(simulation.grasp(device, object, DVec3::new(x, y, z)).map(|()| true))
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_release(simulation: &mut Simulation, device: usize) -> bool {
+    or_error(simulation.release(device).map(|()| true))
+}
+
+/// Titles of a scene on the page: `{ "id": …, "title": …, "about": … }`.
+fn titles(given: &Value) -> Titles {
+    let field = |key: &str| given.get(key).and_then(Value::as_str).unwrap_or_default().to_string();
+    Titles { id: Some(field("id")).filter(|id| !id.is_empty()), title: field("title"), about: field("about") }
+}
+
+/// Starts a live scene of a text and its parts; `about` is JSON with id, title and about.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_open(
+    address: *const u8,
+    length: usize,
+    parts: &PartsInMemory,
+    about: *const u8,
+    about_length: usize,
+) -> *mut LiveScene {
+    // SAFETY: as promised by the caller.
+    let (scene, about) = unsafe { (text(address, length), text(about, about_length)) };
+    let about = serde_json::from_str(&about).unwrap_or_default();
+    match LiveScene::open(titles(&about), scene, parts.clone()) {
+        Ok(live) => handle(live),
+        Err(error) => {
+            send(ERROR, error.as_bytes());
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Starts another scene in place of the one that runs; false after an error was sent.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_replace(
+    live: &mut LiveScene,
+    address: *const u8,
+    length: usize,
+    parts: &PartsInMemory,
+    about: *const u8,
+    about_length: usize,
+) -> bool {
+    // SAFETY: as promised by the caller.
+    let (scene, about) = unsafe { (text(address, length), text(about, about_length)) };
+    let about = serde_json::from_str(&about).unwrap_or_default();
+    or_error(live.replace(titles(&about), scene, parts.clone(), &mut send_message).map(|()| true))
+}
+
+/// Greets the page; `scenes` is a JSON list of objects with id, title and about.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_greet(live: &mut LiveScene, address: *const u8, length: usize) {
+    // SAFETY: as promised by the caller.
+    let scenes: Value = serde_json::from_str(&unsafe { text(address, length) }).unwrap_or_default();
+    let scenes = scenes.as_array().into_iter().flatten().map(titles);
+    let summary =
+        |of: Titles| SceneSummary { id: of.id.unwrap_or_default(), title: of.title, about: of.about };
+    live.greet(scenes.map(summary).collect(), &mut send_message);
+}
+
+/// Receives a message of the page. A scene to open is sent as JSON, its id.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_receive(live: &mut LiveScene, address: *const u8, length: usize) {
+    // SAFETY: as promised by the caller.
+    let message = unsafe { text(address, length) };
+    if let Some(id) = or_error(live.receive(&message, &mut send_message)) {
+        send_json(&Value::String(id));
+    }
+}
+
+/// Makes the steps that are due, and returns the time of the next deadline [s].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_advance(live: &mut LiveScene) -> f64 {
+    live.advance(&now, &mut send_message);
+    live.deadline_s()
+}
+
+/// Sends the data of a path; false if there is none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_data(live: &LiveScene, address: *const u8, length: usize) -> bool {
+    // SAFETY: as promised by the caller.
+    let data = live.static_data(&unsafe { text(address, length) });
+    data.inspect(|data| send(DATA, data)).is_some()
+}

@@ -1,0 +1,19 @@
+//! WebAssembly of palpate: what the npm package `palpate` and the viewer's worker call.
+//!
+//! ```text
+//! JavaScript ─ exports ─ Simulation: a scene that JavaScript steps (npm package)
+//!                      └ LiveScene: a scene that follows the clock and speaks the viewer's protocol (worker of the page)
+//! ```
+//!
+//! Text and bytes go through linear memory; arrays are read where they lie. The functions of `exports.rs` are the whole interface, which
+//! `memory.ts`, `recording.ts`, `scene.ts` and `simulation.ts` wrap; nothing else of this crate is unsafe.
+
+mod description;
+#[cfg(target_arch = "wasm32")]
+mod exports;
+mod live_scene;
+mod simulation;
+
+pub use description::{describe_recording, describe_scene};
+pub use live_scene::LiveScene;
+pub use simulation::{Array, Simulation};

@@ -1,0 +1,175 @@
+//! Live scene of the viewer's page, run in a worker of the page.
+
+use palpate_scene::{PartsInMemory, SettingsChange, TouchableScene, read_touchable_scene};
+use palpate_viewer::{
+    LocalRequest, LocalScene, MaterialDescription, PageMessage, PhysicsSettings, SceneSummary, ViewerDevice,
+    ViewerScene, describe_scene,
+};
+use std::path::Path;
+use std::sync::Arc;
+use toml::{Table, Value};
+
+/// Receiver of messages to the page.
+pub type Send<'a> = &'a mut dyn FnMut(PageMessage);
+
+/// Identity of a scene on the page.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Titles {
+    /// Identifier, by which the page opens it.
+    pub id: Option<String>,
+    /// Title.
+    pub title: String,
+    /// One line of description.
+    pub about: String,
+}
+
+/// Text of a scene with its parts: changes edit the text.
+#[derive(Clone)]
+struct SceneText {
+    titles: Titles,
+    text: String,
+    parts: PartsInMemory,
+}
+
+/// Live scene, with the text that it was made of.
+pub struct LiveScene {
+    local: LocalScene,
+    current: SceneText,
+}
+
+impl LiveScene {
+    /// Starts a scene.
+    ///
+    /// # Errors
+    /// Text, when the scene cannot be read, or needs a device of a machine.
+    pub fn open(titles: Titles, text: String, parts: PartsInMemory) -> Result<Self, String> {
+        let (scene, current) = read(SceneText { titles, text, parts })?;
+        Ok(Self { local: LocalScene::new(scene).map_err(|error| error.to_string())?, current })
+    }
+
+    /// Starts another scene in place of this one; on an error this one goes on.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn replace(
+        &mut self,
+        titles: Titles,
+        text: String,
+        parts: PartsInMemory,
+        send: Send,
+    ) -> Result<(), String> {
+        self.start(SceneText { titles, text, parts }, false, send)
+    }
+
+    /// Sends the first messages to the page. `scenes` can be opened.
+    pub fn greet(&mut self, scenes: Vec<SceneSummary>, send: Send) {
+        self.local.greet(scenes, send);
+    }
+
+    /// Receives a message of the page; returns the id of a scene to open, whose files the caller fetches.
+    ///
+    /// # Errors
+    /// Text for the page, when a change is refused; the scene goes on.
+    pub fn receive(&mut self, text: &str, send: Send) -> Result<Option<String>, String> {
+        match self.local.receive(text, send) {
+            None => Ok(None),
+            Some(LocalRequest::Open(id)) => Ok(Some(id)),
+            Some(LocalRequest::ChangePhysics(settings)) => {
+                let mut changed = self.current.clone();
+                changed.text = edited(&changed.text, |table| {
+                    settings_change(settings).apply(table).map_err(|error| error.to_string())
+                })?;
+                self.start(changed, true, send).map(|()| None)
+            }
+            Some(LocalRequest::ChangeMaterial(object, material)) => {
+                let changed = self.with_material(object, material)?;
+                self.start(changed, false, send).map(|()| None)
+            }
+        }
+    }
+
+    /// Makes the steps that are due; `now_s` reads the clock [s].
+    pub fn advance(&mut self, now_s: &dyn Fn() -> f64, send: Send) {
+        self.local.advance(now_s, send);
+    }
+
+    /// Time of the next deadline [s].
+    pub fn deadline_s(&self) -> f64 {
+        self.local.deadline_s()
+    }
+
+    /// Encoded data of a path, as `scene/1/object/0/surface`.
+    pub fn static_data(&self, path: &str) -> Option<Vec<u8>> {
+        self.local.static_data(path)
+    }
+
+    fn start(&mut self, text: SceneText, resumes: bool, send: Send) -> Result<(), String> {
+        let (scene, current) = read(text)?;
+        self.local.start(scene, resumes, send).map_err(|error| error.to_string())?;
+        self.current = current;
+        Ok(())
+    }
+
+    /// Scene with another material of an object: its recording, rescaled.
+    fn with_material(&self, object: usize, material: MaterialDescription) -> Result<SceneText, String> {
+        let recording = self.local.scene().model.recordings().nth(object);
+        let recording = recording.ok_or_else(|| format!("there is no object {object}"))?;
+        let MaterialDescription { young, poisson, density } = material;
+        let recorded = recording.metadata.materials.first().map_or(poisson, |material| material.poisson);
+        if (poisson - recorded).abs() > 1e-9 {
+            return Err(format!(
+                "here Young's modulus and density can be changed; Poisson's ratio stays {recorded}: another one needs a recording \
+                 (palpate serve, or palpate record)"
+            ));
+        }
+        let rescaled = recording.rescaled(young, density).map_err(|error| error.to_string())?;
+        let mut changed = self.current.clone();
+        let name = format!("object-{object}-{young}-{density}.palp");
+        changed.text = edited(&changed.text, |table| {
+            let entry = table.get_mut("object").and_then(|objects| objects.get_mut(object));
+            let entry = entry.and_then(Value::as_table_mut).ok_or("the scene has no such object")?;
+            entry.insert("recording".into(), Value::String(name.clone()));
+            Ok(())
+        })?;
+        changed.parts.recordings.insert(name.into(), Arc::new(rescaled));
+        Ok(changed)
+    }
+}
+
+/// Text of a scene after a change.
+fn edited(text: &str, change: impl FnOnce(&mut Table) -> Result<(), String>) -> Result<String, String> {
+    let mut table: Table = text.parse().map_err(|error| format!("{error}"))?;
+    change(&mut table)?;
+    Ok(table.to_string())
+}
+
+/// Scene of a text, and the text with the pointers that were added.
+fn read(of: SceneText) -> Result<(ViewerScene, SceneText), String> {
+    let SceneText { titles, text, parts } = of;
+    let read = read_touchable_scene(Path::new("scene.toml"), text, &parts);
+    let TouchableScene { scene, text } = read.map_err(|error| error.to_string())?;
+    let Titles { id, title, about } = titles.clone();
+    // Every recording of one isotropic material can be rescaled.
+    let recordable = vec![true; scene.object_names.len()];
+    let description = describe_scene(&scene, (id, title, about), &recordable);
+    let needs_machine =
+        scene.devices.iter().find(|device| device.real.is_some() || device.simulated.is_some());
+    if let Some(device) = needs_machine {
+        return Err(format!(
+            "the device {:?} needs a machine: open the scene with palpate serve",
+            device.name
+        ));
+    }
+    let scene = ViewerScene::new(&scene, description, |device| match &device.path {
+        Some(path) => ViewerDevice::Path(path.clone(), device.mode),
+        None => ViewerDevice::Pointer,
+    });
+    Ok((scene, SceneText { titles, text, parts }))
+}
+
+fn settings_change(settings: PhysicsSettings) -> SettingsChange {
+    let PhysicsSettings { gravity, step, friction, coupling } = settings;
+    let coupling = coupling
+        .map(|coupling| palpate::Coupling { stiffness: coupling.stiffness, damping: coupling.damping });
+    SettingsChange { gravity, step_s: step, friction, coupling }
+}

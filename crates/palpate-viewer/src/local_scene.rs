@@ -1,0 +1,342 @@
+//! Live scene without threads: a function of time, for a page that runs its scene by itself, as in a Web Worker.
+//!
+//! Ticks are those of the server: at each one the pointers move, and a step is made where the playback says so. Ticks that are more than
+//! [`MAX_BACKLOG_S`] late are skipped: after a page was hidden, or on a slow machine, simulated time falls behind, and the scene goes on.
+
+use crate::current::CurrentScene;
+use crate::error::SceneError;
+use crate::page_requests::{Effect, SceneControls, SceneRequest, unreadable};
+use crate::pointers::{Pointers, lock};
+use crate::protocol::{
+    FrameEncoder, FrameFormat, Hello, MaterialDescription, PROTOCOL, PhysicsSettings, ProcessTiming,
+    SceneSummary, ServerMessage, Status,
+};
+use crate::scene_provider::{ViewerDevice, ViewerScene};
+use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, initial_snapshot, is_resumable};
+use crate::static_data::StaticData;
+use palpate::{DeviceMode, ObjectSnapshot, State};
+use palpate_haptics::{
+    Cycle, DevicePort, ForcePort, ForceProcess, ObstacleTrajectory, Overrun, Playback, Snapshot, Timing, port,
+};
+use std::sync::Mutex;
+use std::time::Duration;
+
+/// Lateness from which ticks are skipped [s]: a timer of a browser wakes every 4 ms, and a frame of the page takes 16.
+const MAX_BACKLOG_S: f64 = 0.05;
+
+/// Longest time in which steps are made without a look at the page's messages [s].
+const MAX_BURST_S: f64 = 0.01;
+
+/// Interval of status messages [s].
+const STATUS_INTERVAL_S: f64 = 0.5;
+
+/// The one page of the scene, as viewers are numbered.
+const VIEWER: u64 = 1;
+
+/// Message to the page.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PageMessage {
+    /// JSON text.
+    Text(String),
+    /// Encoded frame.
+    Frame(Vec<u8>),
+}
+
+/// Request of the page for another scene, which the caller makes and starts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LocalRequest {
+    /// Open a scene by id.
+    Open(String),
+    /// Change physics settings.
+    ChangePhysics(PhysicsSettings),
+    /// Change the material of an object, by index.
+    ChangeMaterial(usize, MaterialDescription),
+}
+
+/// Live scene of one page.
+pub struct LocalScene {
+    current: CurrentScene,
+    process: ForceProcess,
+    pointers: Mutex<Pointers>,
+    playback: Playback,
+    encoder: FrameEncoder,
+    snapshot: Snapshot,
+    timing: Timing,
+    /// Tick that comes next; deadlines are multiples of the step.
+    tick: u64,
+    /// Tick of the next frame, and step of the last one.
+    frame_at: u64,
+    frame_step: u64,
+    /// Time of the next status message [s].
+    status_at_s: f64,
+    format: FrameFormat,
+    /// Every n-th frame is sent; 0: none.
+    stride: u32,
+    frames: u32,
+}
+
+impl LocalScene {
+    /// Scene from its initial state.
+    ///
+    /// # Errors
+    /// If it has a device that only a machine has.
+    pub fn new(scene: ViewerScene) -> Result<Self, SceneError> {
+        let state = State::new(&scene.model);
+        let (process, ports) = force_process(&scene, state)?;
+        let current = CurrentScene::new(1, scene);
+        let snapshot = initial_snapshot(&current.scene, process.state());
+        Ok(Self {
+            encoder: FrameEncoder::new(current.scene.model.clone(), current.generation),
+            current,
+            process,
+            pointers: Mutex::new(Pointers::new(ports)),
+            playback: Playback::default(),
+            snapshot,
+            timing: Timing::default(),
+            tick: 0,
+            frame_at: 0,
+            frame_step: 0,
+            status_at_s: 0.0,
+            format: FrameFormat::Modal,
+            stride: 1,
+            frames: 0,
+        })
+    }
+
+    /// Starts another scene in place of this one; `resumes`: from the state of this one, where both scenes allow it.
+    ///
+    /// # Errors
+    /// If it has a device that only a machine has; then this scene goes on.
+    pub fn start(
+        &mut self,
+        scene: ViewerScene,
+        resumes: bool,
+        send: &mut dyn FnMut(PageMessage),
+    ) -> Result<(), SceneError> {
+        let objects: Option<Vec<ObjectSnapshot>> =
+            (resumes && is_resumable(&scene)).then(|| self.process.state().snapshots());
+        let state = match &objects {
+            Some(objects) => State::resume(&scene.model, objects),
+            None => State::new(&scene.model),
+        };
+        let (process, ports) = force_process(&scene, state)?;
+        let current = CurrentScene::new(self.current.generation + 1, scene);
+        *lock(&self.pointers) = Pointers::new(ports);
+        self.encoder = FrameEncoder::new(current.scene.model.clone(), current.generation);
+        self.snapshot = initial_snapshot(&current.scene, process.state());
+        (self.current, self.process, self.timing) = (current, process, Timing::default());
+        (self.tick, self.frame_at, self.frame_step) = (0, 0, 0);
+        self.send_scene(send);
+        Ok(())
+    }
+
+    /// Sends the first messages: hello, scene and frame. `scenes` can be opened.
+    pub fn greet(&mut self, scenes: Vec<SceneSummary>, send: &mut dyn FnMut(PageMessage)) {
+        let version = env!("CARGO_PKG_VERSION");
+        let kind = "live";
+        let hello = Hello {
+            protocol: PROTOCOL,
+            version,
+            kind,
+            viewer: VIEWER,
+            scenes,
+            logs: Vec::new(),
+            render: None,
+        };
+        send(PageMessage::Text(serde_json::to_string(&hello).unwrap_or_default()));
+        self.send_scene(send);
+    }
+
+    /// Receives a message of the page; returns a request that is left to the caller.
+    pub fn receive(&mut self, text: &str, send: &mut dyn FnMut(PageMessage)) -> Option<LocalRequest> {
+        let message = match serde_json::from_str(text) {
+            Ok(message) => message,
+            Err(error) => {
+                send(PageMessage::Text(unreadable(&error)));
+                return None;
+            }
+        };
+        let controls = SceneControls {
+            model: &self.current.scene.model,
+            pointers: &self.pointers,
+            playback: &self.playback,
+        };
+        match controls.apply(VIEWER, message) {
+            Effect::None | Effect::Scene(SceneRequest::CancelJob) => {}
+            Effect::Reply(text) => send(PageMessage::Text(text)),
+            Effect::Stream(format, stride) => (self.format, self.stride) = (format, stride),
+            Effect::Scene(SceneRequest::SendStatus) => self.send_status(send),
+            Effect::Scene(SceneRequest::Reset) => {
+                let scene = self.current.scene.clone();
+                if let Err(error) = self.start(scene, false, send) {
+                    send_error(&error, send);
+                }
+            }
+            Effect::Scene(SceneRequest::Open(id)) => return Some(LocalRequest::Open(id)),
+            Effect::Scene(SceneRequest::ChangePhysics(settings)) => {
+                return Some(LocalRequest::ChangePhysics(settings));
+            }
+            Effect::Scene(SceneRequest::ChangeMaterial(object, material)) => {
+                return Some(LocalRequest::ChangeMaterial(object, material));
+            }
+        }
+        None
+    }
+
+    /// Makes the steps whose deadlines have passed; `now_s` reads the clock [s].
+    pub fn advance(&mut self, now_s: &dyn Fn() -> f64, send: &mut dyn FnMut(PageMessage)) {
+        let step_s = self.step_s();
+        let begun_s = now_s();
+        let newest = (begun_s / step_s) as u64;
+        let backlog = (MAX_BACKLOG_S / step_s) as u64;
+        let skipped = newest.saturating_sub(backlog).saturating_sub(self.tick);
+        if self.tick > 0 && skipped > 0 {
+            self.timing.overruns += 1;
+            self.timing.skipped += skipped;
+        }
+        self.tick = self.tick.max(newest.saturating_sub(backlog));
+        let mut time_s = begun_s;
+        while self.tick as f64 * step_s <= time_s && time_s - begun_s < MAX_BURST_S {
+            self.cycle(time_s, now_s, send);
+            time_s = now_s();
+        }
+        if time_s >= self.status_at_s {
+            self.status_at_s = time_s + STATUS_INTERVAL_S;
+            self.send_status(send);
+        }
+    }
+
+    /// Time of the next deadline [s].
+    pub fn deadline_s(&self) -> f64 {
+        self.tick as f64 * self.step_s()
+    }
+
+    /// Whether the playback is paused: then nothing is late.
+    pub fn is_paused(&self) -> bool {
+        self.playback.is_paused()
+    }
+
+    /// Encoded data of a path that the server would answer, as `scene/1/object/0/surface`.
+    pub fn static_data(&self, path: &str) -> Option<Vec<u8>> {
+        let (generation, data) = StaticData::parse(path)?;
+        (generation == self.current.generation).then(|| data.encode(&self.current.scene.model))?
+    }
+
+    /// Scene that runs.
+    pub fn scene(&self) -> &ViewerScene {
+        &self.current.scene
+    }
+
+    fn step_s(&self) -> f64 {
+        self.current.scene.model.parameters().step_s
+    }
+
+    /// One tick at a time [s].
+    fn cycle(&mut self, time_s: f64, now_s: &dyn Fn() -> f64, send: &mut dyn FnMut(PageMessage)) {
+        let step_s = self.step_s();
+        let lateness = (time_s - self.deadline_s()).max(0.0);
+        lock(&self.pointers).advance(step_s, time_s);
+        let is_due = self.playback.is_due(self.tick);
+        if is_due {
+            self.process.cycle(time_s);
+        }
+        let is_paused = self.playback.is_paused();
+        let has_news = self.frame_step < self.process.steps();
+        if has_news && (self.tick >= self.frame_at || is_paused) {
+            self.send_frame(send);
+        }
+        if is_due {
+            let end_s = now_s();
+            let compute = end_s - time_s;
+            let is_over = end_s > (self.tick + 1) as f64 * step_s;
+            let overrun = is_over.then_some(Overrun { by_compute: compute > step_s, skipped: 0 });
+            self.timing.record(Cycle { lateness: seconds(lateness), compute: seconds(compute), overrun });
+        }
+        self.tick += 1;
+    }
+
+    fn send_frame(&mut self, send: &mut dyn FnMut(PageMessage)) {
+        let frame_ticks = (1.0 / (FRAME_RATE_HZ * self.step_s())).round().max(1.0) as u64;
+        (self.frame_at, self.frame_step) = (self.tick + frame_ticks, self.process.steps());
+        self.frames = self.frames.wrapping_add(1);
+        if self.stride == 0 || !self.frames.is_multiple_of(self.stride) {
+            return;
+        }
+        self.snapshot.capture(self.process.steps(), self.process.input(), self.process.state());
+        send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+    }
+
+    fn send_scene(&mut self, send: &mut dyn FnMut(PageMessage)) {
+        send(PageMessage::Text(self.current.message.to_string()));
+        send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+        self.send_status(send);
+    }
+
+    fn send_status(&self, send: &mut dyn FnMut(PageMessage)) {
+        let timing = &self.timing;
+        let status = Status {
+            generation: self.current.generation,
+            paused: self.playback.is_paused(),
+            slowdown: self.playback.slowdown(),
+            steps: self.process.steps(),
+            viewers: 1,
+            force_process: ProcessTiming {
+                compute_us: timing.compute_us().into(),
+                lateness_us: timing.lateness_us().into(),
+                overruns: timing.overruns,
+                compute_overruns: timing.own_overruns,
+                realtime_priority: false,
+            },
+        };
+        send(PageMessage::Text(ServerMessage::Status(status).to_json()));
+    }
+}
+
+/// Sends an error to the page.
+pub(crate) fn send_error(error: &SceneError, send: &mut dyn FnMut(PageMessage)) {
+    send(PageMessage::Text(ServerMessage::Error { text: &error.to_string() }.to_json()));
+}
+
+fn seconds(time_s: f64) -> Duration {
+    Duration::from_secs_f64(time_s.clamp(0.0, 1e6))
+}
+
+/// Force process of a scene at a state, warmed up, with the ports of its pointers by device index.
+fn force_process(
+    scene: &ViewerScene,
+    state: State,
+) -> Result<(ForceProcess, Vec<(usize, DevicePort)>), SceneError> {
+    let mut ports = Vec::new();
+    let mut slots: Vec<(ForcePort, DeviceMode)> = Vec::new();
+    for (index, device) in scene.devices.iter().enumerate() {
+        let (device_port, force_port) = port();
+        let mode = match device {
+            ViewerDevice::Pointer => {
+                ports.push((index, device_port));
+                DeviceMode::Touch
+            }
+            ViewerDevice::Path(_, mode) => *mode,
+            #[cfg(feature = "server")]
+            ViewerDevice::Local(_) => {
+                return Err(SceneError::from("a device of this machine needs `palpate serve`"));
+            }
+        };
+        slots.push((force_port, mode));
+    }
+    let movers = scene.obstacle_trajectories.iter().map(|pose| {
+        let pose = pose.clone();
+        Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
+    });
+    let mut process =
+        ForceProcess::from_state(state, scene.model.clone(), slots, movers.collect(), DEVICE_TIMEOUT_S);
+    for (index, device) in scene.devices.iter().enumerate() {
+        if let ViewerDevice::Path(path, _) = device {
+            process.follow(index, path.clone());
+        }
+    }
+    process.move_clamps(scene.clamp_paths.clone());
+    process.move_bases(scene.base_paths.clone());
+    scene.gravity.iter().for_each(|gravity| process.change_gravity(gravity.clone()));
+    process.warm_up();
+    Ok((process, ports))
+}
