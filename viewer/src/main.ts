@@ -12,7 +12,8 @@ import { SceneView } from "./rendering/scene_view";
 import type { DisplaySettings } from "./rendering/scene_graph";
 import { prefersDark, loadPreferences, savePreferences } from "./preferences";
 import { token } from "./protocol/token";
-import { Connection, type ConnectionState } from "./protocol/connection";
+import { Connection, type ConnectionListener, type ConnectionState } from "./protocol/connection";
+import { runsInWorker, WorkerConnection } from "./protocol/worker_connection";
 import type { ServerMessage, Hello } from "./protocol/messages";
 import { RenderMode } from "./modes/render_mode";
 
@@ -65,12 +66,13 @@ function start(): void {
   const observer = new ResizeObserver(fit);
   observer.observe(layout.viewArea);
 
-  const connection = new Connection({
+  const listener: ConnectionListener = {
     message: (message) => handleMessage(message),
     frame: (frame) => mode?.frameReceived(frame),
     state: (state) => showState(state),
     decodeFailed: (what) => notifications.notifyOnce("unreadable", `The server sent a message that this page cannot read; it was dropped (${what}).`),
-  });
+  };
+  const connection = runsInWorker() ? new WorkerConnection(listener) : new Connection(listener);
 
   function handleMessage(message: ServerMessage): void {
     if (message.type === "hello") {
@@ -121,7 +123,8 @@ function start(): void {
     } else if (state.name === "lost") {
       mode?.connectionLost();
       const why = state.reason === "" ? "" : ` (${state.reason})`;
-      notifications.showBanner(`The connection to palpate is lost${why}. Reconnecting …`, { text: "Reconnect now", run: () => connection.retryNow() });
+      if (runsInWorker()) notifications.showBanner(`The simulation has ended${why}.`, { text: "Start again", run: () => connection.retryNow() });
+      else notifications.showBanner(`The connection to palpate is lost${why}. Reconnecting …`, { text: "Reconnect now", run: () => connection.retryNow() });
     }
   }
 

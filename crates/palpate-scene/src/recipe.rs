@@ -6,7 +6,7 @@ use crate::progress::WithoutRemarks;
 use crate::recording_file::read_recording;
 use palpate::{Damping, Material, Recording, Support};
 use palpate_export::write_atomically;
-use palpate_fem::{ElementOrder, Progress, RecordParameters, record};
+use palpate_fem::{ElementOrder, Precision, Progress, RecordParameters, record};
 use palpate_mesh::{Mesh, MeshingParameters, Repair};
 use std::path::{Path, PathBuf};
 
@@ -27,6 +27,8 @@ pub struct RecordingRecipe {
     pub modes: usize,
     /// Damping of the modes.
     pub damping: Damping,
+    /// Precision of the numbers.
+    pub precision: Precision,
 }
 
 impl RecordingRecipe {
@@ -44,6 +46,7 @@ impl RecordingRecipe {
             order: if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
             modes: recording.modes.len(),
             damping: metadata.damping,
+            precision: Precision::Full,
         })
     }
 
@@ -57,9 +60,10 @@ impl RecordingRecipe {
         };
         let source = source_name(&self.source).replace(['/', ':'], "_");
         let cells = self.cell_size.map_or(String::new(), |size| format!("-c{size}"));
+        let precision = if self.precision == Precision::Compact { "-compact" } else { "" };
         let (scale, modes, version) = (self.scale, self.modes, env!("CARGO_PKG_VERSION"));
         format!(
-            "{source}-{scale}{cells}-E{young}-n{poisson}-r{density}-o{order}-m{modes}-{damping}-{version}.palp"
+            "{source}-{scale}{cells}-E{young}-n{poisson}-r{density}-o{order}-m{modes}-{damping}{precision}-{version}.palp"
         )
     }
 
@@ -68,6 +72,7 @@ impl RecordingRecipe {
         let material = Material { region: String::new(), ..self.material.clone() };
         RecordParameters {
             source: source_name(&self.source),
+            precision: self.precision,
             ..RecordParameters::new(vec![material; regions], self.order, self.modes, self.damping)
         }
     }

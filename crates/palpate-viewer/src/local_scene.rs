@@ -139,6 +139,7 @@ impl LocalScene {
             version,
             kind,
             viewer: VIEWER,
+            records: false,
             scenes,
             logs: Vec::new(),
             render: None,

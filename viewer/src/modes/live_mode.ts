@@ -62,7 +62,7 @@ export class LiveMode implements PageMode {
     private readonly layout: PageLayout,
     private readonly notifications: Notifications,
     display: DisplayPanel,
-    private readonly connection: Connection,
+    private readonly connection: Pick<Connection, "send">,
   ) {
     const send = connection.send.bind(connection);
     const first: TouchMode = window.matchMedia("(pointer: coarse)").matches ? "hold" : "touch";
@@ -113,6 +113,7 @@ export class LiveMode implements PageMode {
     this.touches.clear();
     this.scenes.setScenes(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
+    this.meshUpload.section.hidden = !hello.records;
     this.stream();
   }
 

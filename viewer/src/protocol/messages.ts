@@ -23,6 +23,8 @@ export interface Hello {
   version: string;
   kind: "live" | "logs" | "render";
   viewer: number;
+  /** Whether meshes can be recorded. */
+  records: boolean;
   scenes: SceneSummary[];
   logs: { name: string }[];
   render?: RenderRequest;

@@ -29,8 +29,23 @@ export function prefersVertexStream(): boolean {
   return here().searchParams.get("stream") === "vertices";
 }
 
+/** Source of a scene's data in place of the server. */
+export type DataSource = (path: string) => Promise<ArrayBuffer>;
+
+let dataSource: DataSource | null = null;
+
+/** Takes the data of scenes from a source in place of the server. */
+export function setDataSource(source: DataSource): void {
+  dataSource = source;
+}
+
 /** Response body with progress reports. Never cached: a restarted server counts generations from 1 again. */
 export async function fetchBytes(path: string, signal: AbortSignal, onProgress: (bytes: number) => void): Promise<ArrayBuffer> {
+  if (dataSource !== null) {
+    const data = await dataSource(path);
+    onProgress(data.byteLength);
+    return data;
+  }
   const response = await fetch(serverUrl(path), { signal, cache: "no-store" });
   if (!response.ok) throw new Error(`${path}: ${response.status} ${response.statusText}`);
   if (response.body === null) return response.arrayBuffer();

@@ -167,6 +167,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       version: "stand-in",
       kind,
       viewer: viewers.size,
+      records: true,
       scenes: kind === "live" ? SCENES.map(({ id, title, about }) => ({ id, title, about })) : [],
       logs: recorded.map(({ name }) => ({ name })),
       ...(kind === "render" ? { render } : {}),

@@ -16,5 +16,6 @@ pub mod render;
 pub mod replay;
 pub mod reproduce;
 pub mod run;
+pub mod scenes;
 pub mod serve;
 pub mod verify;

@@ -304,11 +304,11 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
     } else {
         RigidCompliance::Dropped
     };
-    let count = |key: &str, given: &Option<Spanned<i64>>, usual: usize, allowed: RangeInclusive<i64>| {
-        let Some(given) = given else { return Ok(usual) };
+    let count = |key: &str, given: &Option<Spanned<i64>>, allowed: RangeInclusive<i64>| {
+        let Some(given) = given else { return Ok(None) };
         let (count, span) = (*given.get_ref(), given.span());
         if allowed.contains(&count) {
-            return Ok(count as usize);
+            return Ok(Some(count as u64));
         }
         let (least, most) = (allowed.start(), allowed.end());
         source.fail(
@@ -319,12 +319,9 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
         )
     };
     let allowed = 1..=MAX_CONTACT_POINTS;
-    let max_contact_points =
-        count("max_contact_points", &file.max_contact_points, usual.max_contact_points, allowed)?;
-    let max_contact_samples =
-        count("max_contact_samples", &file.max_contact_samples, usual.max_contact_samples, CONTACT_SAMPLES)?;
-    let usual_budget = usize::try_from(usual.solver_budget).unwrap_or(usize::MAX);
-    let solver_budget = count("solver_budget", &file.solver_budget, usual_budget, SOLVER_BUDGET)? as u64;
+    let max_contact_points = count("max_contact_points", &file.max_contact_points, allowed)?;
+    let max_contact_samples = count("max_contact_samples", &file.max_contact_samples, CONTACT_SAMPLES)?;
+    let solver_budget = count("solver_budget", &file.solver_budget, SOLVER_BUDGET)?;
     let step_s = file.step.as_ref().map_or(usual.step_s, |step| *step.get_ref());
     let sleep_after_s = match &file.sleep_after {
         Some(given) if given.get_ref().is_nan() || *given.get_ref() <= 0.0 => {
@@ -341,9 +338,9 @@ fn read_parameters(source: &Source, file: &SceneFile, mode: RunMode) -> Result<M
         step_s,
         motion,
         rigid_compliance,
-        max_contact_points,
-        max_contact_samples,
-        solver_budget,
+        max_contact_points: max_contact_points.map_or(usual.max_contact_points, |count| count as usize),
+        max_contact_samples: max_contact_samples.map_or(usual.max_contact_samples, |count| count as usize),
+        solver_budget: solver_budget.unwrap_or(usual.solver_budget),
         sleep_after_s,
         ..usual
     })

@@ -2,7 +2,7 @@
 //!
 //! A scene is represented by its text: a change edits the text, which is read as any scene file.
 
-use super::built_in::{self, BUILT_IN_SCENES};
+use super::built_in::{self, BUILT_IN_SCENES, BuiltInScene};
 use super::settings::{SettingsChange, set};
 use super::touchable::{TouchableScene, read_touchable_scene};
 use crate::error::{SceneError, SceneErrorKind};
@@ -11,9 +11,9 @@ use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::Scene;
 use palpate::{Damping, Material};
-use palpate_export::TemporaryFolder;
-use palpate_fem::ElementOrder;
-use palpate_fem::Progress;
+use palpate_export::{TemporaryFolder, write_atomically};
+use palpate_fem::{ElementOrder, Precision, Progress};
+use palpate_mesh::read_regular_file;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -151,11 +151,7 @@ impl SceneLibrary {
     /// # Errors
     /// When there is no such scene, or an object cannot be recorded.
     pub fn open_built_in(&self, id: &str, progress: &mut dyn Progress) -> Result<OpenedScene, SceneError> {
-        let Some(scene) = BUILT_IN_SCENES.iter().find(|scene| scene.id == id) else {
-            let known = BUILT_IN_SCENES.map(|scene| scene.id).join(", ");
-            let message = format!("there is no scene {id:?}; there are {known}");
-            return Err(SceneError::new(SceneErrorKind::UnknownValue, message));
-        };
+        let scene = built_in_scene(id)?;
         let folder = self.folder.path().join(scene.id);
         make_folder(&folder)?;
         for (name, at) in scene.paths {
@@ -184,6 +180,36 @@ impl SceneLibrary {
             ..Current::default()
         };
         self.open_text(current, text.to_string())
+    }
+
+    /// Writes a built-in scene to a folder: `scene.toml` with its recordings, which are compact and have at most `modes` modes, and its paths.
+    ///
+    /// # Errors
+    /// When there is no such scene, an object cannot be recorded, or a file cannot be written.
+    pub fn write_built_in(
+        &self,
+        id: &str,
+        modes: usize,
+        folder: &Path,
+        progress: &mut dyn Progress,
+    ) -> Result<(), SceneError> {
+        let scene = built_in_scene(id)?;
+        make_folder(folder)?;
+        for (name, at) in scene.paths {
+            let text = built_in::path_text(*at, scene.period_s);
+            write_atomically(&folder.join(name), text.as_bytes())?;
+        }
+        let mut text = scene.text.trim_start().to_string();
+        for name in built_in::recipe_names(scene.text) {
+            let Some(small) = built_in::small_recipe(name, modes) else { continue };
+            let recorded = small.record_cached(&self.cache, progress)?;
+            let bytes =
+                read_regular_file(&recorded).map_err(|error| SceneError::io("read", &recorded, &error))?;
+            write_atomically(&folder.join(format!("{name}.palp")), &bytes)?;
+            text = text.replace(&format!("\"@{name}\""), &format!("\"{name}.palp\""));
+        }
+        write_atomically(&folder.join("scene.toml"), format!("# {}\n{text}", scene.title).as_bytes())?;
+        Ok(())
     }
 
     /// Changes settings of the scene that was opened last.
@@ -261,6 +287,7 @@ impl SceneLibrary {
             order: ElementOrder::Quadratic,
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
+            precision: Precision::Full,
         };
         // The sender knows the name of the file, not its folder.
         let without_folder = |error: SceneError| {
@@ -297,6 +324,14 @@ impl SceneLibrary {
         };
         self.open_text(current, text)
     }
+}
+
+fn built_in_scene(id: &str) -> Result<BuiltInScene, SceneError> {
+    BUILT_IN_SCENES.into_iter().find(|scene| scene.id == id).ok_or_else(|| {
+        let known = BUILT_IN_SCENES.map(|scene| scene.id).join(", ");
+        let message = format!("there is no scene {id:?}; there are {known}");
+        SceneError::new(SceneErrorKind::UnknownValue, message)
+    })
 }
 
 fn make_folder(folder: &Path) -> Result<(), SceneError> {

@@ -34,6 +34,8 @@ pub(crate) struct Hello {
     pub kind: &'static str,
     /// Number of the viewer, for the jobs that it asks for.
     pub viewer: u64,
+    /// Whether meshes can be recorded.
+    pub records: bool,
     pub scenes: Vec<SceneSummary>,
     pub logs: Vec<LogEntry>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -90,6 +90,7 @@ impl<'s> PageSession<'s> {
                 (None, None) => "logs",
             },
             viewer: self.viewer,
+            records: self.state.live.is_some(),
             scenes: self.state.scenes.clone(),
             logs: self.state.logs.iter().map(|log| LogEntry { name: log.name.clone() }).collect(),
             render: self.state.render.as_ref().map(|job| job.request.clone()),

@@ -1,0 +1,143 @@
+// Instance of the WebAssembly module: its memory, what it sends, and calls with texts and bytes.
+
+/** Error of palpate: a file, scene or motion that it refuses. */
+export class PalpateError extends Error {
+  override name = "PalpateError";
+}
+
+/** Kinds of what the module sends. */
+export const enum Sent {
+  Error = 0,
+  Json = 1,
+  Text = 2,
+  Frame = 3,
+  Data = 4,
+}
+
+/** Functions of the module; handles and addresses are numbers. */
+export interface Exports {
+  readonly memory: WebAssembly.Memory;
+  allocate(length: number): number;
+  deallocate(address: number, length: number): void;
+  describe_library(): void;
+  recording_read(address: number, length: number): number;
+  recording_free(recording: number): void;
+  recording_describe(recording: number): void;
+  recording_positions(recording: number): number;
+  recording_triangles(recording: number): number;
+  recording_rescaled(recording: number, young: number, density: number): number;
+  scene_files(address: number, length: number): void;
+  parts_new(): number;
+  parts_free(parts: number): void;
+  parts_add_recording(parts: number, name: number, nameLength: number, recording: number): void;
+  parts_add_path(parts: number, name: number, nameLength: number, path: number, pathLength: number): void;
+  scene_read(address: number, length: number, parts: number, isReference: number): number;
+  scene_free(scene: number): void;
+  simulation_new(scene: number): number;
+  simulation_free(simulation: number): void;
+  simulation_reset(simulation: number): void;
+  simulation_step(simulation: number): number;
+  simulation_time(simulation: number): number;
+  simulation_array(simulation: number, array: number): number;
+  simulation_array_length(simulation: number, array: number): number;
+  simulation_surface(simulation: number, object: number): number;
+  simulation_grasp(simulation: number, device: number, object: number, x: number, y: number, z: number): number;
+  simulation_release(simulation: number, device: number): number;
+  live_open(address: number, length: number, parts: number, about: number, aboutLength: number): number;
+  live_replace(live: number, address: number, length: number, parts: number, about: number, aboutLength: number): number;
+  live_greet(live: number, address: number, length: number): void;
+  live_receive(live: number, address: number, length: number): void;
+  live_advance(live: number): number;
+  live_data(live: number, address: number, length: number): number;
+}
+
+/** Source of the module: an address, its bytes, or a compiled module. */
+export type ModuleSource = string | URL | BufferSource | WebAssembly.Module;
+
+/** Receiver of messages: `bytes` is valid during the call only. */
+export type Receiver = (kind: Sent, bytes: Uint8Array) => void;
+
+const encoder = new TextEncoder();
+const decoder = new TextDecoder();
+
+/** Text of bytes of the module. */
+export function textOf(bytes: Uint8Array): string {
+  return decoder.decode(bytes);
+}
+
+/** Instance of the module. */
+export class Instance {
+  readonly exports: Exports;
+  /** Receives what is neither an error nor JSON. */
+  receiver: Receiver = () => undefined;
+  private error: string | null = null;
+  private json: unknown = null;
+
+  private constructor(module: WebAssembly.Module, now: () => number) {
+    const send = (kind: Sent, address: number, length: number) => this.receive(kind, new Uint8Array(this.exports.memory.buffer, address, length));
+    const instance = new WebAssembly.Instance(module, { palpate: { send, now } });
+    this.exports = instance.exports as unknown as Exports;
+  }
+
+  /** Compiles and starts a module; `now` reads a clock that never goes back [s]. */
+  static async load(source: ModuleSource, now: () => number = () => performance.now() / 1000): Promise<Instance> {
+    return new Instance(await compile(source), now);
+  }
+
+  /** Result of a call of the module; the error that it sends is thrown. */
+  call<T>(run: (exports: Exports) => T): T {
+    this.error = null;
+    const result = run(this.exports);
+    if (this.error !== null) throw new PalpateError(this.error);
+    return result;
+  }
+
+  /** JSON that a call of the module sends. */
+  described<T>(run: (exports: Exports) => unknown): T {
+    this.json = null;
+    this.call(run);
+    return this.json as T;
+  }
+
+  /** Last JSON that was sent since it was taken, or null. */
+  takeJson(): unknown {
+    const json = this.json;
+    this.json = null;
+    return json;
+  }
+
+  /** Result of a call with bytes, or with a text in UTF-8, in the module's memory. */
+  withBytes<T>(content: Uint8Array | string, use: (address: number, length: number) => T): T {
+    const bytes = typeof content === "string" ? encoder.encode(content) : content;
+    const address = this.exports.allocate(bytes.byteLength);
+    try {
+      if (address === 0) throw new PalpateError(`there is no memory for ${bytes.byteLength} bytes`);
+      new Uint8Array(this.exports.memory.buffer, address, bytes.byteLength).set(bytes);
+      return use(address, bytes.byteLength);
+    } finally {
+      if (address !== 0) this.exports.deallocate(address, bytes.byteLength);
+    }
+  }
+
+  private receive(kind: Sent, bytes: Uint8Array): void {
+    if (kind === Sent.Error) this.error = textOf(bytes);
+    else if (kind === Sent.Json) this.json = JSON.parse(textOf(bytes));
+    else this.receiver(kind, bytes);
+  }
+}
+
+async function compile(source: ModuleSource): Promise<WebAssembly.Module> {
+  if (source instanceof WebAssembly.Module) return source;
+  if (typeof source !== "string" && !(source instanceof URL)) return WebAssembly.compile(source);
+  const url = new URL(source, import.meta.url);
+  if (url.protocol === "file:") {
+    // Node.js does not fetch files.
+    const files = "node:fs/promises";
+    const { readFile } = (await import(/* @vite-ignore */ files)) as typeof import("node:fs/promises");
+    return WebAssembly.compile(await readFile(url));
+  }
+  const response = await fetch(url);
+  if (!response.ok) throw new PalpateError(`${url.href}: ${response.status} ${response.statusText}`);
+  // A file server may not know the type that streaming asks for.
+  return WebAssembly.compile(await response.arrayBuffer());
+}

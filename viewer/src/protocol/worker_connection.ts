@@ -1,0 +1,90 @@
+// Connection to a scene that the page runs by itself, in a Web Worker: the same messages as from a server.
+
+import type { FromWorker, ToWorker } from "../worker/messages";
+import { decodeFrame } from "./frame";
+import { parseMessage, type ClientMessage } from "./messages";
+import type { ConnectionListener } from "./connection";
+import { setDataSource } from "./urls";
+
+/** Whether this page runs its scene by itself: a static site says so. */
+export function runsInWorker(): boolean {
+  return document.documentElement.dataset.transport === "worker";
+}
+
+/** Session with a worker. */
+export class WorkerConnection {
+  private worker: Worker | null = null;
+  private requests = new Map<number, (bytes: ArrayBuffer | null) => void>();
+  private lastRequest = 0;
+
+  constructor(private readonly listener: ConnectionListener) {
+    setDataSource((path) => this.fetch(path));
+  }
+
+  start(): void {
+    this.listener.state({ name: "connecting" });
+    const worker = new Worker(new URL("../worker/scene_worker.ts", import.meta.url), { type: "module" });
+    this.worker = worker;
+    worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
+    worker.onerror = (event) => this.handleLoss(event.message || "the worker cannot be started");
+    const page = new URL(window.location.href);
+    this.post({ kind: "start", base: new URL(".", page).href, scene: page.searchParams.get("scene") });
+  }
+
+  send(message: ClientMessage): void {
+    this.post({ kind: "message", text: JSON.stringify(message) });
+  }
+
+  /** Starts a scene that has ended again. */
+  retryNow(): void {
+    if (this.worker === null) this.start();
+  }
+
+  close(): void {
+    this.worker?.terminate();
+    this.worker = null;
+    this.requests.forEach((answer) => answer(null));
+    this.requests.clear();
+  }
+
+  private post(message: ToWorker): void {
+    this.worker?.postMessage(message);
+  }
+
+  private receive(message: FromWorker): void {
+    switch (message.kind) {
+      case "message": {
+        const parsed = parseMessage(message.text);
+        if (parsed === null) this.listener.decodeFailed("a message of unknown type");
+        else {
+          if (parsed.type === "hello") this.listener.state({ name: "open" });
+          this.listener.message(parsed);
+        }
+        break;
+      }
+      case "frame":
+        this.post({ kind: "shown" });
+        this.listener.frame(decodeFrame(message.frame));
+        break;
+      case "data":
+        this.requests.get(message.request)?.(message.bytes);
+        this.requests.delete(message.request);
+        break;
+      case "failed":
+        this.handleLoss(message.reason);
+    }
+  }
+
+  private handleLoss(reason: string): void {
+    this.close();
+    this.listener.state({ name: "lost", retryAt: Number.POSITIVE_INFINITY, reason });
+  }
+
+  private fetch(path: string): Promise<ArrayBuffer> {
+    const request = ++this.lastRequest;
+    return new Promise((done, failed) => {
+      this.requests.set(request, (bytes) => (bytes === null ? failed(new Error(`${path}: not found`)) : done(bytes)));
+      this.post({ kind: "data", request, path });
+    });
+  }
+}

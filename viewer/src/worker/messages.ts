@@ -1,0 +1,21 @@
+// Messages between the page and the worker that runs its scene.
+
+/** Message to the worker. */
+export type ToWorker =
+  /** Start: address of the folder of `palpate.wasm` and `scenes/`, and the scene to open, or the first. */
+  | { kind: "start"; base: string; scene: string | null }
+  /** Message of the viewer protocol, as JSON. */
+  | { kind: "message"; text: string }
+  /** A frame was shown. */
+  | { kind: "shown" }
+  /** Request for data, by the path that the server would answer. */
+  | { kind: "data"; request: number; path: string };
+
+/** Message to the page. */
+export type FromWorker =
+  | { kind: "message"; text: string }
+  | { kind: "frame"; frame: ArrayBuffer }
+  /** Answer to a request; null if there is no such data. */
+  | { kind: "data"; request: number; bytes: ArrayBuffer | null }
+  /** The scene has ended. */
+  | { kind: "failed"; reason: string };

@@ -1,0 +1,172 @@
+// Web Worker that runs a live scene: the force process in WebAssembly, speaking the protocol of the server.
+
+import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
+import type { SceneSummary, ServerMessage } from "../protocol/messages";
+import type { FromWorker, ToWorker } from "./messages";
+import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
+import { Ticker } from "./ticker";
+
+/** Frames that are under way to the page at once; newer ones take the place of older ones. */
+const MAX_FRAMES_UNDER_WAY = 3;
+
+function post(message: FromWorker, transfer: Transferable[] = []): void {
+  (self as unknown as { postMessage(message: FromWorker, transfer: Transferable[]): void }).postMessage(message, transfer);
+}
+
+function tell(message: ServerMessage): void {
+  post({ kind: "message", text: JSON.stringify(message) });
+}
+
+/** Text of anything that was thrown. */
+function reasonOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** Frames to the page, no more than it can show. */
+class FrameStream {
+  private underWay = 0;
+  private waiting: ArrayBuffer | null = null;
+
+  send(frame: ArrayBuffer): void {
+    if (this.underWay >= MAX_FRAMES_UNDER_WAY) {
+      this.waiting = frame;
+      return;
+    }
+    this.underWay += 1;
+    post({ kind: "frame", frame }, [frame]);
+  }
+
+  shown(): void {
+    this.underWay -= 1;
+    const frame = this.waiting;
+    this.waiting = null;
+    if (frame !== null) this.send(frame);
+  }
+}
+
+/** Live scene in the module. */
+class SceneRunner {
+  private live = 0;
+  private opening = 0;
+  private readonly frames = new FrameStream();
+  private readonly ticker = new Ticker(() => this.guarded(() => this.instance.exports.live_advance(this.live), Number.POSITIVE_INFINITY));
+
+  constructor(
+    private readonly instance: Instance,
+    private readonly base: string,
+    private readonly scenes: SceneSummary[],
+  ) {
+    instance.receiver = (kind, bytes) => {
+      if (kind === Sent.Text) post({ kind: "message", text: textOf(bytes) });
+      else if (kind === Sent.Frame) this.frames.send(bytes.slice().buffer);
+    };
+  }
+
+  /** Opens a scene; a later request takes the place of one that is under way. */
+  async open(id: string | null): Promise<void> {
+    const number = ++this.opening;
+    const summary = id === null ? this.scenes[0] : this.scenes.find((scene) => scene.id === id);
+    if (summary === undefined) throw new Error(`there is no scene ${JSON.stringify(id)}; there are ${this.scenes.map((scene) => scene.id).join(", ")}`);
+    const progress = (fraction: number | null, done = false) => tell({ type: "progress", job: "scene", phase: "loading", fraction, done });
+    try {
+      const files = await fetchScene(this.instance, this.base, summary, progress);
+      if (number === this.opening) this.start(files);
+    } finally {
+      progress(1, true);
+    }
+  }
+
+  receive(text: string): void {
+    if (this.live === 0) return;
+    const { instance, live } = this;
+    try {
+      instance.withBytes(text, (address, length) => instance.call((exports) => exports.live_receive(live, address, length)));
+    } catch (error) {
+      tell({ type: "error", text: reasonOf(error) });
+      return;
+    }
+    const id = instance.takeJson();
+    if (typeof id === "string") this.open(id).catch((error: unknown) => tell({ type: "error", text: reasonOf(error) }));
+  }
+
+  shown(): void {
+    this.frames.shown();
+  }
+
+  answer(request: number, path: string): void {
+    const { instance, live } = this;
+    let bytes: ArrayBuffer | null = null;
+    const before = instance.receiver;
+    instance.receiver = (_, data) => (bytes = data.slice().buffer);
+    instance.withBytes(path, (address, length) => instance.exports.live_data(live, address, length));
+    instance.receiver = before;
+    post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
+  }
+
+  private start(files: SceneFiles): void {
+    const { instance } = this;
+    const { exports } = instance;
+    const parts = exports.parts_new();
+    const recordings: number[] = [];
+    try {
+      for (const [name, bytes] of files.recordings) {
+        const recording = instance.withBytes(bytes, (address, length) => instance.call(() => exports.recording_read(address, length)));
+        recordings.push(recording);
+        instance.withBytes(name, (address, length) => exports.parts_add_recording(parts, address, length, recording));
+      }
+      for (const [name, path] of files.paths) {
+        instance.withBytes(name, (address, length) => instance.withBytes(path, (text, textLength) => exports.parts_add_path(parts, address, length, text, textLength)));
+      }
+      instance.withBytes(files.text, (address, length) =>
+        instance.withBytes(JSON.stringify(files.summary), (about, aboutLength) => {
+          if (this.live !== 0) {
+            instance.call(() => exports.live_replace(this.live, address, length, parts, about, aboutLength));
+            return;
+          }
+          this.live = instance.call(() => exports.live_open(address, length, parts, about, aboutLength));
+        }),
+      );
+    } finally {
+      recordings.forEach((recording) => exports.recording_free(recording));
+      exports.parts_free(parts);
+    }
+    if (this.greeted) return;
+    this.greeted = true;
+    instance.withBytes(JSON.stringify(this.scenes), (address, length) => exports.live_greet(this.live, address, length));
+    this.ticker.start();
+  }
+
+  private greeted = false;
+
+  /** Result of a call; a trap of the module ends the scene. */
+  private guarded<T>(run: () => T, otherwise: T): T {
+    try {
+      return run();
+    } catch (error) {
+      this.ticker.stop();
+      post({ kind: "failed", reason: `the simulation stopped: ${reasonOf(error)}` });
+      return otherwise;
+    }
+  }
+}
+
+let runner: SceneRunner | null = null;
+
+async function start(base: string, scene: string | null): Promise<void> {
+  try {
+    const [instance, scenes] = await Promise.all([Instance.load(new URL("palpate.wasm", base)), fetchScenes(base)]);
+    runner = new SceneRunner(instance, base, scenes);
+    const known = scenes.some(({ id }) => id === scene);
+    await runner.open(known ? scene : null);
+  } catch (error) {
+    post({ kind: "failed", reason: reasonOf(error) });
+  }
+}
+
+self.onmessage = (event: MessageEvent<ToWorker>) => {
+  const message = event.data;
+  if (message.kind === "start") void start(message.base, message.scene);
+  else if (message.kind === "message") runner?.receive(message.text);
+  else if (message.kind === "shown") runner?.shown();
+  else runner?.answer(message.request, message.path);
+};
