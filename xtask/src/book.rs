@@ -1,6 +1,7 @@
 //! The site in `target/site`: pages by mdBook, and the API's documentation (`xtask::site`).
 
 use crate::files;
+use crate::web;
 use crate::process::{cargo_command, root, run};
 use std::fs;
 use xtask::site::{book, built, links};
@@ -29,6 +30,9 @@ pub fn build() -> Result<(), String> {
     let tool = tool.map(std::ffi::OsStr::new).into_iter().chain([source.as_os_str(), site.as_os_str()]);
     run(cargo_command().args(tool).env("CARGO_TARGET_DIR", root().join("target/site-tool")))?;
     files::copy_tree(&root().join("target/doc"), &site.join("api"))?;
+    if web::build()? {
+        files::copy_tree(&web::page(), &site.join("live"))?;
+    }
     let (broken, count) = built::check(&site)?;
     broken.iter().for_each(|text| println!("{text}"));
     if !broken.is_empty() {

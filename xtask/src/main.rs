@@ -16,6 +16,7 @@ mod standard_library;
 mod systems;
 mod tests;
 mod viewer;
+mod web;
 mod wheel;
 
 use process::{palpate, root, run};
@@ -62,6 +63,12 @@ const CHORES: &[Chore] = &[
         summary: "build the Python package's wheel into target/wheels (bindings/python, docs/python.md)",
         flags: &[],
         run: |_| wheel::build().map(|_| ()),
+    },
+    Chore {
+        name: "web",
+        summary: "build WebAssembly, the npm package (bindings/web), and the page without a server into target/web/page",
+        flags: &[],
+        run: |_| web::build().map(|_| ()),
     },
     Chore {
         name: "dependencies",

@@ -1,11 +1,11 @@
 //! Tests, by part: Rust, doc comments, Python, C, and the page in a browser. One release build serves them all.
 
 use crate::process::{cargo, program, run};
-use crate::{c_library, machine, viewer, wheel};
+use crate::{c_library, machine, viewer, web, wheel};
 use std::process::Command;
 
 /// Parts of the tests in the order in which they run: the last lines are those of the Rust tests' runner.
-pub const PARTS: &[&str] = &["build", "python", "viewer", "c", "doc", "rust"];
+pub const PARTS: &[&str] = &["build", "python", "viewer", "web", "c", "doc", "rust"];
 
 /// All workspace members, as one release build.
 const WORKSPACE: &[&str] = &["--release", "--workspace", "--locked"];
@@ -21,6 +21,10 @@ pub fn run_parts(only: Option<&str>) -> Result<(), String> {
             "viewer" => {
                 build()?;
                 viewer::test(&program())?;
+            }
+            "web" => {
+                build()?;
+                web::test()?;
             }
             "c" => {
                 c_library::install_tools();

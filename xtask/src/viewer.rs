@@ -30,8 +30,8 @@ pub fn test(palpate: &Path) -> Result<(), String> {
     npm(&folder, &browser, &[("PALPATE", palpate), ("CHROMIUM", &chromium)])
 }
 
-/// Packages of `package-lock.json`, if they are not there.
-fn install(folder: &Path) -> Result<(), String> {
+/// Install the packages of `package-lock.json`, if they are not there.
+pub fn install(folder: &Path) -> Result<(), String> {
     let lock = |path: &str| std::fs::metadata(folder.join(path)).and_then(|file| file.modified()).ok();
     match (lock("node_modules/.package-lock.json"), lock("package-lock.json")) {
         (Some(installed), Some(wanted)) if installed >= wanted => Ok(()),
@@ -44,6 +44,7 @@ fn is_built(folder: &Path) -> bool {
     built.is_ok_and(|built| newest(folder).is_some_and(|source| source <= built))
 }
 
-fn npm(folder: &Path, arguments: &[&str], variables: &[(&str, &Path)]) -> Result<(), String> {
+/// Run npm in a folder with variables.
+pub fn npm(folder: &Path, arguments: &[&str], variables: &[(&str, &Path)]) -> Result<(), String> {
     run_in(folder, Command::new("npm").args(arguments).envs(variables.iter().copied()))
 }

@@ -1,21 +1,28 @@
-// Browser tests of the page: against the stand-in, or against the real server if PALPATE is the path of the binary.
+// Browser tests of the page: against the stand-in, against the real server if PALPATE is the path of the binary, or without a server if PAGE is the
+// folder of the page that runs its scene by itself.
 //   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
 
 import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
+import { NeedsServer } from "./servers.mjs";
 import { touchCases } from "./touching.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
-const real = Boolean(process.env.PALPATE);
+const real = Boolean(process.env.PALPATE || process.env.PAGE);
+const serverless = Boolean(process.env.PAGE);
 const filter = process.argv[2] ?? "";
 const cases = [...liveCases, ...touchCases, ...reconstructionCases, ...logCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
-for (const { name, run, standinOnly, realOnly } of cases) {
+for (const { name, run, standinOnly, realOnly, serverOnly } of cases) {
+  if (serverless && serverOnly) {
+    console.log(`skipped  ${name} (needs a server)`);
+    continue;
+  }
   if (real ? standinOnly : realOnly) {
     console.log(`skipped  ${name} (needs the ${real ? "stand-in" : "real server"})`);
     continue;
@@ -25,6 +32,10 @@ for (const { name, run, standinOnly, realOnly } of cases) {
     await run(browser);
     console.log(`passed   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
   } catch (error) {
+    if (error instanceof NeedsServer) {
+      console.log(`skipped  ${name} (needs a server: ${error.message})`);
+      continue;
+    }
     failed++;
     console.log(`FAILED   ${name}\n${error.stack ?? error}`);
   } finally {

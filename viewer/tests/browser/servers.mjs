@@ -1,7 +1,10 @@
 // Server of a test case: the stand-in, or `palpate serve`.
 
 import { spawn } from "node:child_process";
+import { readFile } from "node:fs/promises";
+import { createServer as createHttpServer } from "node:http";
 import { createServer } from "node:net";
+import { join, normalize } from "node:path";
 import { serve } from "../standin/server.mjs";
 import { hasPage, startProxy } from "./proxy.mjs";
 
@@ -38,8 +41,34 @@ async function servePalpate(port, { log, scene = "bounce", token }) {
   }
 }
 
+/** A case that needs a server. */
+export class NeedsServer extends Error {}
+
+const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", json: "application/json", wasm: "application/wasm" };
+
+/** Plain file server of the folder PAGE: the page that runs its scene by itself. */
+async function serveFiles({ scene, ...others }) {
+  const given = Object.keys(others).filter((key) => others[key] !== undefined && key !== "port");
+  if (given.length > 0) throw new NeedsServer(given.join(", "));
+  const server = createHttpServer(async (request, response) => {
+    const { pathname } = new URL(request.url, "http://localhost");
+    const path = decodeURIComponent(pathname.endsWith("/") ? `${pathname}index.html` : pathname);
+    try {
+      const content = await readFile(join(process.env.PAGE, normalize(path)));
+      response.writeHead(200, { "content-type": TYPES[path.split(".").at(-1)] ?? "application/octet-stream" }).end(content);
+    } catch {
+      response.writeHead(404).end();
+    }
+  });
+  await new Promise((done) => server.listen(others.port ?? 0, "127.0.0.1", done));
+  const { port } = server.address();
+  const query = scene === undefined ? "" : `?scene=${scene}`;
+  return { url: `http://127.0.0.1:${port}/${query}`, port, close: () => new Promise((done) => (server.close(done), server.closeAllConnections())) };
+}
+
 /** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene; `token`: its token. */
 export async function start(options = {}) {
+  if (process.env.PAGE) return serveFiles(options);
   const port = options.port ?? (await freePort());
   if (!process.env.PALPATE) return serve({ ...options, port });
   const behind = await servePalpate(port, options);

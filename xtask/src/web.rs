@@ -1,0 +1,97 @@
+//! WebAssembly of palpate (`bindings/web`), the npm package, and the page that needs no server.
+
+use crate::files::{copy, copy_tree, empty, write};
+use crate::process::{cargo_command, palpate, root, run};
+use crate::standard_library::{HINT, build_std, is_installed};
+use crate::{machine, viewer};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const TARGET: &str = "wasm32-unknown-unknown";
+
+/// Vector instructions, which every browser has since 2023.
+const FLAGS: &str = "-Ctarget-feature=+simd128";
+
+/// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser.
+const SMALL_FLAGS: &str =
+    "-Ctarget-feature=+simd128 -Zlocation-detail=none -Zunstable-options -Cpanic=immediate-abort";
+
+/// Folder of the npm package.
+pub fn package() -> PathBuf {
+    root().join("bindings/web")
+}
+
+/// Folder of the page that needs no server.
+pub fn page() -> PathBuf {
+    root().join("target/web/page")
+}
+
+/// Build the module, the npm package and the page; false, with a message, where no toolchain for WebAssembly can be had.
+pub fn build() -> Result<bool, String> {
+    let Some(module) = module()? else {
+        println!("skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}");
+        return Ok(false);
+    };
+    machine::need_node()?;
+    let package = package();
+    viewer::install(&package)?;
+    viewer::npm(&package, &["run", "build", "--silent"], &[])?;
+    copy(&module, &package.join("dist/palpate.wasm"))?;
+    build_page(&module)?;
+    report(&module)?;
+    Ok(true)
+}
+
+/// Tests of the package, and those of the page in a real browser, from a plain file server.
+pub fn test() -> Result<(), String> {
+    if !build()? {
+        return Ok(());
+    }
+    let program = palpate()?;
+    viewer::npm(&package(), &["run", "check", "--silent"], &[])?;
+    viewer::npm(&package(), &["test", "--silent"], &[("PALPATE", &program)])?;
+    let chromium = machine::need_chromium()?;
+    let variables = [("PAGE", page()), ("CHROMIUM", chromium)];
+    let variables = variables.each_ref().map(|(name, path)| (*name, path.as_path()));
+    viewer::npm(&root().join("viewer"), &["run", "test:browser", "--silent"], &variables)
+}
+
+/// WebAssembly module; none where no toolchain for it can be had.
+fn module() -> Result<Option<PathBuf>, String> {
+    let mut cargo = cargo_command();
+    cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
+    if build_std(&mut cargo, "std,panic_abort")? {
+        cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS);
+    } else if is_installed(TARGET)? {
+        cargo.env("RUSTFLAGS", FLAGS);
+    } else {
+        return Ok(None);
+    }
+    eprintln!("building the WebAssembly module");
+    run(&mut cargo)?;
+    Ok(Some(root().join("target").join(TARGET).join("web/palpate_web.wasm")))
+}
+
+/// The page with the module and the built-in scenes: files that any server serves.
+fn build_page(module: &Path) -> Result<(), String> {
+    viewer::build()?;
+    let page = page();
+    empty(&page)?;
+    copy_tree(&root().join("viewer/dist"), &page)?;
+    let index = page.join("index.html");
+    let html = fs::read_to_string(&index).map_err(|error| format!("{}: {error}", index.display()))?;
+    let switched = html.replacen("<html", "<html data-transport=\"worker\"", 1);
+    write(&index, switched.as_bytes())?;
+    copy(module, &page.join("palpate.wasm"))?;
+    let scenes = page.join("scenes");
+    run(Command::new(palpate()?).arg("scenes").arg("--output").arg(&scenes))
+}
+
+/// Print the sizes of the package as npm would pack it, and of the page.
+fn report(module: &Path) -> Result<(), String> {
+    let bytes = fs::metadata(module).map_err(|error| format!("{}: {error}", module.display()))?.len();
+    println!("bindings/web/dist/palpate.wasm: {:.0} kB", bytes as f64 / 1e3);
+    println!("target/web/page: the page, for any file server, as `python3 -m http.server --directory target/web/page`");
+    Ok(())
+}
