@@ -1,8 +1,8 @@
 //! The site in `target/site`: pages by mdBook, and the API's documentation (`xtask::site`).
 
 use crate::files;
-use crate::web;
 use crate::process::{cargo_command, root, run};
+use crate::web;
 use std::fs;
 use xtask::site::{book, built, links};
 

@@ -30,7 +30,9 @@ pub fn page() -> PathBuf {
 /// Build the module, the npm package and the page; false, with a message, where no toolchain for WebAssembly can be had.
 pub fn build() -> Result<bool, String> {
     let Some(module) = module()? else {
-        println!("skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}");
+        println!(
+            "skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}"
+        );
         return Ok(false);
     };
     machine::need_node()?;
@@ -92,6 +94,8 @@ fn build_page(module: &Path) -> Result<(), String> {
 fn report(module: &Path) -> Result<(), String> {
     let bytes = fs::metadata(module).map_err(|error| format!("{}: {error}", module.display()))?.len();
     println!("bindings/web/dist/palpate.wasm: {:.0} kB", bytes as f64 / 1e3);
-    println!("target/web/page: the page, for any file server, as `python3 -m http.server --directory target/web/page`");
+    println!(
+        "target/web/page: the page, for any file server, as `python3 -m http.server --directory target/web/page`"
+    );
     Ok(())
 }

@@ -20,6 +20,7 @@ async function waitForStop(page) {
 export const liveCases = [
   {
     name: "loads and shows the hint without overlaps, at four window sizes, light and dark",
+    serverOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       for (const [name, options] of [
@@ -124,6 +125,7 @@ export const liveCases = [
   },
   {
     name: "a lost connection is shown, and restored when the server is back",
+    serverOnly: true,
     async run(browser) {
       const server = await start();
       const page = await browser.page(server.url);
@@ -165,6 +167,7 @@ export const liveCases = [
   },
   {
     name: "two viewers see the same scene and the viewer count",
+    serverOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const [one, two] = [await browser.page(server.url), await browser.page(server.url)];
@@ -339,6 +342,7 @@ export const liveCases = [
   },
   {
     name: "the content security policy blocks inline code and foreign connections, and nothing that the page does",
+    serverOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

@@ -6,6 +6,7 @@ import { start } from "./servers.mjs";
 export const reconstructionCases = [
   {
     name: "surfaces reconstructed on the GPU match the vertex stream",
+    serverOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const url = new URL(server.url);

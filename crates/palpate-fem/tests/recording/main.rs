@@ -3,5 +3,6 @@
 mod bodies;
 mod plates;
 mod records;
+mod rescaled;
 mod responses;
 mod rods;

@@ -1,0 +1,182 @@
+//! A live scene without threads: the protocol of the server, in simulated time.
+
+use glam::DVec3;
+use palpate_scene::{PartsInMemory, read_touchable_scene};
+use palpate_testkit::FREE_BLOCK_FILE;
+use palpate_viewer::{LocalRequest, LocalScene, PageMessage, ViewerDevice, ViewerScene, describe_scene};
+use serde_json::Value;
+use std::cell::Cell;
+use std::path::Path;
+use std::sync::Arc;
+
+const SCENE: &str = "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"block\"\nrecording = \"block.palp\"\nposition = [0.0, 0.2, 0.0]\n\
+                     [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n";
+
+/// Scene with a clock of its own, and what it has sent.
+struct Page {
+    scene: LocalScene,
+    now_s: Cell<f64>,
+    texts: Vec<Value>,
+    frames: Vec<Vec<u8>>,
+}
+
+fn viewer_scene(text: &str) -> ViewerScene {
+    let recording = palpate::Recording::from_bytes(FREE_BLOCK_FILE).expect("a recording");
+    let mut parts = PartsInMemory::default();
+    parts.recordings.insert("block.palp".into(), Arc::new(recording));
+    let read = read_touchable_scene(Path::new("scene"), text.into(), &parts).expect("a scene");
+    let titles = (Some("block".to_string()), "A block".to_string(), String::new());
+    let description = describe_scene(&read.scene, titles, &[true]);
+    ViewerScene::new(&read.scene, description, |_| ViewerDevice::Pointer)
+}
+
+impl Page {
+    fn new(text: &str) -> Self {
+        let scene = LocalScene::new(viewer_scene(text)).expect("pointers only");
+        let mut page = Self { scene, now_s: Cell::new(0.0), texts: Vec::new(), frames: Vec::new() };
+        page.call(|scene, _, send| scene.greet(Vec::new(), send));
+        page
+    }
+
+    fn call<T>(
+        &mut self,
+        run: impl FnOnce(&mut LocalScene, &Cell<f64>, &mut dyn FnMut(PageMessage)) -> T,
+    ) -> T {
+        let (texts, frames) = (&mut self.texts, &mut self.frames);
+        run(&mut self.scene, &self.now_s, &mut |message| match message {
+            PageMessage::Text(text) => texts.push(serde_json::from_str(&text).expect("JSON")),
+            PageMessage::Frame(frame) => frames.push(frame),
+        })
+    }
+
+    fn receive(&mut self, message: &str) -> Option<LocalRequest> {
+        self.call(|scene, _, send| scene.receive(message, send))
+    }
+
+    /// Wakes the scene every 4 ms of its clock, in which a step takes no time.
+    fn run(&mut self, duration_s: f64) {
+        let end = self.now_s.get() + duration_s;
+        while self.now_s.get() < end {
+            self.now_s.set(self.now_s.get() + 0.004);
+            self.call(|scene, now, send| scene.advance(&|| now.get(), send));
+        }
+    }
+
+    fn newest(&self, kind: &str) -> &Value {
+        self.texts.iter().rev().find(|text| text["type"] == kind).expect("a message of this kind")
+    }
+
+    fn steps(&mut self) -> u64 {
+        self.receive(r#"{"type":"slow_motion","slowdown":1}"#);
+        self.newest("status")["steps"].as_u64().expect("a number")
+    }
+}
+
+/// Position of the block in a frame [m, world].
+fn height(frame: &[u8]) -> f64 {
+    // Header of 24 bytes, energies, four counts, two words; then the pose of the first object.
+    let energies = palpate::EnergyLedger::default().named().len();
+    let at = 24 + 4 * energies + 4 * 4 + 8 + 4;
+    f64::from(f32::from_le_bytes(frame[at..at + 4].try_into().expect("four bytes")))
+}
+
+#[test]
+fn a_page_gets_what_a_server_sends_and_steps_follow_the_clock() {
+    let mut page = Page::new(SCENE);
+    let kinds: Vec<&str> = page.texts.iter().filter_map(|text| text["type"].as_str()).collect();
+    assert_eq!(kinds, ["hello", "scene", "status"]);
+    assert_eq!(page.texts[0]["records"], false);
+    assert_eq!(page.frames.len(), 1, "the initial state");
+    page.run(0.1);
+    // The first steps are made when the clock wakes; from then on none is left out.
+    let (before, at) = (page.steps(), page.now_s.get());
+    page.run(1.0);
+    assert_eq!(page.steps() - before, ((page.now_s.get() - at) * 1e3).round() as u64);
+    assert!((58..=70).contains(&page.frames.len()), "{} frames in 1.1 s", page.frames.len());
+    let (first, last) = (height(&page.frames[0]), height(page.frames.last().expect("frames")));
+    assert!((first - 0.2).abs() < 1e-6 && last < first - 0.05, "it falls from {first} to {last}");
+}
+
+#[test]
+fn time_in_which_the_page_slept_is_skipped() {
+    let mut page = Page::new(SCENE);
+    page.run(0.1);
+    let before = page.steps();
+    page.now_s.set(page.now_s.get() + 3600.0);
+    page.run(0.004);
+    let made = page.steps() - before;
+    assert!(made <= 60, "{made} steps after an hour");
+    assert!(page.newest("status")["force_process"]["overruns"].as_u64() > Some(0), "it says so");
+    let (before, at) = (page.steps(), page.now_s.get());
+    page.run(0.5);
+    assert_eq!(page.steps() - before, ((page.now_s.get() - at) * 1e3).round() as u64);
+}
+
+#[test]
+fn a_slow_machine_answers_between_bursts_of_steps() {
+    let mut page = Page::new(SCENE);
+    page.run(0.02);
+    // Each reading of the clock is 2 ms later: a step of 1 ms is never in time.
+    page.call(|scene, now, send| {
+        let clock = || {
+            now.set(now.get() + 0.002);
+            now.get()
+        };
+        scene.advance(&clock, send);
+    });
+    let before = page.now_s.get();
+    page.call(|scene, now, send| {
+        let clock = || {
+            now.set(now.get() + 0.002);
+            now.get()
+        };
+        scene.advance(&clock, send);
+    });
+    assert!(page.now_s.get() - before < 0.03, "{} s without a look at messages", page.now_s.get() - before);
+}
+
+#[test]
+fn pointers_press_pause_steps_and_reset_work_as_with_a_server() {
+    let mut page = Page::new(SCENE);
+    page.run(3.0);
+    let top = 0.3;
+    page.receive(&format!(r#"{{"type":"press","pointer":1,"mode":"touch","position":[0.0,{top},0.0]}}"#));
+    assert_eq!(page.newest("assigned")["device"], 0);
+    page.receive(r#"{"type":"move","pointers":[{"pointer":1,"position":[0.0,0.02,0.0]}]}"#);
+    page.run(0.5);
+    let pressed = page.frames.last().expect("frames").clone();
+    page.receive(r#"{"type":"release","pointer":1}"#);
+    page.receive(r#"{"type":"pause","paused":true}"#);
+    page.run(0.1);
+    let paused = page.steps();
+    page.run(0.1);
+    assert_eq!(page.steps(), paused);
+    page.receive(r#"{"type":"single_step"}"#);
+    page.run(0.02);
+    assert_eq!(page.steps(), paused + 1);
+    page.receive(r#"{"type":"pause","paused":false}"#);
+    page.receive(r#"{"type":"reset"}"#);
+    assert_eq!(page.newest("scene")["generation"], 2);
+    assert!((height(page.frames.last().expect("frames")) - 0.2).abs() < 1e-6);
+    assert!(height(&pressed) < 0.2);
+    assert!(page.scene.static_data("scene/2/object/0/surface").is_some_and(|data| data.len() > 8));
+    assert!(page.scene.static_data("scene/1/object/0/surface").is_none(), "of an older generation");
+    assert_eq!(page.receive("nonsense"), None);
+    assert!(page.newest("error")["text"].as_str().is_some_and(|text| text.contains("cannot read a message")));
+}
+
+#[test]
+fn another_scene_goes_on_from_the_state_where_both_allow_it() {
+    let mut page = Page::new(SCENE);
+    page.run(0.15);
+    let before = height(page.frames.last().expect("frames"));
+    let request = page.receive(r#"{"type":"set_physics","gravity":[0.0,0.0,0.0]}"#);
+    let Some(LocalRequest::ChangePhysics(settings)) = request else { panic!("{request:?}") };
+    assert_eq!(settings.gravity, Some(DVec3::ZERO.to_array()));
+    let floating = SCENE.replace("-9.81", "0.0");
+    page.call(|scene, _, send| scene.start(viewer_scene(&floating), true, send)).expect("a scene");
+    let after = height(page.frames.last().expect("frames"));
+    assert!((after - before).abs() < 0.03 && after < 0.2, "{before} {after}");
+    let request = page.receive(r#"{"type":"open_scene","scene":"other"}"#);
+    assert_eq!(request, Some(LocalRequest::Open("other".into())));
+}
