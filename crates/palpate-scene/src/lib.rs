@@ -28,6 +28,7 @@ mod scene;
 mod scene_log;
 mod step_check;
 mod supports;
+mod tables;
 mod warning;
 
 pub use attach::{attach_path, attach_real};

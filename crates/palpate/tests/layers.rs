@@ -95,7 +95,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-render",
         ],
     ),
-    ("palpate-c", &["palpate", "palpate-scene"]),
+    // Its tests write a store.
+    ("palpate-c", &["palpate", "palpate-scene", "palpate-store"]),
     (
         "palpate-python",
         &["palpate", "palpate-export", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene"],

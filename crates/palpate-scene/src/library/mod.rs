@@ -147,7 +147,7 @@ impl SceneLibrary {
         let edit = |text: &str, objects: &[ModelObject]| {
             let edited = with_pointers(text, objects)?;
             added = edited.added;
-            Some(edited.text)
+            Some(edited.edited)
         };
         let (mut scene, text) = read_edited_scene(&current.path, text, RunMode::RealTime, edit)?;
         current.text = text.parse().map_err(|error| {
