@@ -20,6 +20,7 @@ mod record;
 mod recording;
 mod run_length;
 mod run_state;
+mod scalars;
 mod scene;
 mod series;
 mod simulation;

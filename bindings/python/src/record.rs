@@ -4,6 +4,7 @@ use crate::arrays::{Numbers, check_finite, read_integers};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
+use crate::scalars::{Text, Whole};
 use crate::workers::{Workers, no_threads};
 use glam::DVec3;
 use palpate::{Damping, Material};
@@ -104,14 +105,14 @@ pub fn record(
     young: Option<f64>,
     poisson: Option<f64>,
     density: Option<f64>,
-    material: Option<&str>,
+    material: Option<Text>,
     materials: Option<&Bound<'_, PyAny>>,
-    rayleigh: Option<[f64; 2]>,
+    rayleigh: Option<&Bound<'_, PyAny>>,
     damping_ratio: Option<f64>,
-    modes: i64,
+    #[pyo3(from_py_with = Whole::number_of)] modes: i64,
     force_error: Option<f64>,
     bandwidth: Option<f64>,
-    order: i64,
+    #[pyo3(from_py_with = Whole::number_of)] order: i64,
     scale: f64,
     cell_size: Option<f64>,
     fix: Option<&Bound<'_, PyAny>>,
@@ -123,9 +124,10 @@ pub fn record(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Recording> {
     let refused = |message: String| input_error(py, message);
+    let material = material.as_ref().map(|Text(name)| name.as_str());
     let damping = match (rayleigh, damping_ratio) {
         (Some(_), Some(_)) => return Err(refused("give rayleigh or damping_ratio, not both".into())),
-        (Some([alpha, beta]), None) => Some(Damping::Rayleigh { alpha, beta }),
+        (Some(given), None) => Some(read_rayleigh(given)?),
         (None, ratio) => ratio.map(Damping::Ratio),
     };
     let options = RecordOptions {
@@ -191,18 +193,28 @@ pub fn record(
     recorded.map(Recording::new).map_err(|error| scene_error(py, &with_keywords(error)))
 }
 
-/// Error whose message has keywords in place of options: `cell_size` for `--cell-size`.
+/// Error whose message has keywords in place of options.
 fn with_keywords(mut error: SceneError) -> SceneError {
+    error.message = keywords_in(&error.message);
+    error
+}
+
+/// Message with keywords in place of options: `cell_size` for `--cell-size`, `scale=0.001` for `--scale 0.001`.
+pub fn keywords_in(message: &str) -> String {
     // A path may have two hyphens inside.
-    let mut message = format!(" {}", error.message);
+    let mut message = format!(" {message}");
     for keyword in KEYWORDS {
         let option = format!("--{}", keyword.replace('_', "-"));
         for before in [" ", "("] {
+            for digit in 0..10 {
+                let (given, said) =
+                    (format!("{before}{option} {digit}"), format!("{before}{keyword}={digit}"));
+                message = message.replace(&given, &said);
+            }
             message = message.replace(&format!("{before}{option}"), &format!("{before}{keyword}"));
         }
     }
-    error.message = message.split_off(1);
-    error
+    message.split_off(1)
 }
 
 /// Materials: by numbers, by name, by region, or those of the mesh file.
@@ -236,6 +248,15 @@ fn read_materials(
     }
     let text = py.import("palpate._toml")?.call_method1("material_tables", (given,))?.extract()?;
     Ok(MaterialChoice::Text(text, "materials".into()))
+}
+
+/// Rayleigh's α [1/s] and β [s].
+fn read_rayleigh(given: &Bound<'_, PyAny>) -> PyResult<Damping> {
+    let numbers = Numbers::read(given, "rayleigh", &[Some(2)])?;
+    let &[alpha, beta] = numbers.as_slice()? else {
+        return Err(input_error(given.py(), "rayleigh is not two numbers"));
+    };
+    Ok(Damping::Rayleigh { alpha, beta })
 }
 
 /// Piece of a mesh: "largest", or its number.
