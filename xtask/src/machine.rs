@@ -64,7 +64,7 @@ fn python_of(environment: &Path) -> PathBuf {
     environment.join("bin/python")
 }
 
-/// What was installed into an environment, as its list of packages says.
+/// File with the list of packages that an environment has.
 fn stamp_of(environment: &Path) -> PathBuf {
     environment.join("installed.txt")
 }

@@ -12,6 +12,7 @@ mod batch_series;
 mod contacts;
 mod device_mode;
 mod errors;
+mod keywords;
 mod log;
 mod motion;
 mod progress;

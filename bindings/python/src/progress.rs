@@ -1,6 +1,6 @@
 //! Progress of a recording: calls of a Python function, warnings, and KeyboardInterrupt.
 
-use crate::record::keywords_in;
+use crate::keywords::keywords_in;
 use palpate_fem::Progress;
 use pyo3::prelude::*;
 use std::cell::{Cell, RefCell};

@@ -2,6 +2,7 @@
 
 use crate::arrays::{Numbers, check_finite, read_integers};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
+use crate::keywords::keywords_in;
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
 use crate::scalars::{Text, Whole};
@@ -26,22 +27,6 @@ enum Source {
 
 /// Process that recorded first: the threads of the numerics live in it.
 static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
-
-/// Keywords whose options of the command line stand in messages.
-const KEYWORDS: [&str; 12] = [
-    "young",
-    "poisson",
-    "density",
-    "material",
-    "modes",
-    "order",
-    "scale",
-    "cell_size",
-    "fix",
-    "spring",
-    "merge_nodes",
-    "piece",
-];
 
 /// Recording of a mesh by finite elements, with the options of `palpate record` (docs/recording.md).
 ///
@@ -197,24 +182,6 @@ pub fn record(
 fn with_keywords(mut error: SceneError) -> SceneError {
     error.message = keywords_in(&error.message);
     error
-}
-
-/// Message with keywords in place of options: `cell_size` for `--cell-size`, `scale=0.001` for `--scale 0.001`.
-pub fn keywords_in(message: &str) -> String {
-    // A path may have two hyphens inside.
-    let mut message = format!(" {message}");
-    for keyword in KEYWORDS {
-        let option = format!("--{}", keyword.replace('_', "-"));
-        for before in [" ", "("] {
-            for digit in 0..10 {
-                let (given, said) =
-                    (format!("{before}{option} {digit}"), format!("{before}{keyword}={digit}"));
-                message = message.replace(&given, &said);
-            }
-            message = message.replace(&format!("{before}{option}"), &format!("{before}{keyword}"));
-        }
-    }
-    message.split_off(1)
 }
 
 /// Materials: by numbers, by name, by region, or those of the mesh file.
