@@ -1,7 +1,7 @@
 //! Programs that chores need of the machine, and their installation.
 
 use crate::process::root;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Whether a command can be run and succeeds.
@@ -27,22 +27,63 @@ pub fn need_c_compiler() -> Result<(), String> {
     Err("a C compiler is missing and could not be installed: install gcc or clang, so that `cc --version` works".into())
 }
 
+/// Packages of Python that the tests need, and maturin.
+const REQUIREMENTS: &str = "python/tests/requirements.txt";
+
 /// A Python with what the tests in python/tests need, in an environment of its own under target/.
 pub fn need_python() -> Result<PathBuf, String> {
-    let environment = root().join("target/python-tests");
-    let requirements = root().join("python/tests/requirements.txt");
-    let python = environment.join("bin/python");
-    // Renewed when the list of packages changes.
-    let wanted =
-        std::fs::read_to_string(&requirements).map_err(|e| format!("{}: {e}", requirements.display()))?;
-    let stamp = environment.join("installed.txt");
-    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
+    python_with(TESTS, &requirements()?)
+}
+
+/// A Python with maturin: that of the tests if it is there, or else one that has nothing more.
+pub fn need_maturin() -> Result<PathBuf, String> {
+    let requirements = requirements()?;
+    let tests = root().join(TESTS);
+    if has_installed(&tests, &requirements) {
+        return Ok(python_of(&tests));
+    }
+    python_with("target/python-wheel", &line_of(&requirements, "maturin")?)
+}
+
+/// Environment of the tests.
+const TESTS: &str = "target/python-tests";
+
+fn requirements() -> Result<String, String> {
+    std::fs::read_to_string(root().join(REQUIREMENTS)).map_err(|e| format!("{REQUIREMENTS}: {e}"))
+}
+
+/// Line of one package.
+fn line_of(requirements: &str, package: &str) -> Result<String, String> {
+    let is_of =
+        |line: &&str| line.strip_prefix(package).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric));
+    let line = requirements.lines().find(is_of);
+    line.map(|line| format!("{line}\n")).ok_or_else(|| format!("{REQUIREMENTS} has no {package}"))
+}
+
+fn python_of(environment: &Path) -> PathBuf {
+    environment.join("bin/python")
+}
+
+/// File with the list of packages that an environment has.
+fn stamp_of(environment: &Path) -> PathBuf {
+    environment.join("installed.txt")
+}
+
+fn has_installed(environment: &Path, wanted: &str) -> bool {
+    std::fs::read_to_string(stamp_of(environment)).is_ok_and(|installed| installed == wanted)
+}
+
+/// A Python with a list of packages, in an environment of its own, which is renewed when the list changes.
+fn python_with(folder: &str, wanted: &str) -> Result<PathBuf, String> {
+    let environment = root().join(folder);
+    let python = python_of(&environment);
+    if has_installed(&environment, wanted) {
         return Ok(python);
     }
     if !runs("python3", &["-c", "import venv, ensurepip"]) {
         install(&["python3", "python3-venv"]);
     }
-    eprintln!("installing Python packages for the tests into target/python-tests");
+    eprintln!("installing Python packages into {folder}");
     let made = Command::new("python3").args(["-m", "venv"]).arg(&environment).status();
     if !made.is_ok_and(|status| status.success()) {
         return Err(
@@ -50,12 +91,14 @@ pub fn need_python() -> Result<PathBuf, String> {
                 .into(),
         );
     }
-    let installed =
-        Command::new(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&requirements).status();
+    let list = environment.join("requirements.txt");
+    let write = |file: &Path| std::fs::write(file, wanted).map_err(|e| format!("{}: {e}", file.display()));
+    write(&list)?;
+    let installed = Command::new(&python).args(["-m", "pip", "install", "--quiet", "-r"]).arg(&list).status();
     if !installed.is_ok_and(|status| status.success()) {
-        return Err(format!("pip could not install the packages of {}", requirements.display()));
+        return Err(format!("pip could not install the packages of {REQUIREMENTS}"));
     }
-    std::fs::write(&stamp, wanted).map_err(|e| format!("{}: {e}", stamp.display()))?;
+    write(&stamp_of(&environment))?;
     Ok(python)
 }
 
@@ -101,4 +144,18 @@ pub fn install(packages: &[&str]) {
     eprintln!("installing {} with apt-get", packages.join(" "));
     let _ = Command::new("apt-get").args(["update", "--quiet"]).status();
     let _ = Command::new("apt-get").args(["install", "--yes", "--quiet"]).args(packages).status();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wheel_needs_one_line_of_the_tests_packages() {
+        let requirements = requirements().expect("a list");
+        assert!(requirements.lines().filter(|line| !line.starts_with('#')).count() > 10);
+        let line = line_of(&requirements, "maturin").expect("maturin");
+        assert!(line.starts_with("maturin>=") && line.lines().count() == 1, "{line:?}");
+        assert!(line_of("maturin-extra\n#maturin\n", "matur").is_err());
+    }
 }

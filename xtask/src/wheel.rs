@@ -1,4 +1,4 @@
-//! Wheel of the Python package, built by maturin in the environment of the tests.
+//! Wheel of the Python package, built by maturin.
 
 use crate::machine;
 use crate::process::{root, run};
@@ -11,7 +11,7 @@ const FOLDER: &str = "target/wheels";
 /// Build the wheel, in release, with what other builds have left in `target`; print its path and size.
 pub fn build() -> Result<PathBuf, String> {
     machine::need_c_compiler()?;
-    let python = machine::need_python()?;
+    let python = machine::need_maturin()?;
     // Wheels of other versions would be installed in its place.
     let folder = root().join(FOLDER);
     let _ = std::fs::remove_dir_all(&folder);
@@ -27,8 +27,9 @@ pub fn build() -> Result<PathBuf, String> {
 
 /// Build the wheel and install it into the environment of the tests.
 pub fn install() -> Result<(), String> {
-    let wheel = build()?;
+    // It has maturin, too.
     let python = machine::need_python()?;
+    let wheel = build()?;
     let options = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
     run(Command::new(python).args(options).arg(wheel))
 }

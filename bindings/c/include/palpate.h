@@ -295,7 +295,9 @@ PalpateStatus palpate_state_set_position(PalpateState *state,
 // state is a state or null.
 PalpateStatus palpate_state_set_force(PalpateState *state, size_t device, PalpateVector force);
 
-// Set mode, position, point and force of a device.
+// Set mode, position, point and force of a device. Of an object on a recorded table it loads what another mode or point needs: it may read a
+// file then, so call it between runs or in another thread than that of a device; with mode and point as before it costs as much as
+// palpate_state_set_position.
 //
 // state is a state or null; input can be read; error can be written, or is null.
 PalpateStatus palpate_state_set_device(PalpateState *state,

@@ -71,7 +71,17 @@ pub unsafe extern "C" fn palpate_state_set_force(state: *mut State, device: usiz
     }
 }
 
-/// Set mode, position, point and force of a device.
+/// Whether a mode needs more of the model than another one: another point, or a tip that another mode is not.
+fn acts_elsewhere(before: &DeviceMode, mode: &DeviceMode) -> bool {
+    match (before, mode) {
+        (DeviceMode::Force(before), DeviceMode::Force(now)) => before.grasp != now.grasp,
+        _ => before != mode,
+    }
+}
+
+/// Set mode, position, point and force of a device. Of an object on a recorded table it loads what another mode or point needs: it may read a
+/// file then, so call it between runs or in another thread than that of a device; with mode and point as before it costs as much as
+/// [`palpate_state_set_position`].
 ///
 /// # Safety
 /// `state` is a state or null; `input` can be read; `error` can be written, or is null.
@@ -88,10 +98,8 @@ pub unsafe extern "C" fn palpate_state_set_device(
         change(state, error, |state| {
             let input = input.ok_or_else(|| Failure::argument("input is null"))?;
             let input = input.checked()?;
-            match input.mode {
-                DeviceMode::Held(grasp) => state.scene.model().check_grasp(&grasp)?,
-                DeviceMode::Force(applied) => state.scene.model().check_grasp(&applied.grasp)?,
-                DeviceMode::Inactive | DeviceMode::Touch | DeviceMode::Suspended => {}
+            if acts_elsewhere(&state.device_input(device)?.mode, &input.mode) {
+                state.scene.scene.prepare_device(device, &input.mode)?;
             }
             state.set_device_input(device, input)
         })

@@ -5,7 +5,7 @@ use crate::error::{Error, Failure, Status, checked, put};
 use crate::scene::{Loaded, Scene, no_part};
 use crate::types::{SurfacePoint, Vector};
 use glam::DVec3;
-use palpate::{DeviceInput, Grasp, Input, ResidualFieldCache, step};
+use palpate::{DeviceInput, Grasp, Input, ModelError, ResidualFieldCache, step};
 use std::ptr;
 use std::sync::Arc;
 
@@ -94,7 +94,11 @@ impl State {
     /// A point in the present placement and deformation of its object [m, world].
     fn position(&self, grasp: &Grasp) -> Result<DVec3, Failure> {
         let surface = self.scene.surface(grasp.object)?;
-        self.scene.model().check_grasp(grasp)?;
+        if !surface.contains(&grasp.point) {
+            let (object, triangle) = (grasp.object, grasp.point.triangle);
+            let error = Box::new(ModelError::NoSuchPoint { triangle });
+            return Err(palpate::Error::from(ModelError::Object { object, error }).into());
+        }
         let pose = self.state.output().objects[grasp.object].pose;
         let displacement = self.state.point_displacement(self.scene.model(), grasp.object, &grasp.point);
         Ok(pose.world_from_body(surface.rest_position(&grasp.point) + displacement))

@@ -185,7 +185,7 @@ load: 0 \nnew: 0 \nnames: cube finger floor 1 -1
 parts of kind 7: 0
 input: 0 \nbegins in mode 2\nforce: 1 \ndevice 5: 1 \nmode 77: 1 there is no mode of a device of number 77
 object 3: 13 object 3: there is no point in triangle 0 with such weights where a force may enter
-triangle 1000000: 13 object 0: there is no point in triangle 1000000 with such weights where a force may enter
+triangle 1000000: 13 object \"cube\": there is no point in triangle 1000000 with such weights where a force may enter
 obstacle 9: 1 \nnan: 0 \nstep: 0 \nrejected: 1
 no state: 1 \nsurface: 1 \nsurface of 4: 1 \nnowhere: 1 \nnearest: 0 \nposition: 0 \nheld: 0 \ncopy: 0 \npulled: 1, alike: 1, time: 0.022
 obstacles: 1, pressed: 1, by its contacts: 1

@@ -7,12 +7,14 @@ forces of the last step; implicit coupling solves x = F(p'(x)) + d.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate._arguments import flags, numbers, positive, whole
 from palpate._errors import InputError
 from palpate._interface import Interface
 from palpate._palpate import Simulation, Snapshot
@@ -33,7 +35,8 @@ class RigidCoupling:
     objects : iterable of Object
         Elastic bodies.
     shapes : sequence of sequences of Obstacle and Plane
-        Shapes of each rigid body; their positions, orientations, points and normals are in the body's frame.
+        Shapes of each rigid body; their positions, orientations, points and normals are in the body's frame. Names are kept; those without one
+        are "shape0", "shape1" and so on.
     poses : (N, 7) array_like
         Poses of the bodies at the start: x, y, z [m], qw, qx, qy, qz.
     step : float
@@ -88,15 +91,14 @@ class RigidCoupling:
         tolerance: float = 1e-3,
         **options: Any,
     ) -> None:
-        count = len(shapes)
+        count = _check_shapes(shapes)
+        self.step = positive(step, "step", " of seconds")
         if substeps is None:
-            substeps = max(1, int(np.ceil(step / 1e-3 - 1e-6)))
-        if substeps < 1 or iterations < 1:
-            raise InputError(f"substeps is {substeps} and iterations {iterations}, expected 1 or more")
-        self.step, self.substeps = float(step), int(substeps)
-        self._centers = _rows(np.zeros((count, 3)) if centers is None else centers, "centers", count, 3)
-        self._moving = np.ones(count, bool) if moving is None else np.asarray(moving, bool).reshape(count)
-        self._poses = _rows(poses, "poses", count, 7)
+            substeps = max(1, int(np.ceil(self.step / 1e-3 - 1e-6)))
+        self.substeps = whole(substeps, "substeps")
+        self._centers = np.zeros((count, 3)) if centers is None else numbers(centers, "centers", (count, 3))
+        self._moving = np.ones(count, bool) if moving is None else flags(moving, "moving", count)
+        self._poses = numbers(poses, "poses", (count, 7))
         scene = self._scene(objects, shapes, options)
         self.simulation = Simulation(scene)
         self._start = self.simulation.snapshot()
@@ -104,24 +106,27 @@ class RigidCoupling:
         size = max((float(np.ptp(scene.rest_positions(name), axis=0).max()) for name in scene.object_names), default=1.0)
         #: Unknowns of the interface: forces [N], and torques as forces at the size of the objects.
         self._scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
-        self._interface = Interface(iterations, tolerance)
+        self._interface = Interface(whole(iterations, "iterations"), positive(tolerance, "tolerance"))
         self.reset(poses)
 
     def _scene(self, objects: Iterable[Object | Mapping[str, Any]], shapes: Sequence[Sequence[Obstacle | Plane]], options: dict[str, Any]) -> Scene:
         """Scene whose obstacles are the shapes at their start; planes come first, as in its rows of obstacles."""
         rows: tuple[list[tuple[int, int, Any]], list[tuple[int, int, Any]]] = ([], [])
-        numbers = iter(range(sum(map(len, shapes))))
+        number = itertools.count()
         for body, own in enumerate(shapes):
             for shape in own:
-                rows[0 if isinstance(shape, Plane) else 1].append((next(numbers), body, shape))
+                rows[0 if isinstance(shape, Plane) else 1].append((next(number), body, shape))
         ordered = rows[0] + rows[1]
         self._shape_body = np.array([body for _, body, _ in ordered], dtype=int)
         self._shape_number = np.array([number for number, _, _ in ordered], dtype=int)
         self._body_of_shape = self._shape_body[np.argsort(self._shape_number)]
         self._local = np.array([_local_pose(shape) for _, _, shape in ordered]).reshape(len(ordered), 7)
         start = self._shape_poses(self._poses)
+        if isinstance(objects, Iterable) and not isinstance(objects, (str, Mapping)):
+            objects = list(objects)
+        names_of_shapes = _names([shape for own in shapes for shape in own], objects)
         placed = [
-            replace(shape, name=f"shape{number}", path=np.concatenate([[0], pose])[None], **_UNPLACED[type(shape)])
+            replace(shape, name=names_of_shapes[number], path=np.concatenate([[0], pose])[None], **_UNPLACED[type(shape)])
             for (number, _, shape), pose in zip(ordered, start)
         ]
         names = np.array([shape.name for shape in placed])
@@ -137,7 +142,7 @@ class RigidCoupling:
         """Go back to the start, with the bodies at other poses."""
         count = len(self._centers)
         self.simulation.restore(self._start)
-        self._poses = _rows(poses, "poses", count, 7)
+        self._poses = numbers(poses, "poses", (count, 7))
         self._interface.forget()
         self._owed = np.zeros((count, 6))  # N and N·m about the world's origin, over a step
         self._spatial = np.zeros((count, 6))
@@ -181,7 +186,7 @@ class RigidCoupling:
             Mean wrenches on the bodies, (N, 6): force [N] and torque [N·m] about the centres of mass at the end of the step. An engine that applies them
             in its next step is coupled staggered.
         """
-        end = _rows(poses, "poses", len(self._centers), 7)
+        end = numbers(poses, "poses", (len(self._centers), 7))
         self._spatial = self._press(end)
         self._poses = end
         self.work += self._step_work
@@ -216,7 +221,7 @@ class RigidCoupling:
             is_first = False
             applied = np.zeros_like(owed)
             applied[self._moving] = x.reshape(-1, 6) / self._scale
-            end = _rows(move(applied), "poses", len(owed), 7)
+            end = numbers(move(applied), "what move returns", (len(owed), 7))
             self._spatial = self._press(end)
             answer = ((about(self._spatial, centers) + owed)[self._moving] * self._scale).ravel()
             return answer - x, max(float(np.abs(answer).max(initial=0)), _NOTHING)
@@ -275,11 +280,44 @@ class RigidCoupling:
 #: Force [N] below which residuals do not count.
 _NOTHING = 1e-6
 
+#: Deviation of a quaternion's length from 1 that is round-off.
+_UNIT = 1e-3
+
 #: Keys of a shape that its pose replaces.
 _UNPLACED: dict[type, dict[str, Any]] = {
     Plane: {"point": None, "normal": [0, 0, 1]},
     Obstacle: {"position": None, "orientation": None},
 }
+
+
+def _names(shapes: Sequence[Obstacle | Plane], objects: Any) -> list[str]:
+    """Names of the shapes: their own, and "shape0" and so on for those without one."""
+    parts = [*shapes, *(objects if isinstance(objects, list) else [])]
+    own = [part.get("name") if isinstance(part, Mapping) else getattr(part, "name", None) for part in parts]
+    taken = {name for name in own if isinstance(name, str)}
+    names = []
+    for number, shape in enumerate(shapes):
+        name = f"shape{number}" if shape.name is None else shape.name
+        while shape.name is None and name in taken:
+            name += "_"
+        names.append(name)
+    return names
+
+
+def _check_shapes(shapes: Sequence[Sequence[Obstacle | Plane]]) -> int:
+    """Check the lists of shapes; returns the number of bodies."""
+    what = "expected a list for each body, of palpate.Obstacle and palpate.Plane"
+    if isinstance(shapes, str) or not isinstance(shapes, Sequence):
+        raise InputError(f"shapes is {shapes!r}, {what}")
+    for body, own in enumerate(shapes):
+        if isinstance(own, str) or not isinstance(own, Sequence):
+            raise InputError(f"the shapes of body {body} are {own!r}, {what}")
+        for shape in own:
+            if not isinstance(shape, (Obstacle, Plane)):
+                raise InputError(f"body {body} has the shape {shape!r}, {what}")
+            if shape.name is not None and not isinstance(shape.name, str):
+                raise InputError(f"a shape of body {body} has the name {shape.name!r}, expected text")
+    return len(shapes)
 
 
 def about(wrenches: Array, points: Array) -> Array:
@@ -291,23 +329,20 @@ def about(wrenches: Array, points: Array) -> Array:
 def _local_pose(shape: Obstacle | Plane) -> Array:
     """Pose of a shape in its body's frame; planes are turned from their normal to z."""
     if isinstance(shape, Obstacle):
-        position = np.zeros(3) if shape.position is None else shape.position
-        orientation = IDENTITY[3:] if shape.orientation is None else shape.orientation
-        return np.concatenate([np.asarray(position, float), np.asarray(orientation, float)])
-    normal = np.asarray(shape.normal, float)
-    normal = normal / np.linalg.norm(normal)
+        position = np.zeros(3) if shape.position is None else numbers(shape.position, "position", (3,))
+        orientation = IDENTITY[3:] if shape.orientation is None else numbers(shape.orientation, "orientation", (4,))
+        length = float(np.linalg.norm(orientation))
+        if abs(length - 1) > _UNIT:
+            raise InputError(f"the orientation {orientation.tolist()} has the length {length:.6g}, expected a quaternion w, x, y, z of length 1")
+        return np.concatenate([position, orientation / length])
+    normal = numbers(shape.normal, "normal", (3,))
+    length = float(np.linalg.norm(normal))
+    if not 0 < length < np.inf:
+        raise InputError(f"the normal {normal.tolist()} has the length {length}, expected a direction")
+    normal = normal / length
     # The half-way turn from z to the normal; any axis across, if they are opposite.
     half = np.array([1 + normal[2], -normal[1], normal[0], 0]) if normal[2] > -1 + 1e-12 else np.array([0, 1.0, 0, 0])
     half = half / np.linalg.norm(half)
     assert np.allclose(rotated(half, np.array([0, 0, 1.0])), normal)
-    point = np.zeros(3) if shape.point is None else np.asarray(shape.point, float)
+    point = np.zeros(3) if shape.point is None else numbers(shape.point, "point", (3,))
     return np.concatenate([point, half])
-
-
-def _rows(given: ArrayLike, name: str, count: int, columns: int) -> Array:
-    rows = np.array(given, dtype=float)
-    if rows.shape != (count, columns):
-        raise InputError(f"{name} has the shape {rows.shape}, expected ({count}, {columns})")
-    if not np.isfinite(rows).all():
-        raise InputError(f"{name} has numbers that are not finite: {rows.tolist()}")
-    return rows

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import warnings
 from typing import Any
 
 __all__ = [
@@ -105,3 +107,16 @@ class FileError(PalpateError, OSError):
 
 class PalpateWarning(UserWarning):
     """What a scene or a recording can do, but its author hardly means."""
+
+
+def warn(message: str) -> None:
+    """Warn at the line that called the package, however deep in it the reason is."""
+    try:
+        frame, level = sys._getframe(1), 2
+    except ValueError:
+        # A thread of the extension module has no line of Python.
+        warnings.warn(message, PalpateWarning, stacklevel=1)
+        return
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == "palpate":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, PalpateWarning, stacklevel=level)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Union
 
 import mujoco  # type: ignore[import-untyped, import-not-found, unused-ignore]
 import numpy as np
 
-from palpate._errors import InputError, PalpateWarning
+from palpate._errors import InputError, warn
 from palpate._mujoco_shapes import CAN_PRESS, name_of
 from palpate._palpate import Recording, Simulation
 from palpate._scene import Object
@@ -30,24 +29,30 @@ def chosen_geoms(model: Any, geoms: Iterable[Union[str, int]] | None) -> list[in
     if isinstance(geoms, str):
         raise InputError(f"geoms is {geoms!r}, expected a list of names")
     if geoms is not None:
-        try:
-            return sorted({int(model.geom(geom).id) for geom in geoms})
-        except (KeyError, IndexError) as error:
-            raise InputError(f"geoms: {error.args[0]}") from None
+        if not isinstance(geoms, Iterable):
+            raise InputError(f"geoms is {geoms!r}, expected a list of names or numbers")
+        return sorted({number_of(model.geom, "geoms", geom) for geom in geoms})
     all_geoms = [geom for geom in range(model.ngeom) if model.geom_contype[geom] or model.geom_conaffinity[geom]]
     chosen = [geom for geom in all_geoms if mujoco.mjtGeom(int(model.geom_type[geom])) in CAN_PRESS]
     if len(chosen) < len(all_geoms):
         names = ", ".join(name_of(model, geom) for geom in all_geoms if geom not in chosen)
-        warnings.warn(f"height fields and signed distance fields do not meet soft bodies: {names}", PalpateWarning, stacklevel=4)
+        warn(f"height fields and signed distance fields do not meet soft bodies: {names}")
     return chosen
+
+
+def number_of(find: Callable[[Any], Any], kind: str, given: Any) -> int:
+    """Number of a part of the model by its name or number; `find` is the model's own function."""
+    try:
+        return int(find(given).id)
+    except (KeyError, IndexError) as error:
+        raise InputError(f"{kind}: {error.args[0]}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{kind}: there is no {given!r}, expected a name or a number") from None
 
 
 def user_sensor(model: Any, name: str) -> tuple[int, int, Any, int]:
     """Address, extent, type of object and number of object of a user sensor."""
-    try:
-        sensor = model.sensor(name).id
-    except KeyError as error:
-        raise InputError(f"sensors: {error.args[0]}") from None
+    sensor = number_of(model.sensor, "sensors", name)
     kind, extent = mujoco.mjtObj(int(model.sensor_objtype[sensor])), int(model.sensor_dim[sensor])
     objects = (mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_XBODY, mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SITE)
     extents = (1, 3) if kind == mujoco.mjtObj.mjOBJ_GEOM else (1, 3, 6)

@@ -302,14 +302,18 @@ class Scene(_palpate.Scene):
         reference : bool
             Every surface node as a contact, and no object asleep: slow, to compare with.
         """
+        # A number would be taken for an open file.
+        path = os.fsdecode(path)
         try:
             with open(path, encoding="utf-8") as file:
                 text = file.read()
         except OSError as error:
-            message = f"cannot read the scene {os.fspath(path)}: {error.strerror}"
+            message = f"cannot read the scene {path}: {error.strerror}"
             raise FileError(message, file=path, errno=error.errno) from None
         except UnicodeDecodeError:
-            raise SceneError(f"{os.fspath(path)}: it is not a text file; a scene is TOML", kind="syntax", file=path) from None
+            raise SceneError(f"{path}: it is not a text file; a scene is TOML", kind="syntax", file=path) from None
+        except ValueError as error:
+            raise InputError(f"the path {path!a} is not one of a file: {error}") from None
         return cls._read(text, path, {}, {}, reference)
 
     @classmethod
@@ -391,7 +395,8 @@ def _keys(part: Any, kind: Any, number: int, texts: Texts) -> dict[str, Any]:
         keys = {field.name: getattr(part, field.name) for field in fields(kind)}
     else:
         raise InputError(f"{header}s has {part!r}, expected palpate.{kind.__name__}")
-    name = f"{header} {keys.get('name') or number}"
+    own = keys.get("name")
+    name = f"{header} {own if isinstance(own, str) and own else number}"
     if keys.get("path") is not None:
         keys["path"] = texts.path(keys["path"], name)
     if isinstance(keys.get("recording"), _palpate.Recording):

@@ -48,7 +48,10 @@ def _csv(rows: Any, part: str) -> str:
     import numpy as np
 
     try:
-        numbers = np.asarray(rows, dtype=float)
+        given = np.asarray(rows)
+        if given.dtype.kind == "c":
+            raise TypeError("its numbers are complex")
+        numbers = given.astype(float)
     except (TypeError, ValueError) as error:
         raise InputError(f"the path of {part} is no file and no array of numbers: {error}") from None
     if numbers.ndim != 2:
@@ -78,6 +81,11 @@ def _key(key: str) -> str:
 
 
 def _text(text: str) -> str:
+    if not text.isascii():
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise InputError(f"{text!a} has characters that no text has (half of a surrogate pair)") from None
     # Strings of JSON are strings of TOML, but for one character.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import tempfile
-import warnings
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Union
 
@@ -30,7 +29,7 @@ except ModuleNotFoundError as error:
 
 from palpate import _mujoco_parts, _mujoco_shapes
 from palpate._coupling import RigidCoupling
-from palpate._errors import InputError, PalpateWarning
+from palpate._errors import InputError, warn
 from palpate._palpate import Recording, Simulation
 from palpate._scene import Object
 
@@ -218,11 +217,9 @@ class SoftBody:
         self._exchanged = keep * self._exchanged + (abs(on_soft) + abs(on_rigid)) / 2
         if not self._warned and self._made > _NOTHING + _SUSPECT * self._exchanged:
             self._warned = True
-            warnings.warn(
+            warn(
                 f"the coupling with MuJoCo makes energy, {self._made:.2g} J of {self._exchanged:.2g} J exchanged in some steps before {data.time:.3f} s: a body is light "
-                "for the contact and the step; take a shorter timestep, more iterations, or armature at its joints",
-                PalpateWarning,
-                stacklevel=4,
+                "for the contact and the step; take a shorter timestep, more iterations, or armature at its joints"
             )
 
     @property
@@ -270,13 +267,13 @@ class SoftBody:
         return float(self.coupling.pressing_forces[self._geom_row(geom)])
 
     def _geom_row(self, geom: str | int) -> int:
-        number = self.model.geom(geom).id
+        number = _mujoco_parts.number_of(self.model.geom, "geom", geom)
         if number not in self._geoms:
             raise InputError(f"geom {geom!r} is not coupled: name it in geoms")
         return self._geoms.index(number)
 
     def _body_row(self, body: str | int | None) -> int:
-        number = self.model.body(body).id
+        number = _mujoco_parts.number_of(self.model.body, "body", body)
         if number not in self._bodies:
             raise InputError(f"body {body!r} has no coupled geom: name one in geoms")
         return int(np.searchsorted(self._bodies, number))

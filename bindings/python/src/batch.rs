@@ -12,6 +12,7 @@ use crate::device_mode::ModeChange;
 use crate::errors::{catch_panic, input_error, internal_error, lock_at_once};
 use crate::motion::{Arguments, check_devices};
 use crate::run_state::{RunState, held_points};
+use crate::scalars::Whole;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
@@ -105,14 +106,15 @@ impl Batch {
 impl Batch {
     #[new]
     #[pyo3(signature = (scene, n, threads=None))]
-    fn new(py: Python<'_>, scene: Py<Scene>, n: i64, threads: Option<i64>) -> PyResult<Self> {
+    fn new(py: Python<'_>, scene: Py<Scene>, n: Whole, threads: Option<Whole>) -> PyResult<Self> {
         let inner = Arc::clone(&scene.get().inner);
         check_devices(py, &inner)?;
+        let Whole(n) = n;
         if !(1..=MAX_ROWS).contains(&n) {
             return Err(input_error(py, format!("n is {n}, expected 1 to {MAX_ROWS}")));
         }
         let cores = || std::thread::available_parallelism().map_or(1, usize::from) as i64;
-        let threads = threads.unwrap_or_else(cores);
+        let threads = threads.map_or_else(cores, |Whole(threads)| threads);
         if !(1..=MAX_THREADS).contains(&threads) {
             return Err(input_error(py, format!("threads is {threads}, expected 1 to {MAX_THREADS}")));
         }
@@ -224,13 +226,14 @@ impl Batch {
         &self,
         py: Python<'py>,
         positions: Option<&Bound<'py, PyAny>>,
-        steps: Option<i64>,
+        steps: Option<Whole>,
         obstacles: Option<&Bound<'py, PyAny>>,
         clamps: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut motion = BatchMotion::new(&self.inner, self.len);
         motion.read(py, &self.inner, true, &Arguments { positions, obstacles, clamps })?;
-        let count = motion.count_steps(steps).map_err(|text| input_error(py, text))?;
+        let count =
+            motion.count_steps(steps.map(|Whole(steps)| steps)).map_err(|text| input_error(py, text))?;
         let mut guard = self.lock(py)?;
         let Rows { rows, outputs, workers, .. } = &mut *guard;
         let mut series = BatchSeries::new(self.len, count, self.outputs.row_length())
@@ -335,7 +338,8 @@ impl Batch {
     /// Parameters
     /// ----------
     /// row : int
-    fn simulation(&self, py: Python<'_>, row: i64) -> PyResult<Simulation> {
+    fn simulation(&self, py: Python<'_>, row: Whole) -> PyResult<Simulation> {
+        let Whole(row) = row;
         let at = usize::try_from(row).ok().filter(|at| *at < self.len);
         let at =
             at.ok_or_else(|| input_error(py, format!("row is {row}, expected 0 to {}", self.len - 1)))?;
@@ -436,7 +440,7 @@ impl Batch {
         py: Python<'_>,
         device: &Bound<'_, PyAny>,
         object: &Bound<'_, PyAny>,
-        point: [f64; 3],
+        point: &Bound<'_, PyAny>,
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::grasp(&self.inner, device, object, point)?;

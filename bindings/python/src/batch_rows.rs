@@ -80,7 +80,9 @@ pub fn chosen_rows(len: usize, rows: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<
     let Some(rows) = rows else { return Ok((0..len).collect()) };
     let py = rows.py();
     let numpy = py.import("numpy")?;
-    let given = numpy.call_method1("atleast_1d", (rows,))?;
+    let given = numpy
+        .call_method1("atleast_1d", (rows,))
+        .map_err(|error| input_error(py, format!("rows is no array ({})", error.value(py))))?;
     let kind: String = given.getattr("dtype")?.getattr("kind")?.extract()?;
     let shape: Vec<usize> = given.getattr("shape")?.extract()?;
     let is_mask = kind == "b" && shape == [len];

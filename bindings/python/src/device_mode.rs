@@ -1,10 +1,12 @@
 //! Modes of devices that the caller changes between steps: hands that take hold of a point, let go, or leave.
 
-use crate::errors::input_error;
+use crate::arrays::Numbers;
+use crate::errors::{catch_panic, input_error, internal_error, scene_error};
 use crate::run_state::RunState;
 use crate::scene::Scene;
 use glam::DVec3;
 use palpate::{DeviceMode, Grasp};
+use palpate_scene::SceneErrorKind;
 use pyo3::prelude::*;
 
 /// Distance of a grasped point from the surface that is allowed, as a share of the diagonal: as in scene files.
@@ -23,12 +25,12 @@ impl ModeChange {
         scene: &palpate_scene::Scene,
         device: &Bound<'_, PyAny>,
         object: &Bound<'_, PyAny>,
-        point: [f64; 3],
+        point: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let py = device.py();
         let (number, at) = (Scene::device(scene, device)?, Scene::object(scene, object)?);
         let name = &scene.object_names[at];
-        let point = DVec3::from_array(point);
+        let point = DVec3::from_slice(Numbers::read(point, "point", &[Some(3)])?.as_slice()?);
         if !point.is_finite() {
             return Err(input_error(py, format!("point is {point}, expected finite numbers")));
         }
@@ -46,23 +48,28 @@ impl ModeChange {
             return Err(input_error(py, message));
         }
         let grasp = Grasp { object: at, point: found };
-        scene.model.check_grasp(&grasp).map_err(|error| {
-            input_error(py, format!("the point {point} of {name:?} cannot be held: {error}"))
-        })?;
-        Self::of(scene, py, number, DeviceMode::Held(grasp))
+        let refused = format!("the point {point} of {name:?} cannot be held: ");
+        Self::of(scene, py, number, DeviceMode::Held(grasp), &refused)
     }
 
     /// Device that lets go, and touches with its tip from now on.
     pub fn release(scene: &palpate_scene::Scene, device: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::of(scene, device.py(), Scene::device(scene, device)?, DeviceMode::Touch)
+        Self::of(scene, device.py(), Scene::device(scene, device)?, DeviceMode::Touch, "")
     }
 
     /// Device that takes no part from now on.
     pub fn deactivate(scene: &palpate_scene::Scene, device: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::of(scene, device.py(), Scene::device(scene, device)?, DeviceMode::Inactive)
+        Self::of(scene, device.py(), Scene::device(scene, device)?, DeviceMode::Inactive, "")
     }
 
-    fn of(scene: &palpate_scene::Scene, py: Python<'_>, device: usize, mode: DeviceMode) -> PyResult<Self> {
+    /// Mode that is checked, and whose tables are loaded; `refused` stands before the reason of a refusal.
+    fn of(
+        scene: &palpate_scene::Scene,
+        py: Python<'_>,
+        device: usize,
+        mode: DeviceMode,
+        refused: &str,
+    ) -> PyResult<Self> {
         let own = &scene.devices[device];
         let is_course = matches!(own.mode, DeviceMode::Force(_)) && own.path.is_some();
         if is_course && mode != DeviceMode::Inactive {
@@ -72,7 +79,17 @@ impl ModeChange {
             );
             return Err(input_error(py, message));
         }
-        Ok(Self { device, mode })
+        match py.detach(|| catch_panic(|| scene.prepare_device(device, &mode))) {
+            Ok(Ok(())) => Ok(Self { device, mode }),
+            Ok(Err(error)) if error.kind == SceneErrorKind::Grasp => {
+                Err(input_error(py, format!("{refused}{error}")))
+            }
+            Ok(Err(mut error)) => {
+                error.message.insert_str(0, refused);
+                Err(scene_error(py, &error))
+            }
+            Err(panic) => Err(internal_error(py, &panic)),
+        }
     }
 
     /// Change the mode from the next step on.

@@ -2,6 +2,7 @@
 
 use crate::arrays::{array, pose_row, read_only, twist_row};
 use crate::errors::{Class, catch_panic, exception, file_error, internal_error};
+use crate::scalars::FilePath;
 use numpy::PyArray1;
 use palpate::EnergyLedger;
 use palpate_haptics::log::{LogReader, LoggedStep};
@@ -144,10 +145,16 @@ fn read(path: &Path) -> Result<Content, ReadError> {
     Ok(content)
 }
 
+/// Log in the form of another package, by a function of `palpate._log_frames`.
+fn frame_of(log: &Bound<'_, Log>, function: &str) -> PyResult<Py<PyAny>> {
+    Ok(log.py().import("palpate._log_frames")?.call_method1(function, (log,))?.unbind())
+}
+
 #[pymethods]
 impl Log {
     #[new]
-    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    fn new(py: Python<'_>, path: FilePath) -> PyResult<Self> {
+        let FilePath(path) = path;
         let content = py.detach(|| catch_panic(|| read(&path)));
         let content = content.map_err(|text| internal_error(py, &text))?;
         let content = content.map_err(|error| match error {
@@ -180,6 +187,39 @@ impl Log {
             compute_time: numbers(content.compute_time)?,
             path,
         })
+    }
+
+    /// Steps as a table of pandas, a row for each, by their times.
+    ///
+    /// Returns
+    /// -------
+    /// pandas.DataFrame
+    ///     The columns of `palpate run --csv` that a log has, `finger.fx` or `cube.px`, then `energy.NAME`, `lateness` and `compute_time`; the index is
+    ///     `time` [s]. `attrs["units"]` has the unit of each column. Devices and objects that a step lacks are NaN.
+    ///
+    /// Raises
+    /// ------
+    /// ModuleNotFoundError
+    ///     Without pandas: `pip install pandas`.
+    fn to_pandas(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        frame_of(slf, "to_pandas")
+    }
+
+    /// Steps as a data set of xarray, with units, by time, name and axis.
+    ///
+    /// Returns
+    /// -------
+    /// xarray.Dataset
+    ///     `position`, `force` and `proxy` (time, device, axis); `object_position`, `velocity`, `angular_velocity` (time, object, axis) and
+    ///     `orientation` (time, object, quaternion) with components w, x, y, z; `energy` (time, term); `lateness`, `compute_time` (time). Each has its
+    ///     unit in `attrs["units"]`; those of the set are the log's metadata. Devices and objects that a step lacks are NaN.
+    ///
+    /// Raises
+    /// ------
+    /// ModuleNotFoundError
+    ///     Without xarray: `pip install xarray`.
+    fn to_xarray(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        frame_of(slf, "to_xarray")
     }
 
     /// Names of the devices, in alphabetical order.

@@ -1,5 +1,6 @@
 //! Progress of a recording: calls of a Python function, warnings, and KeyboardInterrupt.
 
+use crate::keywords::keywords_in;
 use palpate_fem::Progress;
 use pyo3::prelude::*;
 use std::cell::{Cell, RefCell};
@@ -71,7 +72,7 @@ impl Progress for PythonProgress {
     }
 
     fn warn(&mut self, text: &str) {
-        self.keep(Python::attach(|py| warn(py, text, 1)));
+        self.keep(Python::attach(|py| warn(py, &keywords_in(text))));
     }
 
     fn is_interrupted(&self) -> bool {
@@ -83,9 +84,8 @@ impl Progress for PythonProgress {
     }
 }
 
-/// Warn through Python's warnings, at the line that is `level` frames of Python above.
-pub fn warn(py: Python<'_>, text: &str, level: i32) -> PyResult<()> {
-    let class = py.import("palpate._errors")?.getattr("PalpateWarning")?;
-    py.import("warnings")?.call_method1("warn", (text, class, level))?;
+/// Warn through Python's warnings, at the line that called the package.
+pub fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    py.import("palpate._errors")?.call_method1("warn", (text,))?;
     Ok(())
 }

@@ -2,8 +2,10 @@
 
 use crate::arrays::{Numbers, check_finite, read_integers};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
+use crate::keywords::keywords_in;
 use crate::progress::PythonProgress;
 use crate::recording::Recording;
+use crate::scalars::{Text, Whole};
 use crate::workers::{Workers, no_threads};
 use glam::DVec3;
 use palpate::{Damping, Material};
@@ -25,22 +27,6 @@ enum Source {
 
 /// Process that recorded first: the threads of the numerics live in it.
 static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
-
-/// Keywords whose options of the command line stand in messages.
-const KEYWORDS: [&str; 12] = [
-    "young",
-    "poisson",
-    "density",
-    "material",
-    "modes",
-    "order",
-    "scale",
-    "cell_size",
-    "fix",
-    "spring",
-    "merge_nodes",
-    "piece",
-];
 
 /// Recording of a mesh by finite elements, with the options of `palpate record` (docs/recording.md).
 ///
@@ -104,14 +90,14 @@ pub fn record(
     young: Option<f64>,
     poisson: Option<f64>,
     density: Option<f64>,
-    material: Option<&str>,
+    material: Option<Text>,
     materials: Option<&Bound<'_, PyAny>>,
-    rayleigh: Option<[f64; 2]>,
+    rayleigh: Option<&Bound<'_, PyAny>>,
     damping_ratio: Option<f64>,
-    modes: i64,
+    #[pyo3(from_py_with = Whole::number_of)] modes: i64,
     force_error: Option<f64>,
     bandwidth: Option<f64>,
-    order: i64,
+    #[pyo3(from_py_with = Whole::number_of)] order: i64,
     scale: f64,
     cell_size: Option<f64>,
     fix: Option<&Bound<'_, PyAny>>,
@@ -123,9 +109,10 @@ pub fn record(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Recording> {
     let refused = |message: String| input_error(py, message);
+    let material = material.as_ref().map(|Text(name)| name.as_str());
     let damping = match (rayleigh, damping_ratio) {
         (Some(_), Some(_)) => return Err(refused("give rayleigh or damping_ratio, not both".into())),
-        (Some([alpha, beta]), None) => Some(Damping::Rayleigh { alpha, beta }),
+        (Some(given), None) => Some(read_rayleigh(given)?),
         (None, ratio) => ratio.map(Damping::Ratio),
     };
     let options = RecordOptions {
@@ -191,17 +178,9 @@ pub fn record(
     recorded.map(Recording::new).map_err(|error| scene_error(py, &with_keywords(error)))
 }
 
-/// Error whose message has keywords in place of options: `cell_size` for `--cell-size`.
+/// Error whose message has keywords in place of options.
 fn with_keywords(mut error: SceneError) -> SceneError {
-    // A path may have two hyphens inside.
-    let mut message = format!(" {}", error.message);
-    for keyword in KEYWORDS {
-        let option = format!("--{}", keyword.replace('_', "-"));
-        for before in [" ", "("] {
-            message = message.replace(&format!("{before}{option}"), &format!("{before}{keyword}"));
-        }
-    }
-    error.message = message.split_off(1);
+    error.message = keywords_in(&error.message);
     error
 }
 
@@ -236,6 +215,15 @@ fn read_materials(
     }
     let text = py.import("palpate._toml")?.call_method1("material_tables", (given,))?.extract()?;
     Ok(MaterialChoice::Text(text, "materials".into()))
+}
+
+/// Rayleigh's α [1/s] and β [s].
+fn read_rayleigh(given: &Bound<'_, PyAny>) -> PyResult<Damping> {
+    let numbers = Numbers::read(given, "rayleigh", &[Some(2)])?;
+    let &[alpha, beta] = numbers.as_slice()? else {
+        return Err(input_error(given.py(), "rayleigh is not two numbers"));
+    };
+    Ok(Damping::Rayleigh { alpha, beta })
 }
 
 /// Piece of a mesh: "largest", or its number.

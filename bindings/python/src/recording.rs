@@ -2,6 +2,7 @@
 
 use crate::arrays::{array, flat, read_only};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
+use crate::scalars::{FilePath, Whole};
 use numpy::{PyArray1, PyArrayMethods};
 use palpate::{Damping, Support};
 use palpate_export::write_atomically;
@@ -10,7 +11,6 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyBytes;
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Largest number of nodes whose residual compliance is given as one matrix: 1.2 GB.
@@ -69,7 +69,8 @@ impl Recording {
     /// RecordingError
     ///     If it is no recording, or damaged.
     #[staticmethod]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    fn open(py: Python<'_>, path: FilePath) -> PyResult<Self> {
+        let FilePath(path) = path;
         let read = py.detach(|| catch_panic(|| read_recording(&path)));
         let read = read.map_err(|text| internal_error(py, &text))?;
         read.map(Self::new).map_err(|error| scene_error(py, &error))
@@ -94,7 +95,8 @@ impl Recording {
     /// ----------
     /// path : str or path
     ///     File, usually `*.palp`.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn save(&self, py: Python<'_>, path: FilePath) -> PyResult<()> {
+        let FilePath(path) = path;
         let bytes = self.bytes(py)?;
         py.detach(|| write_atomically(&path, &bytes)).map_err(|error| scene_error(py, &error.into()))
     }
@@ -218,12 +220,13 @@ impl Recording {
     fn residual_compliance<'py>(
         &self,
         py: Python<'py>,
-        nodes: Option<Vec<i64>>,
+        nodes: Option<Vec<Whole>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let all = self.inner.surface.positions.len();
         let nodes: Vec<usize> = match nodes {
             None => (0..all).collect(),
             Some(nodes) => {
+                let nodes: Vec<i64> = nodes.into_iter().map(|Whole(node)| node).collect();
                 let known = |node: &i64| usize::try_from(*node).ok().filter(|node| *node < all);
                 let unknown = nodes.iter().find(|node| known(node).is_none());
                 if let Some(node) = unknown {

@@ -4,12 +4,12 @@ use crate::arrays::{array, flat};
 use crate::errors::{catch_panic, input_error, internal_error, kind_name, scene_error};
 use crate::progress::warn;
 use crate::recording::Recording;
+use crate::scalars::{FilePath, Text};
 use numpy::{PyArray1, PyArrayMethods};
 use palpate_scene::{PartsInMemory, RunMode, read_scene_text};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Scene that is ready to be simulated; immutable.
@@ -53,22 +53,24 @@ impl Scene {
     #[pyo3(signature = (text, path, recordings, paths, reference=false))]
     fn new(
         py: Python<'_>,
-        text: String,
-        path: PathBuf,
-        recordings: HashMap<PathBuf, Py<Recording>>,
-        paths: HashMap<PathBuf, String>,
+        text: Text,
+        path: FilePath,
+        recordings: HashMap<FilePath, Py<Recording>>,
+        paths: HashMap<FilePath, Text>,
         reference: bool,
     ) -> PyResult<Self> {
+        let (Text(text), FilePath(path)) = (text, path);
+        let recordings = recordings.into_iter();
         let recordings =
-            recordings.into_iter().map(|(name, own)| (name, Arc::clone(&own.get().inner))).collect();
+            recordings.map(|(FilePath(name), own)| (name, Arc::clone(&own.get().inner))).collect();
+        let paths = paths.into_iter().map(|(FilePath(name), Text(rows))| (name, rows)).collect();
         let parts = PartsInMemory { recordings, paths };
         let mode = if reference { RunMode::Reference } else { RunMode::Offline };
         let read = py.detach(|| catch_panic(|| read_scene_text(&path, &text, &parts, mode)));
         let read = read.map_err(|text| internal_error(py, &text))?;
         let inner = read.map_err(|error| scene_error(py, &error))?;
-        // Above: two functions of palpate.Scene, and its caller.
         for warning in &inner.warnings {
-            warn(py, &warning.to_string(), 3)?;
+            warn(py, &warning.to_string())?;
         }
         Ok(Self { inner: Arc::new(inner), text })
     }

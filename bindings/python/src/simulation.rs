@@ -10,6 +10,7 @@ use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
 use crate::readings::{energy_by_name, load_row, status_by_name, surface, write_forces};
 use crate::run_length::count_steps;
 use crate::run_state::{RunState, StepFailure, held_points, run_part};
+use crate::scalars::Whole;
 use crate::scene::Scene;
 use crate::series::Series;
 use crate::snapshot::Snapshot;
@@ -188,16 +189,20 @@ impl Simulation {
         &self,
         py: Python<'py>,
         positions: Option<&Bound<'py, PyAny>>,
-        steps: Option<i64>,
+        steps: Option<Whole>,
         duration: Option<f64>,
         obstacles: Option<&Bound<'py, PyAny>>,
         clamps: Option<&Bound<'py, PyAny>>,
         contacts: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let motion = SeriesMotion::read(py, &self.inner, &Arguments { positions, obstacles, clamps })?;
-        let count =
-            count_steps(&self.inner, self.lock(py)?.state.step_count(), motion.steps, (steps, duration))
-                .map_err(|text| input_error(py, text))?;
+        let count = count_steps(
+            &self.inner,
+            self.lock(py)?.state.step_count(),
+            motion.steps,
+            (steps.map(|Whole(steps)| steps), duration),
+        )
+        .map_err(|text| input_error(py, text))?;
         check_memory(count as f64 * Series::bytes_per_step(&self.inner)).map_err(|error| {
             input_error(py, format!("the series of {count} steps: {error}; run fewer at a time"))
         })?;
@@ -423,7 +428,7 @@ impl Simulation {
         py: Python<'_>,
         device: &Bound<'_, PyAny>,
         object: &Bound<'_, PyAny>,
-        point: [f64; 3],
+        point: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         self.change(py, ModeChange::grasp(&self.inner, device, object, point)?)
     }

@@ -180,6 +180,30 @@ def test_reset_begins_again_to_the_bit(cube):
     assert np.array_equal(ends[0], ends[1])
 
 
+def test_shapes_keep_the_names_that_they_have(cube):
+    jaw = palpate.Obstacle(name="jaw", sphere={"radius": RADIUS}, position=[0, 0.04, 0])
+    plain = palpate.Obstacle(sphere={"radius": RADIUS}, position=[0, -0.04, 0])
+    table = palpate.Plane(name="table", normal=[0, 0, 1])
+    shapes, poses = [[jaw, plain], [table], [plain]], [[0.081, 0, 0, 1, 0, 0, 0], [0, 0, -0.3, 1, 0, 0, 0], [-0.081, 0, 0, 1, 0, 0, 0]]
+    coupling = palpate.RigidCoupling([palpate.Object("shape3", cube)], shapes, poses, step=0.001)
+    # Planes come first; a name that an object has is not taken.
+    assert coupling.simulation.scene.obstacle_names == ["table", "jaw", "shape1", "shape3_"]
+    for _ in range(20):
+        poses[0][0], poses[2][0] = poses[0][0] - 1e-4, poses[2][0] + 1e-4
+        coupling.follow(poses)
+    found = {(str(own["against"]), int(own["body"]), int(own["shape"])) for own in coupling.contacts}
+    assert found == {("jaw", 0, 0), ("shape1", 0, 1), ("shape3_", 2, 3)}
+    with pytest.raises(palpate.SceneError, match='the name "jaw" is taken already'):
+        palpate.RigidCoupling([palpate.Object("cube", cube)], [[jaw, jaw]], poses[:1], step=0.001)
+
+
+def test_warnings_of_the_scene_point_to_the_line_of_the_coupling(cube):
+    deep = [[0.03, 0, 0, 1, 0, 0, 0]]
+    with pytest.warns(palpate.PalpateWarning, match="begins") as caught:
+        palpate.RigidCoupling([palpate.Object("cube", cube)], [[palpate.Obstacle(sphere={"radius": RADIUS})]], deep, step=0.001)
+    assert {warning.filename for warning in caught} == {__file__}
+
+
 def test_wrong_arguments_say_what_is_expected(cube):
     shapes, poses = [[palpate.Obstacle(sphere={"radius": RADIUS})]], [[0.1, 0, 0, 1, 0, 0, 0]]
     objects = [palpate.Object("cube", cube)]

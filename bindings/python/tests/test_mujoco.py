@@ -188,10 +188,24 @@ def test_the_examples_finger_presses_to_one_newton(monkeypatch):
 def test_energy_that_the_coupling_makes_is_warned_of(monkeypatch):
     gripper = example("mujoco_gripper", monkeypatch)
     _, data, soft = gripper.make(timestep=0.004, finger_mass=0.005, iterations=1)
-    with pytest.warns(palpate.PalpateWarning, match="the coupling with MuJoCo makes energy"):
+    with pytest.warns(palpate.PalpateWarning, match="the coupling with MuJoCo makes energy") as caught:
         while data.time < 0.6:
             gripper.command(data)
             soft.step()
+    assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_warnings_of_the_constructor_point_to_its_line(cube):
+    field = '<hfield name="hills" nrow="2" ncol="2" size="1 1 .1 .1" elevation="0 1 0 1"/>'
+    text = f'<mujoco><asset>{field}</asset><worldbody><geom type="hfield" hfield="hills" pos="0 0 -1"/>{BALL}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text.replace('pos="-0.085 0.01 0"', 'pos="-0.06 0 0"'))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with pytest.warns(palpate.PalpateWarning) as caught:
+        SoftBody(model, data, cube)
+    texts = [str(warning.message) for warning in caught]
+    assert any("height fields" in text for text in texts) and any("begins" in text for text in texts), texts
+    assert {warning.filename for warning in caught} == {__file__}
 
 
 def test_pictures_have_the_surface(cube):
@@ -217,6 +231,17 @@ def test_what_is_wrong_is_said(cube):
     soft = SoftBody(model, data, cube)
     with pytest.raises(palpate.InputError, match="body 'world' has no coupled geom"):
         soft.force("world")
+    for call, text in [
+        (lambda: soft.force("thumb"), "body: .*Invalid name 'thumb'"),
+        (lambda: soft.torque("thumb"), "body: .*Invalid name 'thumb'"),
+        (lambda: soft.force(geom="thumb"), "geom: .*Invalid name 'thumb'"),
+        (lambda: soft.pressing_force(99), "geom: "),
+        (lambda: soft.pressing_force(None), "geom: there is no None, expected a name or a number"),
+        (lambda: SoftBody(model, data, cube, geoms=3), "geoms is 3, expected a list"),
+        (lambda: SoftBody(model, data, cube, sensors=["none"]), "sensors: .*Invalid name 'none'"),
+    ]:
+        with pytest.raises(palpate.InputError, match=text):
+            call()
     mujoco.mj_step(model, data)
     with pytest.raises(palpate.InputError, match=r"call step\(\) instead of mj_step"):
         soft.step()

@@ -170,3 +170,20 @@ def test_a_forked_process_records_too():
     child.start()
     assert queue.get(timeout=120) == here
     child.join(timeout=60)
+
+
+def test_a_body_in_millimetres_is_asked_about_before_the_work():
+    warnings_at_first_stage = []
+
+    with pytest.warns(palpate.PalpateWarning) as caught:
+        palpate.record(
+            "box:100x100x100/2x2x2",
+            material="rubber",
+            modes=5,
+            order=1,
+            progress=lambda stage, share: warnings_at_first_stage.append(len(caught)),
+        )
+    question = "the body is 100 m large; if the file is in millimetres, use scale=0.001"
+    assert str(caught[0].message) == question and caught[0].filename == __file__
+    assert warnings_at_first_stage[0] == 1
+    assert [str(warning.message) for warning in caught].count(question) == 1

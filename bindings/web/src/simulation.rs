@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use palpate::{
-    Collider, DeviceInput, DeviceMode, EnergyLedger, Grasp, Input, Pose, ResidualFieldCache, State, step,
+    Collider, DeviceInput, DeviceMode, Grasp, Input, Pose, ResidualFieldCache, State, step,
 };
 use palpate_scene::Scene;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub enum Array {
     ObstacleLoads,
     /// Reactions on the clamps, likewise.
     ClampLoads,
-    /// Energies [J], in the order of [`EnergyLedger::named`].
+    /// Energies [J], in the order of [`palpate::EnergyLedger::named`].
     Energies,
     /// Contacts that carry force: rows of point [m], normal, force on the object [N], gap [m], slip speed [m/s], object, kind of the other
     /// side (0 device, 1 obstacle, 2 object), its number.
@@ -148,7 +148,6 @@ impl Simulation {
         let nearest = recording.surface.nearest(pose.body_from_world(position));
         let (point, _) = nearest.ok_or("the position is not finite")?;
         let grasp = Grasp { object, point };
-        self.scene.model.check_grasp(&grasp).map_err(|error| error.to_string())?;
         self.set_mode(device, DeviceMode::Held(grasp))?;
         let rest = self.scene.model.recordings().nth(object).map(|of| of.surface.rest_position(&point));
         let displacement = self.state.point_displacement(&self.scene.model, object, &point);
@@ -167,6 +166,7 @@ impl Simulation {
 
     fn set_mode(&mut self, device: usize, mode: DeviceMode) -> Result<(), String> {
         let own = self.modes.get_mut(device).ok_or_else(|| format!("there is no device {device}"))?;
+        self.scene.prepare_device(device, &mode).map_err(|error| error.to_string())?;
         *own = mode;
         Ok(())
     }
@@ -270,8 +270,9 @@ impl Simulation {
 }
 
 /// Names of the energies.
+#[cfg(target_arch = "wasm32")]
 pub fn energy_names() -> Vec<&'static str> {
-    EnergyLedger::default().named().into_iter().map(|(name, _)| name).collect()
+    palpate::EnergyLedger::default().named().into_iter().map(|(name, _)| name).collect()
 }
 
 fn pose_row(pose: &Pose) -> [f64; 7] {

@@ -1,7 +1,8 @@
 //! Standard input and output in place of files: `-`.
 
 use crate::failure::Failure;
-use crate::terminal::{notify, print};
+use crate::terminal::{notify, print, size_text};
+use palpate_fem::available_memory;
 use std::io::Read;
 use std::path::Path;
 
@@ -20,11 +21,31 @@ pub fn is_stream(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Content of standard input.
+/// Share of the free memory that standard input may take: what is read is taken apart beside it.
+const INPUT_SHARE: f64 = 0.5;
+
+/// Free memory where the system does not state it [bytes].
+const UNKNOWN_MEMORY: f64 = 8e9;
+
+/// Content of standard input, if it fits into memory, as a file has to.
 pub fn read_input() -> Result<Vec<u8>, Failure> {
+    let limit = INPUT_SHARE * available_memory().unwrap_or(UNKNOWN_MEMORY);
+    read_within(std::io::stdin().lock(), limit as usize)
+}
+
+/// Content of a stream of at most a number of bytes.
+fn read_within(stream: impl Read, limit: usize) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     let failed = |error| Failure(format!("cannot read {STANDARD_INPUT}: {error}"));
-    std::io::stdin().lock().read_to_end(&mut bytes).map_err(failed)?;
+    // One byte more tells whether there is more.
+    stream.take(limit as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() > limit {
+        return Err(Failure(format!(
+            "{STANDARD_INPUT} has more than {}, half of the memory that is free: is it endless? A body or a scene that is as large \
+             needs a machine with more memory",
+            size_text(limit)
+        )));
+    }
     if bytes.is_empty() {
         return Err(Failure(format!("{STANDARD_INPUT} is empty")));
     }
@@ -61,14 +82,18 @@ pub fn report(text: &str, output_is_taken: bool) -> Result<(), Failure> {
     print(text)
 }
 
-/// Writes data to standard output; a reader that has gone away is no failure.
-pub fn write_output(bytes: &[u8]) -> Result<(), Failure> {
-    use std::io::Write;
-    let mut out = std::io::stdout().lock();
-    match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure(format!("cannot write to standard output: {error}")))
-        }
-        _ => Ok(()),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_without_end_is_refused_at_the_limit() {
+        let endless = read_within(std::io::repeat(7), 3_000_000).map_err(|Failure(text)| text);
+        let expected = "standard input has more than 3.0 MB, half of the memory that is free: is it endless? A body or a scene that is as \
+                        large needs a machine with more memory";
+        assert_eq!(endless, Err(expected.to_string()));
+        assert_eq!(read_within(&[7; 3][..], 3), Ok(vec![7; 3]));
+        let empty = read_within(&[][..], 3);
+        assert_eq!(empty, Err(Failure("standard input is empty".into())));
     }
 }

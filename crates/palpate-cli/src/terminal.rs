@@ -1,6 +1,7 @@
 //! Output on the terminal: results on standard output, messages on standard error.
 
 use crate::failure::Failure;
+use palpate_export::has_reader;
 use palpate_scene::{LogReplay, SceneLog};
 use std::io::Write;
 
@@ -11,12 +12,14 @@ pub fn notify(text: &str) {
 
 /// Prints to standard output; a reader that has gone away is no failure.
 pub fn print(text: &str) -> Result<(), Failure> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure(format!("cannot write to standard output: {error}")))
-        }
-        _ => Ok(()),
-    }
+    print_bytes(text.as_bytes())
+}
+
+/// Writes data to standard output; a reader that has gone away is no failure.
+pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    has_reader(out.write_all(bytes).and_then(|()| out.flush()))?;
+    Ok(())
 }
 
 /// Prints a value as one JSON object.

@@ -3,6 +3,7 @@
 use crate::atomic_file::AtomicFile;
 use crate::error::ExportError;
 use crate::labels::{ProbeReading, SceneLabels};
+use crate::standard_output::{STANDARD_OUTPUT, has_reader};
 use palpate::{Collider, Input, Model, Output, State};
 use std::io::{self, BufWriter, Stdout, Write};
 use std::path::{Path, PathBuf};
@@ -44,23 +45,16 @@ impl Rows {
     }
 }
 
-/// Path that means standard output.
-const STANDARD_OUTPUT: &str = "-";
-
-/// Writes to standard output; a reader that has gone away is no failure.
+/// Writes to standard output, until its reader has gone away.
 fn put(
     output: &mut Option<BufWriter<Stdout>>,
     write: impl FnOnce(&mut BufWriter<Stdout>) -> io::Result<()>,
 ) -> Result<(), ExportError> {
-    match output.as_mut().map_or(Ok(()), write) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
-            // What its buffer holds can't be written either.
-            output.take().map(BufWriter::into_parts);
-            Ok(())
-        }
-        Err(error) => Err(ExportError::io("write", Path::new("standard output"), error)),
-        Ok(()) => Ok(()),
+    if !has_reader(output.as_mut().map_or(Ok(()), write))? {
+        // What its buffer holds can't be written either.
+        output.take().map(BufWriter::into_parts);
     }
+    Ok(())
 }
 
 fn joined(numbers: impl IntoIterator<Item = f64>) -> String {

@@ -67,9 +67,17 @@ impl Mesh {
                 Metres(self.nodes[a as usize])
             ));
         }
-        self.warnings.extend(size_question(high - low));
+        if !self.is_unit_asked {
+            self.warnings.extend(size_question(high - low));
+        }
         warn_about_quality(&mut self);
         Ok(CheckedPieces { mesh: self, faces, coincident: coincident.first().map(|&(a, b)| [a, b]) })
+    }
+
+    /// Question about the unit of a body of an unusual size, by the scale to metres: to be asked before it is recorded, which takes long.
+    pub fn unit_question(&self, scale: f64) -> Option<String> {
+        let (low, high) = bounding_box(self, &self.used_nodes().ok()?);
+        size_question(scale * (high - low))
     }
 
     /// Whether each node belongs to a tetrahedron; refuses unknown nodes and coordinates that are not finite.
@@ -191,7 +199,7 @@ fn check_connected(mesh: &Mesh, faces: &[Face], coincident: Option<[u32; 2]>) ->
 
 /// Question about the unit of a body of this extent [m]; none for a usual one.
 pub(crate) fn size_question(extent: DVec3) -> Option<String> {
-    let largest = extent.max_element();
+    let largest = four_digits(extent.max_element());
     let [small, large] = USUAL_EXTENT;
     if largest > 1000.0 * large {
         Some(format!("the body is {largest} m large; if the file is in micrometres, use --scale 1e-6"))
@@ -202,6 +210,13 @@ pub(crate) fn size_question(extent: DVec3) -> Option<String> {
     } else {
         None
     }
+}
+
+/// Number rounded to four digits.
+fn four_digits(number: f64) -> f64 {
+    let unit = 10.0_f64.powi(3 - number.log10().floor() as i32);
+    let rounded = (number * unit).round() / unit;
+    if rounded.is_finite() { rounded } else { number }
 }
 
 /// Mean ratio 12·(3V)^(2/3)/Σ edge² (Liu & Joe 1994).

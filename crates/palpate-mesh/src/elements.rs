@@ -213,8 +213,17 @@ impl Elements {
         }
         let (regions, tet_regions) = regions(&tags, name);
         let elements = self.counts.into_iter().map(|(shape, count)| (shape.name(), count)).collect();
-        let mesh =
-            Mesh { nodes, tets, tet_regions, regions, groups, mid_edge_nodes, mid_side_nodes, warnings };
+        let mesh = Mesh {
+            nodes,
+            tets,
+            tet_regions,
+            regions,
+            groups,
+            mid_edge_nodes,
+            mid_side_nodes,
+            is_unit_asked: false,
+            warnings,
+        };
         VolumeFile { format, elements, mesh }
     }
 

@@ -65,6 +65,7 @@ impl Mesh {
             regions: self.regions.clone(),
             mid_edge_nodes,
             mid_side_nodes: self.mid_side_nodes.clone(),
+            is_unit_asked: self.is_unit_asked,
             warnings: self.warnings.clone(),
         };
         mesh.drop_empty_regions();

@@ -1,5 +1,6 @@
 //! The front door: a file of any format, recognised by its content.
 
+use crate::check::size_question;
 use crate::error::MeshError;
 use crate::files::Files;
 use crate::format::{Format, Recognised, recognise};
@@ -8,6 +9,7 @@ use crate::scan::{Scanner, quoted};
 use crate::surface_mesh::{SurfaceFile, SurfaceMesh};
 use crate::volume_mesh::{Mesh, VolumeFile};
 use crate::{abaqus, gltf, gmsh, medit, obj, off, ply, stl, tetgen, vega, vtk};
+use glam::DVec3;
 use std::path::Path;
 
 /// Content of a mesh file.
@@ -72,6 +74,18 @@ impl MeshFile {
 }
 
 impl MeshFile {
+    /// Question about the unit of a body of an unusual size, by the scale from the file's units to metres: to be asked before a surface is
+    /// filled and a body recorded, which take long where the size is wrong.
+    pub fn unit_question(&self, scale: f64) -> Option<String> {
+        match self {
+            Self::Volume(VolumeFile { mesh, .. }) => mesh.unit_question(scale),
+            Self::Surface(SurfaceFile { mesh, .. }) => {
+                let finite = || mesh.positions.iter().copied().filter(|point| point.is_finite());
+                size_question(scale * (finite().reduce(DVec3::max)? - finite().reduce(DVec3::min)?))
+            }
+        }
+    }
+
     /// Tetrahedra in metres: the solid elements, or the inside of the surface, by [`tetrahedralise`]; `scale` is from the file's units to
     /// metres.
     ///

@@ -24,6 +24,8 @@ pub struct Mesh {
     pub mid_edge_nodes: Vec<MidEdgeNode>,
     /// Other nodes of elements of higher order that are no corners, ascending: they keep their numbers and are not used.
     pub mid_side_nodes: Vec<u32>,
+    /// Whether the user was asked about the unit, so that [`Mesh::checked`] asks no more.
+    pub is_unit_asked: bool,
     /// Warnings of the reader and of [`Mesh::checked`] for the user, a sentence each.
     pub warnings: Vec<String>,
 }

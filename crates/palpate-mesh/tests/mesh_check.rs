@@ -295,6 +295,13 @@ fn sizes_that_look_like_another_unit_get_a_warning() {
         |size| sound(box_mesh([size, 0.5 * size, 0.5 * size], [2; 3]).expect("a good box")).warnings;
     assert_eq!(warnings(10.0), ["the body is 10 m large; if the file is in millimetres, use --scale 0.001"]);
     assert_eq!(warnings(1e-5), ["the body is only 0.00001 m large; is the scale right? (--scale)"]);
+    let odd = ["the body is 180.2 m large; if the file is in millimetres, use --scale 0.001"];
+    assert_eq!(warnings(180.239997863), odd);
+    // Whoever has been asked is not asked again.
+    let mut asked = box_mesh([180.0; 3], [2; 3]).expect("a good box");
+    assert!(asked.unit_question(1.0).is_some() && asked.unit_question(1e-3).is_none());
+    asked.is_unit_asked = true;
+    assert!(sound(asked).warnings.is_empty());
     assert!(warnings(3.0).is_empty() && warnings(1e-3).is_empty());
 }
 

@@ -44,6 +44,7 @@ mod scene_log;
 mod step_check;
 #[cfg(feature = "native")]
 mod supports;
+mod tables;
 mod warning;
 
 #[cfg(feature = "native")]

@@ -19,27 +19,71 @@ pub fn read_body(
     meshing: &MeshingParameters,
     progress: &mut dyn Progress,
 ) -> Result<Mesh, SceneError> {
-    if let Some(mut mesh) = primitive(source)? {
-        if meshing.cell_size.is_some() {
-            return Err(mesh_error(format!("{source}: {}", MeshError::CellSizeOfSolids)));
-        }
-        mesh.scale(scale).map_err(refused)?;
-        return Ok(mesh);
-    }
-    let file = MeshFile::read(Files::Disk, Path::new(source)).map_err(refused)?;
-    body_of(file, source, scale, meshing, progress)
+    UnscaledBody::read(source)?.into_mesh(scale, meshing, progress)
 }
 
-/// Reads a mesh file that is in memory, as [`read_body`] does: one that names no other file.
-pub(crate) fn read_body_bytes(
-    (name, bytes): (&str, &[u8]),
-    scale: f64,
-    meshing: &MeshingParameters,
-    progress: &mut dyn Progress,
-) -> Result<Mesh, SceneError> {
-    let files = BTreeMap::from([(PathBuf::from(name), bytes.to_vec())]);
-    let file = MeshFile::read(Files::Memory(&files), Path::new(name)).map_err(refused)?;
-    body_of(file, name, scale, meshing, progress)
+/// Body in the units of its source.
+pub(crate) struct UnscaledBody<'a> {
+    content: Content,
+    name: &'a str,
+}
+
+enum Content {
+    /// Primitive, or a mesh that a program made.
+    Mesh(Mesh),
+    File(MeshFile),
+}
+
+impl<'a> UnscaledBody<'a> {
+    /// Primitive or mesh file.
+    pub fn read(source: &'a str) -> Result<Self, SceneError> {
+        let content = match primitive(source)? {
+            Some(mesh) => Content::Mesh(mesh),
+            None => Content::File(MeshFile::read(Files::Disk, Path::new(source)).map_err(refused)?),
+        };
+        Ok(Self { content, name: source })
+    }
+
+    /// Mesh file that is in memory: one that names no other file.
+    pub fn of_bytes(bytes: &[u8], name: &'a str) -> Result<Self, SceneError> {
+        let files = BTreeMap::from([(PathBuf::from(name), bytes.to_vec())]);
+        let file = MeshFile::read(Files::Memory(&files), Path::new(name)).map_err(refused)?;
+        Ok(Self { content: Content::File(file), name })
+    }
+
+    /// Mesh that a program made.
+    pub fn of_mesh(mesh: Mesh, name: &'a str) -> Self {
+        Self { content: Content::Mesh(mesh), name }
+    }
+
+    /// Asks about the unit of a body of an unusual size, before it takes long.
+    pub fn ask_unit(&self, scale: f64, progress: &mut dyn Progress) {
+        let question = match &self.content {
+            Content::Mesh(mesh) => mesh.unit_question(scale),
+            Content::File(file) => file.unit_question(scale),
+        };
+        question.into_iter().for_each(|question| progress.warn(&question));
+    }
+
+    /// Mesh in metres.
+    pub fn into_mesh(
+        self,
+        scale: f64,
+        meshing: &MeshingParameters,
+        progress: &mut dyn Progress,
+    ) -> Result<Mesh, SceneError> {
+        let Self { content, name } = self;
+        match content {
+            Content::Mesh(_) if meshing.cell_size.is_some() => {
+                Err(mesh_error(format!("{name}: {}", MeshError::CellSizeOfSolids)))
+            }
+            Content::Mesh(mut mesh) => {
+                mesh.scale(scale).map_err(refused)?;
+                Ok(mesh)
+            }
+            Content::File(file) => body_of(file, name, scale, meshing, progress),
+        }
+    }
 }
 
 /// Body of a mesh file, in metres.

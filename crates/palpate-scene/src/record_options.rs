@@ -6,7 +6,7 @@
 
 use crate::error::{SceneError, SceneErrorKind};
 use crate::material_choice::MaterialChoice;
-use crate::mesh_source::{read_body, read_body_bytes, source_name};
+use crate::mesh_source::{UnscaledBody, source_name};
 use crate::supports::read_supports;
 use palpate::{Damping, Recording};
 use palpate_fem::{
@@ -97,20 +97,15 @@ impl RecordOptions {
         source: BodySource<'_>,
         progress: &mut dyn Progress,
     ) -> Result<PreparedBody, SceneError> {
-        let (mut mesh, name) = match source {
-            BodySource::Text(text) => {
-                let meshing = MeshingParameters { cell_size: self.cell_size };
-                (read_body(text, self.scale, &meshing, progress)?, source_name(text))
-            }
-            BodySource::Bytes(bytes, name) => {
-                let meshing = MeshingParameters { cell_size: self.cell_size };
-                (read_body_bytes((name, bytes), self.scale, &meshing, progress)?, name.to_string())
-            }
-            BodySource::Mesh(mut mesh, name) => {
-                mesh.scale(self.scale).map_err(|error| SceneError::new(SceneErrorKind::Mesh, error))?;
-                (mesh, name.to_string())
-            }
+        let (body, name) = match source {
+            BodySource::Text(text) => (UnscaledBody::read(text)?, source_name(text)),
+            BodySource::Bytes(bytes, name) => (UnscaledBody::of_bytes(bytes, name)?, name.to_string()),
+            BodySource::Mesh(mesh, name) => (UnscaledBody::of_mesh(mesh, name), name.to_string()),
         };
+        body.ask_unit(self.scale, progress);
+        let meshing = MeshingParameters { cell_size: self.cell_size };
+        let mut mesh = body.into_mesh(self.scale, &meshing, progress)?;
+        mesh.is_unit_asked = true;
         mesh.repair(&self.repair).map_err(|error| refused(SceneErrorKind::Mesh, &name, error))?;
         if self.order == ElementOrder::Quadratic {
             mesh.add_mid_edge_nodes();
@@ -167,7 +162,7 @@ mod tests {
     use super::*;
     use palpate::{Material, Support};
     use palpate_fem::SilentProgress;
-    use palpate_mesh::box_mesh;
+    use palpate_mesh::{SurfaceMesh, box_mesh};
 
     fn options() -> RecordOptions {
         let material = Material::isotropic(2e4, 0.3, 1000.0);
@@ -193,6 +188,50 @@ mod tests {
         assert!(difference < 1e-12 * by_text.mass(), "{difference}");
         let sources = [by_text, by_mesh].map(|recording| recording.metadata.provenance.source);
         assert_eq!(sources, [text, "mine"]);
+    }
+
+    /// Listener that keeps what is told, in its order.
+    #[derive(Default)]
+    struct Told(Vec<String>);
+
+    impl Progress for Told {
+        fn begin(&mut self, stage: &str, _: u64) {
+            self.0.push(stage.to_string());
+        }
+        fn advance(&mut self, _: u64) {}
+        fn warn(&mut self, text: &str) {
+            self.0.push(format!("warning: {text}"));
+        }
+    }
+
+    #[test]
+    fn a_body_in_millimetres_is_asked_about_once_and_first() {
+        let question = "warning: the body is 200 m large; if the file is in millimetres, use --scale 0.001";
+        let mesh = box_mesh([200.0, 100.0, 100.0], [2; 3]).expect("a box");
+        let surface = SurfaceMesh::from_boundary(mesh.clone()).expect("a surface");
+        let mut off = String::from("OFF\n");
+        off += &format!("{} {} 0\n", surface.positions.len(), surface.triangles.len());
+        surface.positions.iter().for_each(|p| off += &format!("{} {} {}\n", p.x, p.y, p.z));
+        surface.triangles.iter().for_each(|[a, b, c]| off += &format!("3 {a} {b} {c}\n"));
+        let modes_by_error = ErrorTarget { force_error: Some(0.5), ..ErrorTarget::default() };
+        let coarse = RecordOptions { cell_size: Some(50.0), ..options() };
+        for (source, options) in [
+            (BodySource::Mesh(mesh.clone(), "mine"), options()),
+            (BodySource::Mesh(mesh, "mine"), RecordOptions { target: modes_by_error, ..options() }),
+            (BodySource::Bytes(off.as_bytes(), "box.off"), coarse),
+        ] {
+            let mut told = Told::default();
+            let recorded = options.record(source, &mut told);
+            assert_eq!(
+                told.0.first().map(String::as_str),
+                Some(question),
+                "{:?}: {:?}",
+                recorded.err(),
+                told.0
+            );
+            assert_eq!(told.0.iter().filter(|text| text.contains("m large")).count(), 1, "{:?}", told.0);
+            assert!(told.0.len() > 3, "{:?}", told.0);
+        }
     }
 
     #[test]

@@ -48,6 +48,27 @@ fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
     );
 }
 
+#[test]
+fn an_error_below_a_tip_that_becomes_a_pointer_has_the_line_of_the_file() {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(folder.path().join("cube.palp"), FREE_BLOCK_FILE).expect("a file");
+    let text = |friction: f64| {
+        format!(
+            "# A cube.\n[[object]]\nname = \"cube\"\nrecording = \"cube.palp\"\n\n[[device]]\nname = \"tip\"\nmode = \"touch\"\n\n\
+             [[plane]]\nname = \"floor\"\npoint = [0, 0, -1]\nnormal = [0, 0, 1]\nfriction = {friction}\n"
+        )
+    };
+    let library = SceneLibrary::new(Some(&folder.path().join("cache"))).expect("a library");
+    std::fs::write(&path, text(-1.0)).expect("a file");
+    let error = library.open_file(&path).err().expect("a refusal");
+    assert_eq!((error.line, error.key.as_deref()), (Some(14), Some("friction")));
+    std::fs::write(&path, text(0.5)).expect("a file");
+    let opened = library.open_file(&path).expect("a scene");
+    assert!(opened.scene.devices[0].pointer);
+    assert_eq!(opened.text, text(0.5).replace("\"touch\"\n", "\"touch\"\npointer = true\n"));
+}
+
 /// Listener that wants no recording any more.
 struct Cancelled;
 

@@ -15,14 +15,23 @@ use zarrs::array::ArrayShardedReadableExtCache;
 pub(crate) struct StoredColumns {
     length: usize,
     numbers: Numbers,
+    /// Column of zeros, for those that cannot be read.
+    zeros: Zeros,
     store: TableStore,
     cache: ArrayShardedReadableExtCache,
 }
 
-/// Numbers of each column, from first use on; zeros if the column is damaged.
+/// Numbers of each column, from first use on.
 enum Numbers {
     F32(Vec<OnceLock<Box<[f32]>>>),
     F64(Vec<OnceLock<Box<[f64]>>>),
+}
+
+/// Zeros in place of a column, made on first use.
+#[derive(Default)]
+struct Zeros {
+    f32: OnceLock<Box<[f32]>>,
+    f64: OnceLock<Box<[f64]>>,
 }
 
 impl StoredColumns {
@@ -37,7 +46,7 @@ impl StoredColumns {
             Number::F32 => Numbers::F32((0..columns).map(|_| OnceLock::new()).collect()),
             Number::F64 => Numbers::F64((0..columns).map(|_| OnceLock::new()).collect()),
         };
-        Ok(Self { length: content.column_length(), numbers, store, cache })
+        Ok(Self { length: content.column_length(), numbers, zeros: Zeros::default(), store, cache })
     }
 
     /// Column, read from the store when it is not known yet.
@@ -74,17 +83,26 @@ impl ImpulseColumns for StoredColumns {
         prepared.map_err(|error| error.to_string())
     }
 
+    fn missing_bytes(&self) -> u64 {
+        let missing = match &self.numbers {
+            Numbers::F32(columns) => columns.iter().filter(|column| column.get().is_none()).count(),
+            Numbers::F64(columns) => columns.iter().filter(|column| column.get().is_none()).count(),
+        };
+        (missing * self.length * self.store.content().number.bytes()) as u64
+    }
+
     fn column(&self, touchable: usize) -> Column<'_> {
+        // What cannot be read is not kept, so that preparing it later fails.
         match &self.numbers {
             Numbers::F32(columns) => {
-                let column = &columns[touchable];
-                let known = self.load((touchable, column), f32::from_le_bytes);
-                Column::F32(known.unwrap_or_else(|_| column.get_or_init(|| vec![0.0; self.length].into())))
+                let known = self.load((touchable, &columns[touchable]), f32::from_le_bytes);
+                let zeros = || self.zeros.f32.get_or_init(|| vec![0.0; self.length].into());
+                Column::F32(known.unwrap_or_else(|_| zeros()))
             }
             Numbers::F64(columns) => {
-                let column = &columns[touchable];
-                let known = self.load((touchable, column), f64::from_le_bytes);
-                Column::F64(known.unwrap_or_else(|_| column.get_or_init(|| vec![0.0; self.length].into())))
+                let known = self.load((touchable, &columns[touchable]), f64::from_le_bytes);
+                let zeros = || self.zeros.f64.get_or_init(|| vec![0.0; self.length].into());
+                Column::F64(known.unwrap_or_else(|_| zeros()))
             }
         }
     }

@@ -113,6 +113,10 @@ impl ImpulseColumns for ClosedForm {
         Ok(())
     }
 
+    fn missing_bytes(&self) -> u64 {
+        0
+    }
+
     fn column(&self, j: usize) -> Column<'_> {
         Column::F64(self.columns[j].get_or_init(|| {
             let beyond = |i: usize| self.recording.residual.block(i / 3, j / 3).col(j % 3)[i % 3];
@@ -147,6 +151,10 @@ impl ImpulseColumns for SinglePrecision {
 
     fn prepare(&self, touchable: usize) -> Result<(), String> {
         self.exact.prepare(touchable)
+    }
+
+    fn missing_bytes(&self) -> u64 {
+        self.exact.missing_bytes()
     }
 
     fn column(&self, touchable: usize) -> Column<'_> {

@@ -4,10 +4,11 @@ use crate::clamp::{Clamp, ClampState, PlacedClamp};
 use crate::collision::{Grasp, MAX_TIP_CONTACTS};
 use crate::device::DeviceParameters;
 use crate::error::{Error, ModelError};
+use crate::io::DeviceMode;
 use crate::motion::RigidIntegrator;
 use crate::object::{InitialDeformation, Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
-use crate::recording::Recording;
+use crate::recording::{ImpulseResponse, Recording};
 use crate::response::ResponseForm;
 use crate::surface::{Cell, MIN_CONTACT_SAMPLES};
 use alloc::boxed::Box;
@@ -262,7 +263,7 @@ impl Model {
     }
 
     /// Check that a hand can hold a point: it exists, forces may enter there, and not all of its nodes are fixed. A step rejects other
-    /// grasps.
+    /// grasps. [`Self::prepare_device`] checks the same, and loads what the steps need.
     ///
     /// # Errors
     /// [`ModelError::Object`] of [`ModelError::FixedPoint`] or [`ModelError::NoSuchPoint`], with the number of the object.
@@ -275,6 +276,54 @@ impl Model {
             return fail(ModelError::NoSuchPoint { triangle: grasp.point.triangle });
         }
         if self.can_hold(grasp) { Ok(()) } else { fail(ModelError::FixedPoint) }
+    }
+
+    /// Tables that a mode of a device needs as a whole, with the numbers of their objects: all of them for a tip, that of its object for a
+    /// prescribed force on a patch.
+    pub fn whole_tables(
+        &self,
+        device: usize,
+        mode: &DeviceMode,
+    ) -> impl Iterator<Item = (usize, &ImpulseResponse)> {
+        let is_patch = self.parameters.devices.get(device).is_some_and(|own| own.patch_radius > 0.0);
+        let (all, only) = match mode {
+            DeviceMode::Touch => (true, None),
+            DeviceMode::Force(applied) if is_patch => (false, Some(applied.grasp.object)),
+            _ => (false, None),
+        };
+        let tables = self.objects.iter().map(|object| object.response.table()).enumerate();
+        tables
+            .filter(move |(object, _)| all || only == Some(*object))
+            .filter_map(|(object, table)| Some((object, table?)))
+    }
+
+    /// Check a mode of a device, and load what its steps need of recorded tables into memory, before it is used in a step.
+    ///
+    /// # Errors
+    /// [`ModelError::Object`] with the number of the object: as [`Self::check_grasp`], or [`ModelError::ImpulseResponse`] for a column that cannot be
+    /// read.
+    pub fn prepare_device(&self, device: usize, mode: &DeviceMode) -> Result<(), Error> {
+        let of = |object: usize, error: Error| match error {
+            Error::Model(error) => ModelError::Object { object, error: Box::new(error) }.into(),
+            other => other,
+        };
+        for (object, table) in self.whole_tables(device, mode) {
+            table.prepare_all().map_err(|error| of(object, error))?;
+        }
+        let grasp = match mode {
+            DeviceMode::Held(grasp) => grasp,
+            DeviceMode::Force(applied) => &applied.grasp,
+            DeviceMode::Inactive | DeviceMode::Touch | DeviceMode::Suspended => return Ok(()),
+        };
+        // A column is loaded before it is asked whether its nodes can move.
+        if self.accepts(grasp)
+            && let Some(object) = self.objects.get(grasp.object)
+            && let Some(table) = object.response.table()
+        {
+            let prepared = table.prepare(&object.body.recording.surface, &grasp.point);
+            prepared.map_err(|error| of(grasp.object, error))?;
+        }
+        self.check_grasp(grasp)
     }
 
     /// Whether a hand can hold the point of a grasp: it exists, forces may enter there, and it can move.

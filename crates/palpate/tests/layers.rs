@@ -95,7 +95,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-render",
         ],
     ),
-    ("palpate-c", &["palpate", "palpate-scene"]),
+    // Its tests write a store.
+    ("palpate-c", &["palpate", "palpate-scene", "palpate-store"]),
     ("palpate-web", &["palpate", "palpate-scene", "palpate-viewer"]),
     (
         "palpate-python",

@@ -1,8 +1,7 @@
 //! `palpate completions` and `palpate man`: what shells and manuals need to know of the command line.
 
 use crate::failure::Failure;
-use crate::standard_streams::write_output;
-use crate::terminal::print;
+use crate::terminal::{print, print_bytes};
 use clap::{Args, Command};
 use clap_complete::Shell;
 use std::path::PathBuf;
@@ -35,7 +34,7 @@ pub struct ManArguments {
 pub fn completions(arguments: &CompletionsArguments, mut command: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "palpate", &mut script);
-    write_output(&script)
+    print_bytes(&script)
 }
 
 /// Runs `palpate man`.

@@ -2,8 +2,8 @@
 
 use crate::commands::record::MergeChoice;
 use crate::failure::Failure;
-use crate::standard_streams::{self, STANDARD_INPUT, is_stream, read_input, takes_output, write_output};
-use crate::terminal::print_json;
+use crate::standard_streams::{self, STANDARD_INPUT, is_stream, read_input, takes_output};
+use crate::terminal::{print_bytes, print_json};
 use clap::Args;
 use palpate_export::{check_writable, write_atomically};
 use palpate_mesh::{
@@ -90,7 +90,7 @@ pub fn mesh(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(output), Some(mesh)) = (&arguments.output, mesh) {
         let text = if has_ending(output, "msh") { mesh.to_gmsh() } else { mesh.to_vtk() };
         if output_is_taken {
-            write_output(text.as_bytes())?;
+            print_bytes(text.as_bytes())?;
         } else {
             write_atomically(output, text.as_bytes())?;
         }

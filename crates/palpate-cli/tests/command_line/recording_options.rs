@@ -45,6 +45,13 @@ fn a_dry_run_says_what_the_recording_takes_and_records_nothing() {
     let text = workplace.succeed(&[&ball[..], &["--dry-run", "-o", "a.palp"]].concat());
     assert!(text.starts_with("sphere:0.05/3: nothing is recorded (--dry-run)\n"), "{text}");
     assert!(!workplace.path("a.palp").exists());
+    // Where the recording would go to standard output, the estimate is there alone.
+    let piped = workplace.json(&[&ball[..], &["--dry-run", "--json", "-o", "-"]].concat());
+    assert_eq!(piped["file_bytes"], said["file_bytes"]);
+    assert_eq!(
+        workplace.succeed(&[&ball[..], &["--dry-run", "-o", "-"]].concat()).lines().count(),
+        text.lines().count()
+    );
     let recorded = workplace.json(&[&ball[..], &["-o", "a.palp", "--json"]].concat());
     assert_eq!(said["nodes"], recorded["nodes"]);
     let bytes = std::fs::metadata(workplace.path("a.palp")).expect("a recording").len() as f64;

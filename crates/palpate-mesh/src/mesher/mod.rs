@@ -149,9 +149,10 @@ impl MeshingReport {
     fn warning(&self) -> Option<String> {
         let error = self.volume_error.filter(|error| error.abs() > LARGE_VOLUME_ERROR)?;
         Some(format!(
-            "the tetrahedra have {:+.1} % more volume than the surface encloses: parts are thin beside cells of {:.3e} m; smaller cells \
+            "the tetrahedra have {:.1} % {} volume than the surface encloses: parts are thin beside cells of {:.3e} m; smaller cells \
              (--cell-size) keep more of them",
-            100.0 * error,
+            100.0 * error.abs(),
+            if error < 0.0 { "less" } else { "more" },
             self.cell_size_m
         ))
     }
@@ -249,5 +250,29 @@ fn report(mesh: &Mesh, prepared: &Prepared, cell: f64) -> MeshingReport {
         dihedral_range_deg: [least, most],
         volume_error: (!prepared.overlaps).then(|| volume / prepared.volume - 1.0),
         distance_cells: fidelity::distances(mesh, prepared, cell).map(|distance| distance / cell),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_volume_that_is_far_off_is_told_as_less_or_more() {
+        let told = |volume_error: f64| {
+            MeshingReport {
+                cell_size_m: 0.01,
+                nodes: 4,
+                tetrahedra: 1,
+                dihedral_range_deg: [60.0, 80.0],
+                volume_error: Some(volume_error),
+                distance_cells: [0.1, 0.2],
+            }
+            .warning()
+        };
+        let rest = "volume than the surface encloses: parts are thin beside cells of 1.000e-2 m; smaller cells (--cell-size) keep more of them";
+        assert_eq!(told(-0.033), Some(format!("the tetrahedra have 3.3 % less {rest}")));
+        assert_eq!(told(0.052), Some(format!("the tetrahedra have 5.2 % more {rest}")));
+        assert_eq!(told(-0.01), None);
     }
 }

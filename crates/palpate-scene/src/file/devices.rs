@@ -6,7 +6,7 @@ use super::keys::{AttachEntry, DeviceEntry};
 use super::places::surface_point;
 use super::source::{DeviceMover, Quantity, Source};
 use crate::error::{SceneError, SceneErrorKind};
-use crate::scene::SceneDevice;
+use crate::scene::{Scene, SceneDevice};
 use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
 use palpate::{
@@ -268,6 +268,17 @@ fn read_grasp(
         }
     }
     Ok(grasp)
+}
+
+/// Loads what the devices need of recorded tables beyond their points.
+pub(super) fn prepare(source: &Source, entries: &[DeviceEntry], scene: &Scene) -> Result<(), SceneError> {
+    for (number, (entry, device)) in entries.iter().zip(&scene.devices).enumerate() {
+        if let Err(error) = scene.prepare_device(number, &device.mode) {
+            let message = format!("device {:?}: {error}", device.name);
+            return source.fail(entry.name.span(), error.kind, "table", message);
+        }
+    }
+    Ok(())
 }
 
 /// Checks that no two devices hold the same point: no force could satisfy both.

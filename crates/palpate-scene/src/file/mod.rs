@@ -4,6 +4,7 @@ mod clamps;
 mod coupling;
 mod devices;
 mod drivers;
+mod edited_text;
 mod keys;
 mod objects;
 mod obstacles;
@@ -15,6 +16,7 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::files::read_regular_file;
 use crate::initial_checks::check_start;
 use crate::scene::Scene;
+pub(crate) use edited_text::EditedText;
 use glam::DVec3;
 use keys::{Gravity, RETIRED_KEYS, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, ResponseForm, RigidCompliance, RigidIntegrator, Support};
@@ -120,7 +122,8 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, SceneError> {
     })
 }
 
-/// Reads a scene from a text, which `change` may replace when the objects are known; returns the scene and its text.
+/// Reads a scene from a text, which `change` may replace when the objects are known; returns the scene and its text. Errors have the lines of the
+/// text before.
 ///
 /// `change` must leave the objects as they are: recordings take long to read, and are read once.
 pub(crate) fn read_edited_scene(
@@ -128,7 +131,7 @@ pub(crate) fn read_edited_scene(
     text: String,
     parts: &PartsInMemory,
     mode: RunMode,
-    change: impl FnOnce(&str, &[ModelObject]) -> Option<String>,
+    change: impl FnOnce(&str, &[ModelObject]) -> Option<EditedText>,
 ) -> Result<(Scene, String), SceneError> {
     let relocated = Relocated::new();
     let source = Source { path, text: &text, relocated: &relocated, parts, mover: DeviceMover::Nobody };
@@ -137,8 +140,14 @@ pub(crate) fn read_edited_scene(
     let Some(changed) = change(&text, &objects) else {
         return Ok((assemble(&source, &file, objects, mode)?, text));
     };
-    let source = Source { text: &changed, ..source };
-    Ok((assemble(&source, &parse(&source)?, objects, mode)?, changed))
+    let source = Source { text: &changed.text, ..source };
+    // Whoever reads an error looks into the file.
+    let in_file = |error: SceneError| {
+        let line = error.line.map(|line| changed.line_before(line));
+        SceneError { line, ..error }
+    };
+    let scene = parse(&source).and_then(|file| assemble(&source, &file, objects, mode)).map_err(in_file)?;
+    Ok((scene, changed.text))
 }
 
 fn parse(source: &Source) -> Result<SceneFile, SceneError> {
@@ -247,6 +256,7 @@ fn assemble(
     if scene.can_touch() || !scene.clamps.is_empty() {
         scene.warnings.extend(tables::prepare_tables(source, &file.object, &objects)?);
     }
+    devices::prepare(source, &file.device, &scene)?;
     scene.warnings.extend(check_start(&scene, &objects));
     Ok(scene)
 }

@@ -3,10 +3,10 @@
 use super::keys::ObjectEntry;
 use super::source::Source;
 use crate::error::{SceneError, SceneErrorKind};
+#[cfg(feature = "native")]
+use crate::tables::check_room;
 use crate::warning::{Warning, WarningKind};
 use palpate::{ModelObject, Recording, ResponseForm};
-#[cfg(feature = "native")]
-use palpate_fem::check_memory;
 #[cfg(feature = "native")]
 use palpate_store::{Location, TableStore};
 #[cfg(feature = "native")]
@@ -125,11 +125,8 @@ pub(super) fn prepare_tables(
         let ResponseForm::Fir(table) = &object.response else { continue };
         let name = entry.name.get_ref();
         let fail = |message: String| source.fail(entry.name.span(), SceneErrorKind::Table, "table", message);
-        if let Err(error) = check_memory(table.bytes() as f64) {
-            return fail(format!(
-                "contacts may come anywhere on {name:?}, so that all of its table must be in memory: {error}; record it for fewer \
-                 nodes (--touchable), or use response = \"modal\""
-            ));
+        if let Err(what) = check_room(name, table) {
+            return fail(what);
         }
         if let Err(error) = table.prepare_all() {
             return fail(format!("the table of {name:?}: {error}"));

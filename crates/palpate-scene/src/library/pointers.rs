@@ -1,7 +1,10 @@
 //! Pointer devices for scenes that have none.
 
+use crate::file::EditedText;
 use palpate::{ModelObject, Recording};
-use toml::{Table, Value};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use toml::{Spanned, Table, Value};
 
 /// Number of added pointers.
 const POINTERS: usize = 4;
@@ -11,26 +14,17 @@ const MOVERS: [&str; 5] = ["path", "driver", "linked", "simulated", "pointer"];
 
 /// Scene with its pointers.
 pub(super) struct WithPointers {
-    pub(super) text: String,
+    pub(super) edited: EditedText,
     /// Names of pointers whose size nobody has chosen.
     pub(super) added: Vec<String>,
 }
 
-/// Scene with pointers; none if it has some. Tips that nothing moves become pointers. Without any, four are added: they are appended, so
-/// that line numbers stay.
+/// Scene with pointers; none if it has some. Tips that nothing moves become pointers. Without any, four are added. The rest of the text stays
+/// as it is, with its comments.
 pub(super) fn with_pointers(text: &str, objects: &[ModelObject]) -> Option<WithPointers> {
-    let mut scene: Table = text.parse().ok()?;
-    let mut is_changed = false;
-    let devices = scene.get_mut("device").and_then(Value::as_array_mut).into_iter().flatten();
-    for device in devices.filter_map(Value::as_table_mut).filter(|device| is_unmoved_tip(device)) {
-        for denied in MOVERS {
-            device.remove(denied);
-        }
-        device.insert("pointer".into(), Value::Boolean(true));
-        is_changed = true;
-    }
-    if is_changed {
-        return Some(WithPointers { text: scene.to_string(), added: Vec::new() });
+    let scene: Table = text.parse().ok()?;
+    if let Some(edited) = with_tips_as_pointers(text, &scene) {
+        return Some(WithPointers { edited, added: Vec::new() });
     }
     let entries = |kind: &str| scene.get(kind).and_then(Value::as_array).into_iter().flatten();
     if entries("device").any(|device| device.get("pointer").and_then(Value::as_bool) == Some(true)) {
@@ -41,14 +35,78 @@ pub(super) fn with_pointers(text: &str, objects: &[ModelObject]) -> Option<WithP
     let names = (1..).map(|number| format!("finger{number}")).filter(|name| !taken.contains(&name.as_str()));
     let added: Vec<String> = names.take(POINTERS).collect();
     let fingers = fingers(added.clone(), objects)?;
-    let table = Table::from_iter([("device".to_string(), Value::Array(fingers.clone()))]);
-    let longer = format!("{}\n\n{table}", text.trim_end());
-    if longer.parse::<Table>().is_ok() {
-        return Some(WithPointers { text: longer, added });
+    let mut longer = scene.clone();
+    let devices = longer.entry("device").or_insert_with(|| Value::Array(Vec::new()));
+    devices.as_array_mut()?.extend(fingers.clone());
+    let below = Table::from_iter([("device".to_string(), Value::Array(fingers.clone()))]);
+    let appended = format!("{}\n\n{below}", text.trim_end());
+    let written = EditedText::same_lines(appended, &longer);
+    // An inline array of devices cannot be continued further down, but where it ends.
+    let inline = || {
+        let places: Places<Spanned<IgnoredAny>> = toml::from_str(text).ok()?;
+        let end = places.device.span().end.checked_sub(1)?;
+        let fingers: Vec<String> = fingers.iter().map(Value::to_string).collect();
+        let continued = |comma: &str| {
+            let text = format!("{}{comma}{}{}", &text[..end], fingers.join(", "), &text[end..]);
+            EditedText::same_lines(text, &longer)
+        };
+        [", ", ""].into_iter().find_map(continued)
+    };
+    let edited = written.or_else(inline).unwrap_or_else(|| EditedText::rewritten(&longer));
+    Some(WithPointers { edited, added })
+}
+
+/// Scene in which tips that nothing moves are pointers; none if there is no such tip.
+fn with_tips_as_pointers(text: &str, scene: &Table) -> Option<EditedText> {
+    let devices = scene.get("device").and_then(Value::as_array)?;
+    let is_tip = |device: &Value| device.as_table().is_some_and(is_unmoved_tip);
+    let tips: Vec<usize> = (0..devices.len()).filter(|at| is_tip(&devices[*at])).collect();
+    if tips.is_empty() {
+        return None;
     }
-    // An inline array of devices cannot be continued further down.
-    scene.entry("device").or_insert_with(|| Value::Array(Vec::new())).as_array_mut()?.extend(fingers);
-    Some(WithPointers { text: scene.to_string(), added })
+    let mut expected = scene.clone();
+    for device in expected.get_mut("device").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(tip) = device.as_table_mut().filter(|device| is_unmoved_tip(device)) {
+            tip.insert("pointer".into(), Value::Boolean(true));
+        }
+    }
+    let places: Option<Places<Vec<DevicePlace>>> = toml::from_str(text).ok();
+    let edit = || {
+        let mut edited = EditedText { text: text.to_string(), added_lines: Vec::new() };
+        // From the last, so that the places of the others stay.
+        for &tip in tips.iter().rev() {
+            let DevicePlace { mode, pointer } = places.as_ref()?.device.get(tip)?;
+            match pointer {
+                Some(pointer) => edited.text.replace_range(pointer.span(), "true"),
+                None => edited.insert_after_line(mode.as_ref()?.span().end, "pointer = true"),
+            }
+        }
+        edited.is(&expected).then_some(edited)
+    };
+    let edit_inline = || {
+        let mut edited = text.to_string();
+        for &tip in tips.iter().rev() {
+            let DevicePlace { mode, pointer } = places.as_ref()?.device.get(tip)?;
+            match pointer {
+                Some(pointer) => edited.replace_range(pointer.span(), "true"),
+                None => edited.insert_str(mode.as_ref()?.span().end, ", pointer = true"),
+            }
+        }
+        EditedText::same_lines(edited, &expected)
+    };
+    Some(edit().or_else(edit_inline).unwrap_or_else(|| EditedText::rewritten(&expected)))
+}
+
+/// Places of the devices in a text, or of their array.
+#[derive(Deserialize)]
+struct Places<D> {
+    device: D,
+}
+
+#[derive(Deserialize)]
+struct DevicePlace {
+    mode: Option<Spanned<String>>,
+    pointer: Option<Spanned<bool>>,
 }
 
 /// Whether a device is a tip that a program would move.
@@ -100,30 +158,47 @@ mod tests {
         };
         let text =
             "# mine\n[[object]]\nname = \"finger2\"\n[[device]]\nname = \"left\"\n[[plane]]\nname = \"a\"\n";
-        let WithPointers { text: longer, added } = with_pointers(text, &objects).expect("fingers");
+        let WithPointers { edited: EditedText { text: longer, .. }, added } =
+            with_pointers(text, &objects).expect("fingers");
         assert!(longer.starts_with(text), "{longer}");
         assert_eq!(added, ["finger1", "finger3", "finger4", "finger5"]);
         assert_eq!(names(&longer), ["left", "finger1", "finger3", "finger4", "finger5"]);
         assert!(with_pointers(&longer, &objects).is_none(), "there are some");
-        let list = "device = [{ name = \"left\" }]\n";
-        let longer = with_pointers(list, &objects).expect("fingers").text;
-        assert_eq!(names(&longer), ["left", "finger1", "finger2", "finger3", "finger4"]);
+        for list in
+            ["device = [{ name = \"left\" }]\n# end\n", "device = [\n{ name = \"left\" },\n]\n# end\n"]
+        {
+            let EditedText { text: longer, added_lines } =
+                with_pointers(list, &objects).expect("fingers").edited;
+            assert_eq!(names(&longer), ["left", "finger1", "finger2", "finger3", "finger4"]);
+            assert_eq!((longer.lines().count(), added_lines), (list.lines().count(), Vec::new()), "{longer}");
+            assert!(longer.ends_with("]\n# end\n"), "{longer}");
+        }
     }
 
     #[test]
-    fn tips_that_nothing_moves_become_pointers() {
+    fn tips_that_nothing_moves_become_pointers_where_they_stand() {
         let objects = [object_at(&free_block(), DVec3::ZERO, DVec3::ZERO)];
-        let text = "[[device]]\nname = \"tip\"\nmode = \"touch\"\nlinked = false\ntip_radius = 0.01\n\
+        let text = "# mine\n[[device]]\nname = \"tip\"\nmode = \"touch\" # the finger\nlinked = false\ntip_radius = 0.01\n\n\
                     [[device]]\nname = \"far\"\nmode = \"touch\"\nlinked = true\n\
+                    [[device]]\nname = \"other\"\npointer = false\nmode = \"touch\"\n\
                     [[device]]\nname = \"hand\"\nmode = \"held\"\n";
-        let WithPointers { text, added } = with_pointers(text, &objects).expect("a pointer");
+        let WithPointers { edited, added } = with_pointers(text, &objects).expect("a pointer");
         assert!(added.is_empty());
-        let scene: Table = text.parse().expect("TOML");
-        let devices = scene["device"].as_array().expect("devices");
-        let pointer = |at: usize| devices[at].get("pointer").and_then(Value::as_bool);
-        assert_eq!([pointer(0), pointer(1), pointer(2)], [Some(true), None, None]);
-        assert_eq!(devices[0]["tip_radius"].as_float(), Some(0.01));
-        assert_eq!(devices[0].get("linked"), None, "a pointer is not linked");
-        assert!(with_pointers(&text, &objects).is_none(), "there is one");
+        let expected = text
+            .replace("# the finger\n", "# the finger\npointer = true\n")
+            .replace("pointer = false", "pointer = true");
+        assert_eq!(edited.text, expected);
+        // The finger's line is the fifth; the one after it was the fifth of the file.
+        assert_eq!([4, 5, 6, 7, 99].map(|line| edited.line_before(line)), [4, 4, 5, 6, 98]);
+        assert!(with_pointers(&edited.text, &objects).is_none(), "there are some");
+    }
+
+    #[test]
+    fn tips_in_an_inline_array_become_pointers_on_their_line() {
+        let objects = [object_at(&free_block(), DVec3::ZERO, DVec3::ZERO)];
+        let text = "device = [{ mode = \"touch\", name = \"a\" }, { name = \"b\", mode = \"touch\" }]\n";
+        let edited = with_pointers(text, &objects).expect("pointers").edited;
+        assert_eq!(edited.text, text.replace("\"touch\"", "\"touch\", pointer = true"));
+        assert!(edited.added_lines.is_empty());
     }
 }

@@ -29,7 +29,7 @@ pub fn read_touchable_scene(
     let edit = |text: &str, objects: &[ModelObject]| {
         let edited = with_pointers(text, objects)?;
         added = edited.added;
-        Some(edited.text)
+        Some(edited.edited)
     };
     let (mut scene, text) = read_edited_scene(path, text, parts, RunMode::RealTime, edit)?;
     // Nobody has chosen the size of added pointers.

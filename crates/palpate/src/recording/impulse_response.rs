@@ -36,6 +36,9 @@ pub trait ImpulseColumns: Debug + Send + Sync {
     /// Reason why the column cannot be used.
     fn prepare(&self, touchable: usize) -> Result<(), String>;
 
+    /// Memory that the columns which are not loaded yet will take [bytes].
+    fn missing_bytes(&self) -> u64;
+
     /// Column of a touchable degree of freedom, by its index in [`ImpulseResponse::touchable_dofs`]; zeros if it cannot be
     /// read.
     ///
@@ -94,6 +97,10 @@ impl ImpulseColumns for ColumnsInMemory {
         Ok(())
     }
 
+    fn missing_bytes(&self) -> u64 {
+        0
+    }
+
     fn column(&self, touchable: usize) -> Column<'_> {
         Column::F64(&self.numbers[touchable * self.length..(touchable + 1) * self.length])
     }
@@ -144,15 +151,6 @@ impl ImpulseResponse {
             self.columns.prepare(touchable).map_err(|what| ModelError::ImpulseResponse { what })?;
         }
         Ok(())
-    }
-
-    /// Memory of all columns [bytes].
-    pub fn bytes(&self) -> u64 {
-        let number = match self.columns.column(0) {
-            Column::F32(_) => 4,
-            Column::F64(_) => 8,
-        };
-        number * self.columns.column_length() as u64 * self.touchable_dofs.len() as u64
     }
 
     /// Surface nodes that forces may enter at, and all of them.

@@ -72,6 +72,11 @@ impl Fir {
         Ok(Self { recording, table, touchable, observed, gravity, modes, last_states })
     }
 
+    /// Table.
+    pub(super) fn table(&self) -> &ImpulseResponse {
+        &self.table
+    }
+
     /// Number of samples T.
     pub(super) fn samples(&self) -> usize {
         self.table.samples

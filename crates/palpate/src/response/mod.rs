@@ -99,6 +99,14 @@ impl Response {
         }
     }
 
+    /// Recorded table, if the response is one.
+    pub(crate) fn table(&self) -> Option<&ImpulseResponse> {
+        match self {
+            Self::Modal(_) => None,
+            Self::Fir(fir) => Some(fir.table()),
+        }
+    }
+
     /// Number of modes.
     pub(crate) fn modes(&self) -> usize {
         self.modal().len()

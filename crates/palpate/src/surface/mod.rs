@@ -83,7 +83,7 @@ impl Surface {
     }
 
     /// Whether a point's triangle exists and its weights are barycentric.
-    pub(crate) fn contains(&self, point: &SurfacePoint) -> bool {
+    pub fn contains(&self, point: &SurfacePoint) -> bool {
         (point.triangle as usize) < self.triangles.len()
             && libm::fabs(point.weights.iter().sum::<f64>() - 1.0) < 1e-9
             && point.weights.iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w))

@@ -6,7 +6,8 @@ mod table;
 use crate::commands::inspect;
 use crate::failure::Failure;
 use crate::progress::Bars;
-use crate::standard_streams::{FOLDER, STANDARD_INPUT, read_input, refuse, takes_output, write_output};
+use crate::standard_streams::{FOLDER, STANDARD_INPUT, read_input, refuse, takes_output};
+use crate::terminal::print_bytes;
 use clap::Args;
 use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
@@ -187,7 +188,8 @@ fn residual_choice(text: &str) -> Result<ResidualChoice, String> {
 pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     let output = arguments.output.as_deref();
     refuse(&[("--dense", arguments.dense.dense.as_deref().map(Path::new), FOLDER)])?;
-    let output_is_taken = takes_output(&[("-o", output)], arguments.json)?;
+    // A dry run writes no recording: standard output has its estimate.
+    let output_is_taken = takes_output(&[("-o", output)], arguments.json && !arguments.dry_run)?;
     let inputs: Vec<&Path> =
         [Some(Path::new(&arguments.source)), arguments.materials.as_deref()].into_iter().flatten().collect();
     if let Some(output) = output.filter(|_| !output_is_taken) {
@@ -211,7 +213,7 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
         progress.begin("writing", 1);
         let bytes = recorded.recording.to_bytes()?;
         if output_is_taken {
-            write_output(&bytes)?;
+            print_bytes(&bytes)?;
         } else {
             write_atomically(output, &bytes)?;
         }
