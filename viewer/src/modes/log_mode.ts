@@ -10,8 +10,10 @@ import { Timeline } from "../playback/timeline";
 import { element } from "../ui/elements";
 import type { PageLayout } from "../ui/page_layout";
 import { JobList } from "../ui/job_list";
+import { ScaleLock } from "../ui/scale_lock";
 import type { DisplayPanel } from "../ui/display_panel";
 import { AccuracyPanel } from "../ui/accuracy_panel";
+import { ComparisonPanels } from "../ui/comparison_panels";
 import { PlotPanels } from "../ui/plot_panels";
 import type { Notifications } from "../ui/notifications";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
@@ -23,7 +25,8 @@ const SERIES_RETRY_MS = 1500;
 interface Log {
   scene: SceneMessage;
   cache: FrameCache;
-  plots: PlotPanels;
+  /** Plots of the only log. */
+  plots: PlotPanels | null;
   caption: HTMLElement;
   shownFrame: number;
   seriesLoaded: boolean;
@@ -38,6 +41,8 @@ export class LogMode implements PageMode {
   private readonly accuracy = new AccuracyPanel();
   private readonly captions = element("div", { class: "captions" });
   private names: string[] = [];
+  /** Plots of several logs. */
+  private comparison: ComparisonPanels | null = null;
   private last = 0;
   private started = false;
   private loading: Promise<void> = Promise.resolve();
@@ -52,7 +57,8 @@ export class LogMode implements PageMode {
     this.timeline = new Timeline(this.player, () => sceneView.resetView());
     layout.toolbar.append(...this.timeline.parts);
     layout.overlayTop.append(this.jobs.box);
-    layout.viewArea.append(this.captions);
+    layout.viewArea.append(this.captions, new ScaleLock(sceneView).button);
+    sceneView.keepsForceRange = true;
     layout.controls.append(display.section);
     layout.measurements.append(this.accuracy.section);
     sceneView.canvas.setAttribute("aria-label", "The scene of the log. Drag to rotate the view.");
@@ -66,8 +72,11 @@ export class LogMode implements PageMode {
     this.sceneView.clear();
     for (const log of this.logs.splice(0)) {
       log.caption.remove();
-      for (const part of log.plots.sections) part.remove();
+      for (const part of log.plots?.sections ?? []) part.remove();
     }
+    for (const part of this.comparison?.sections ?? []) part.remove();
+    this.comparison = this.names.length > 1 ? new ComparisonPanels((time) => this.player.seek(time)) : null;
+    if (this.comparison !== null) for (const part of this.comparison.sections) this.layout.measurements.insertBefore(part, this.accuracy.section);
   }
 
   scene(scene: SceneMessage): void {
@@ -87,15 +96,17 @@ export class LogMode implements PageMode {
     const log: Log = {
       scene,
       cache,
-      plots: old?.plots ?? new PlotPanels(this.names.length > 1 ? name : ""),
+      plots: this.comparison === null ? (old?.plots ?? new PlotPanels()) : null,
       caption: old?.caption ?? element("span", { text: name }),
       shownFrame: -1,
       seriesLoaded: false,
     };
     cache.onFailure = (error) => this.notifications.notifyOnce(`frames ${index}`, `Frames did not come: ${error instanceof Error ? error.message : String(error)}`);
     if (old === undefined) {
-      log.plots.force.onSeek = log.plots.energy.onSeek = (time) => this.player.seek(time - this.startTime());
-      this.layout.measurements.insertBefore(element("div", {}, ...log.plots.sections), this.accuracy.section);
+      if (log.plots !== null) {
+        log.plots.force.onSeek = log.plots.energy.onSeek = (time) => this.player.seek(time - this.firstFrameTime);
+        for (const part of log.plots.sections) this.layout.measurements.insertBefore(part, this.accuracy.section);
+      }
       if (this.names.length > 1) this.captions.append(log.caption);
     }
     this.logs[index] = log;
@@ -118,7 +129,8 @@ export class LogMode implements PageMode {
     if (log.seriesLoaded || this.logs[index] !== log) return;
     try {
       const series = await fetchSeries(index);
-      log.plots.showSeries(series);
+      log.plots?.showSeries(series);
+      this.comparison?.setSeries(index, this.names[index] ?? log.scene.title, series);
       log.seriesLoaded = true;
     } catch {
       // Not computed yet: retried after a delay and on progress.
@@ -127,10 +139,6 @@ export class LogMode implements PageMode {
   }
 
   /** Simulation time of the first frame [s]; the timeline begins at 0. */
-  private startTime(): number {
-    return this.logs[0]?.scene === undefined ? 0 : this.firstFrameTime;
-  }
-
   private firstFrameTime = 0;
 
   frameReceived(): void {}
@@ -169,7 +177,13 @@ export class LogMode implements PageMode {
     const all = this.logs.map((log, i) => this.showLog(log, i, now));
     if (all.every(Boolean)) this.player.advance(seconds);
     this.timeline.show();
+    if (this.player.time !== this.markedTime) {
+      this.markedTime = this.player.time;
+      this.comparison?.setMarker(this.player.time);
+    }
   }
+
+  private markedTime = -1;
 
   private showLog(log: Log | undefined, index: number, now: number): boolean {
     const graph = this.sceneView.graphs[index];
@@ -185,8 +199,8 @@ export class LogMode implements PageMode {
       const frame = decodeFrame(bytes);
       if (frameNumber === 0) this.firstFrameTime = frame.time;
       graph.setFrame(frame, now / 1000);
-      log.plots.force.setMarker(frame.time);
-      log.plots.energy.setMarker(frame.time);
+      log.plots?.force.setMarker(frame.time);
+      log.plots?.energy.setMarker(frame.time);
       this.sceneView.requestRender();
     } catch (error) {
       this.notifications.notifyOnce(`frame of ${index}`, `A frame of the log cannot be drawn: ${error instanceof Error ? error.message : String(error)}`);
@@ -195,7 +209,8 @@ export class LogMode implements PageMode {
   }
 
   applyTheme(): void {
-    for (const log of this.logs) log?.plots.applyTheme();
+    for (const log of this.logs) log?.plots?.applyTheme();
+    this.comparison?.applyTheme();
   }
 
   handleKey(event: KeyboardEvent): boolean {

@@ -5,7 +5,6 @@ import type { PageMode } from "./page_mode";
 import { fetchFrames } from "../playback/log_requests";
 import { isColourMode } from "../rendering/colours";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
-import { niceCeil } from "../rendering/auto_range";
 import type { SceneView } from "../rendering/scene_view";
 import type { SceneGraph } from "../rendering/scene_graph";
 import { serverUrl } from "../protocol/urls";
@@ -51,6 +50,7 @@ export class RenderMode implements PageMode {
     const { width, height, camera } = request;
     sceneView.settings = { colour: isColourMode(request.colour) ? request.colour : "displacement", arrows: true, contactPoints: false, wireframe: false, dark: request.dark };
     sceneView.showsTime = true;
+    sceneView.keepsForceRange = true;
     document.body.append(sceneView.canvas, sceneView.overlay);
     const loaded = await loadScene(scene, sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);
     sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
@@ -60,12 +60,11 @@ export class RenderMode implements PageMode {
     if (camera !== null && camera !== undefined) sceneView.orbit.lookFrom(camera.from, camera.to);
 
     // First pass: common colour and force range of all images. Second pass: draw.
-    let largest = 0;
     for await (const frame of decodedFrames(request.frames)) {
       graph.setFrame(frame, 0);
-      largest = Math.max(largest, sceneView.maxValue());
+      sceneView.colourScale?.update(sceneView.maxValue());
     }
-    sceneView.setFixedRange(niceCeil(largest));
+    sceneView.setFixedRange(sceneView.colourScale?.value ?? null);
     let number = 0;
     for await (const frame of decodedFrames(request.frames)) await this.post(graph, frame, number++);
   }

@@ -23,11 +23,12 @@ export class Browser {
     return browser;
   }
 
-  /** Page in its own context; console errors are collected in `consoleErrors`. */
-  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1 } = {}) {
+  /** Page in its own context; console errors are collected in `consoleErrors`. Without its ghost finger, which would touch the scene. */
+  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1, ghost = false, calm = false } = {}) {
     const context = await this.chromium.newContext({
       viewport: { width, height },
       colorScheme: dark ? "dark" : "light",
+      reducedMotion: calm ? "reduce" : "no-preference",
       hasTouch: touch,
       isMobile: touch,
       deviceScaleFactor: scale,
@@ -40,7 +41,9 @@ export class Browser {
     page.on("console", (message) => {
       if (message.type() === "error") page.consoleErrors.push(message.text());
     });
-    await page.goto(url);
+    const address = new URL(url);
+    if (!ghost) address.searchParams.set("ghost", "off");
+    await page.goto(address.href);
     return page;
   }
 

@@ -1,4 +1,5 @@
 // Stand-in server: speaks docs/viewer-protocol.md with a simplified model of a box.
+// `pace`: simulated time per real time, as on a slow machine.
 //   node tests/standin/server.mjs [--port 8123] [--kind live|logs|render] [--logs 2] [--cells 12] [--modes 60] [--garbage]
 
 import { createReadStream, existsSync, readFileSync, statSync } from "node:fs";
@@ -25,7 +26,7 @@ function argument(name, otherwise) {
   return at < 0 ? otherwise : (process.argv[at + 1] ?? "");
 }
 
-export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null, warnings = [] } = {}) {
+export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null, warnings = [], pace = 1 } = {}) {
   const options = { cells, modes, warnings };
   let generation = 1;
   let scene = makeScene("bounce", generation, options);
@@ -46,10 +47,19 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
 
   function open(id) {
     generation++;
-    const { gravity } = scene.box;
+    const { gravity, friction, coupling } = scene.box;
     const same = id === scene.message.id;
     scene = makeScene(id, generation, options);
-    if (same) scene.box.gravity = gravity;
+    // A reset keeps changed settings.
+    if (same) Object.assign(scene.box, { gravity, friction, coupling });
+    tell();
+  }
+
+  /** Sends the scene with its present settings; pointers are free. */
+  function tell() {
+    const { gravity, friction, coupling, devices } = scene.box;
+    for (const device of devices) device.mode = 0;
+    Object.assign(scene.message, { generation, gravity, devices: scene.message.devices.map((device) => ({ ...device, friction, coupling })) });
     for (const viewer of viewers) viewer.pointers.clear();
     broadcast(scene.message);
   }
@@ -148,10 +158,13 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     reset: () => open(scene.message.id),
     cancel_job: cancelJob,
     open_scene: (_, message) => open(message.scene),
-    set_physics: (_, { gravity, friction, coupling }) => {
+    set_physics: (viewer, { gravity, step, friction, coupling }) => {
+      if (step !== undefined) return send(viewer, { type: "error", text: `the step is ${step} s, the stand-in has 0.001 s only` });
       if (gravity !== undefined) scene.box.gravity = gravity;
       if (friction !== undefined) scene.box.friction = friction;
       if (coupling !== undefined) scene.box.coupling = coupling;
+      generation++;
+      return tell();
     },
     set_material: () => record("cube"),
     stream: (viewer, { format, stride }) => Object.assign(viewer, { format, stride }),
@@ -200,7 +213,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   }
   function live() {
     const now = performance.now();
-    if (!paused) pendingTime += Math.min(0.1, (now - last) / 1000) / slowdown;
+    if (!paused) pendingTime += (pace * Math.min(0.1, (now - last) / 1000)) / slowdown;
     last = now;
     for (; pendingTime >= 0.001; pendingTime -= 0.001) scene.box.advance();
     for (const viewer of viewers) {
