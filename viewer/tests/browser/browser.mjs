@@ -80,6 +80,18 @@ export async function waitForScene(page) {
   await latestFrame(page);
 }
 
+/** Collects the messages that the page sends from now on in `window.sent`. */
+export function recordSent(page) {
+  return page.evaluate(() => {
+    const { send } = WebSocket.prototype;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) {
+      window.sent.push(JSON.parse(text));
+      return send.call(this, text);
+    };
+  });
+}
+
 /** Summary of the newest frame; waits for the first one of a scene that the page is loading (again). */
 export async function latestFrame(page) {
   const summary = await page.waitForFunction(

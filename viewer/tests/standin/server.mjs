@@ -45,11 +45,13 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     return boxBytes;
   };
 
-  function open(id) {
+  /** Opens a scene by its id, or the box under the name of an uploaded mesh. */
+  function open(id, upload = null) {
     generation++;
     const { gravity, friction, coupling } = scene.box;
     const same = id === scene.message.id;
     scene = makeScene(id, generation, options);
+    if (upload !== null) Object.assign(scene.message, { id: null, title: upload, about: "Your own mesh." });
     // A reset keeps changed settings.
     if (same) Object.assign(scene.box, { gravity, friction, coupling });
     tell();
@@ -84,7 +86,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       request.on("end", () => {
         const drawn = url.pathname.match(/^\/image\/(\d+)$/);
         if (drawn !== null) images[drawn[1]] = Buffer.concat(parts);
-        else record(url.searchParams.get("name") ?? "mesh");
+        else record("mesh", url.searchParams.get("name") ?? "mesh");
         response.writeHead(drawn !== null ? 204 : 202).end();
       });
       return undefined;
@@ -95,7 +97,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     return createReadStream(file).pipe(response);
   });
 
-  function record(job) {
+  function record(job, upload = null) {
     let share = 0;
     const timer = setInterval(() => {
       share += 0.1;
@@ -103,7 +105,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       if (share < 1) return broadcast({ type: "progress", job, phase, fraction: share });
       clearInterval(timer);
       broadcast({ type: "progress", job, phase: "certificate", fraction: 1, done: true });
-      return open(scene.message.id);
+      return open(scene.message.id, upload);
     }, 300);
     timer.unref();
     recording = { job, timer };
@@ -155,7 +157,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       slowdown = message.slowdown;
       status();
     },
-    reset: () => open(scene.message.id),
+    reset: () => open(scene.message.id, scene.message.id === null ? scene.message.title : null),
     cancel_job: cancelJob,
     open_scene: (_, message) => open(message.scene),
     set_physics: (viewer, { gravity, step, friction, coupling }) => {
