@@ -165,7 +165,7 @@ export class GhostFinger {
     context.arc(x, y, pressing ? 13 : 19, 0, 2 * Math.PI);
     context.stroke();
     context.setLineDash([]);
-    drawHand(context, x, y, pressing ? 0.92 : 1, palette.text, palette.halo);
+    drawHand(context, x, y, pressing ? 0.92 : 1);
     context.font = `500 12px ${FONT}`;
     context.textBaseline = "middle";
     context.lineJoin = "round";
@@ -181,16 +181,20 @@ export class GhostFinger {
 /** Outline of a pointing hand, whose finger tip is at the origin [px]. */
 const HAND = "M-5 6V2a5 5 0 0 1 10 0V17l3 -1a5 5 0 0 1 5 3l3 -.5a5 5 0 0 1 5 5V31a11 11 0 0 1 -11 11H3a11 11 0 0 1 -9 -5l-8 -12a4.500 4.500 0 0 1 7 -6l2 3z";
 
-function drawHand(context: CanvasRenderingContext2D, x: number, y: number, size: number, line: string, fill: string): void {
+/** Colours of the hand, in both themes. */
+const HAND_FILL = "#ffffffc0";
+const HAND_LINE = "#1d2730";
+
+function drawHand(context: CanvasRenderingContext2D, x: number, y: number, size: number): void {
   context.save();
   context.translate(x, y);
   context.scale(size, size);
   const hand = new Path2D(HAND);
-  context.fillStyle = fill;
+  context.fillStyle = HAND_FILL;
   context.fill(hand);
   context.lineWidth = 1.6;
   context.lineJoin = "round";
-  context.strokeStyle = line;
+  context.strokeStyle = HAND_LINE;
   context.stroke(hand);
   context.restore();
 }

@@ -5,6 +5,7 @@ import { decodeFrame } from "../protocol/frame";
 import type { PageMode } from "./page_mode";
 import { FrameCache } from "../playback/frame_cache";
 import { fetchFrames, fetchSeries } from "../playback/log_requests";
+import { larger, largestOfLog, type Largest } from "../playback/log_scales";
 import { Player } from "../playback/player";
 import { Timeline } from "../playback/timeline";
 import { element } from "../ui/elements";
@@ -21,6 +22,7 @@ import type { SceneView } from "../rendering/scene_view";
 import { PointerEvents } from "../interaction/pointer_events";
 
 const SERIES_RETRY_MS = 1500;
+const FRAMES_RETRY_MS = 400;
 
 interface Log {
   scene: SceneMessage;
@@ -46,6 +48,8 @@ export class LogMode implements PageMode {
   private last = 0;
   private started = false;
   private loading: Promise<void> = Promise.resolve();
+  /** Largest values of each log. */
+  private readonly scaled: Promise<Largest | null>[] = [];
 
   constructor(
     private readonly sceneView: SceneView,
@@ -58,7 +62,7 @@ export class LogMode implements PageMode {
     layout.toolbar.append(...this.timeline.parts);
     layout.overlayTop.append(this.jobs.box);
     layout.viewArea.append(this.captions, new ScaleLock(sceneView).button);
-    sceneView.keepsForceRange = true;
+    sceneView.showsLogs = true;
     layout.controls.append(display.section);
     layout.measurements.append(this.accuracy.section);
     sceneView.canvas.setAttribute("aria-label", "The scene of the log. Drag to rotate the view.");
@@ -70,6 +74,7 @@ export class LogMode implements PageMode {
     this.layout.about.textContent = this.names.length > 1 ? "Two logs, one timeline" : "Log playback";
     document.title = `${this.names.join(", ")} · palpate`;
     this.sceneView.clear();
+    this.scaled.length = 0;
     for (const log of this.logs.splice(0)) {
       log.caption.remove();
       for (const part of log.plots?.sections ?? []) part.remove();
@@ -123,6 +128,33 @@ export class LogMode implements PageMode {
       this.player.playing = true;
     }
     void this.loadSeries(index, log);
+    const measured = this.measure(index, log);
+    measured.catch(() => undefined); // Told where it is used.
+    this.scaled[index] = measured;
+    if (this.logs.filter((known) => known !== undefined).length === this.names.length) void this.fixScales([...this.scaled]);
+  }
+
+  /** Largest values of a log, once all of it is computed; null if another scene has taken its place. */
+  private async measure(index: number, log: Log): Promise<Largest | null> {
+    const graph = this.sceneView.graphs[index];
+    const isShown = () => this.logs[index] === log && this.sceneView.graphs[index] === graph;
+    const wait = async () => {
+      await new Promise((wake) => setTimeout(wake, FRAMES_RETRY_MS));
+      return isShown();
+    };
+    const largest = await largestOfLog(index, graph, this.sceneView, wait, () => graph.frame);
+    return isShown() ? largest : null;
+  }
+
+  /** Gives all logs the same scales, those of the largest values in any of them. */
+  private async fixScales(scaled: Promise<Largest | null>[]): Promise<void> {
+    try {
+      const all = await Promise.all(scaled);
+      if (all.every((largest) => largest !== null) && all.length > 0) this.sceneView.fixScales(all.reduce(larger));
+    } catch (error) {
+      // The scales go on growing with what is shown.
+      this.notifications.notifyOnce("scales", `The scales of the logs are not known: ${error instanceof Error ? error.message : String(error)}`);
+    }
   }
 
   private async loadSeries(index: number, log: Log): Promise<void> {

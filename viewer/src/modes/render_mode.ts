@@ -3,22 +3,27 @@
 
 import type { PageMode } from "./page_mode";
 import { fetchFrames } from "../playback/log_requests";
+import { largestOfLog } from "../playback/log_scales";
 import { isColourMode } from "../rendering/colours";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import type { SceneView } from "../rendering/scene_view";
 import type { SceneGraph } from "../rendering/scene_graph";
 import { serverUrl } from "../protocol/urls";
-import type { Hello, RenderRequest, SceneMessage } from "../protocol/messages";
+import type { Hello, Progress, RenderRequest, SceneMessage } from "../protocol/messages";
 import { decodeFrame, type Frame } from "../protocol/frame";
 
 const RETRY_INTERVAL_MS = 250;
 const FRAME_TIMEOUT_MS = 300_000;
 const BATCH_SIZE = 30;
+/** Silence after which the rest of a log is not waited for. */
+const SILENCE_MS = 10_000;
 
 /** Page mode of `palpate render`, without controls. */
 export class RenderMode implements PageMode {
   private request: RenderRequest | null = null;
   private started = false;
+  private progressedAt = performance.now();
+  private complete = false;
 
   constructor(private readonly sceneView: SceneView) {}
 
@@ -50,7 +55,7 @@ export class RenderMode implements PageMode {
     const { width, height, camera } = request;
     sceneView.settings = { colour: isColourMode(request.colour) ? request.colour : "displacement", arrows: true, contactPoints: false, wireframe: false, dark: request.dark };
     sceneView.showsTime = true;
-    sceneView.keepsForceRange = true;
+    sceneView.showsLogs = true;
     document.body.append(sceneView.canvas, sceneView.overlay);
     const loaded = await loadScene(scene, sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);
     sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
@@ -59,14 +64,16 @@ export class RenderMode implements PageMode {
     sceneView.orbit.reset();
     if (camera !== null && camera !== undefined) sceneView.orbit.lookFrom(camera.from, camera.to);
 
-    // First pass: common colour and force range of all images. Second pass: draw.
-    for await (const frame of decodedFrames(request.frames)) {
-      graph.setFrame(frame, 0);
-      sceneView.colourScale?.update(sceneView.maxValue());
-    }
-    sceneView.setFixedRange(sceneView.colourScale?.value ?? null);
+    // First pass: scales of the whole log. Second pass: draw.
+    sceneView.fixScales(await largestOfLog(0, graph, sceneView, () => this.waitForFrames(), () => null));
     let number = 0;
     for await (const frame of decodedFrames(request.frames)) await this.post(graph, frame, number++);
+  }
+
+  /** Waits for frames that are being computed; false if none has come for a while: the log ends early. */
+  private async waitForFrames(): Promise<boolean> {
+    await new Promise((wake) => setTimeout(wake, RETRY_INTERVAL_MS));
+    return !this.complete && performance.now() - this.progressedAt < SILENCE_MS;
   }
 
   private async post(graph: SceneGraph, frame: Frame, number: number): Promise<void> {
@@ -84,7 +91,10 @@ export class RenderMode implements PageMode {
 
   assigned(): void {}
 
-  progress(): void {}
+  progress({ done }: Progress): void {
+    this.progressedAt = performance.now();
+    this.complete ||= done === true;
+  }
 
   connectionLost(): void {}
 

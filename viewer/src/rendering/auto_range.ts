@@ -41,6 +41,12 @@ export class GrowingRange implements DisplayRange {
     this.isLocked = locked;
   }
 
+  /** Sets the end of the range for a largest value, and locks it. */
+  fix(largest: number): void {
+    this.range = Math.max(niceCeil(this.least), niceCeil(largest));
+    this.isLocked = true;
+  }
+
   update(value: number): boolean {
     const wanted = niceCeil(value);
     if (this.isLocked || !(wanted > this.range)) return false;

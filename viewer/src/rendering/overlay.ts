@@ -67,7 +67,7 @@ function overlap(a: Rectangle, b: Rectangle): boolean {
   return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 }
 
-const TITLES: Record<ColourMode, string> = { plain: "", displacement: "displacement", strain: "max. principal strain" };
+const TITLES: Record<ColourMode, string> = { plain: "", displacement: "Displacement", strain: "Max. principal strain" };
 
 function rangeLabel(mode: ColourMode, value: number): string {
   return mode === "strain" ? `${digits(100 * value, 2)}\u202f%` : withUnit(value, "m", 0, 2);

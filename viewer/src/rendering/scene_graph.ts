@@ -1,6 +1,6 @@
 // three.js scene graph of one palpate scene: elastic objects, planes, obstacles, device markers, force arrows.
 
-import { Color, type Object3D, Scene, Vector3, type Vector4, type WebGLRenderer } from "three";
+import { Color, type Object3D, Quaternion, Scene, Vector3, type Vector4, type WebGLRenderer } from "three";
 import type { SceneMessage } from "../protocol/messages";
 import type { DeviceFrame, Frame } from "../protocol/frame";
 import type { ModeShapes, Surface } from "../protocol/surface";
@@ -18,6 +18,8 @@ import type { DisplayRange } from "./auto_range";
 
 const MAX_SHADOWS = 2;
 const ARROW_CAPACITY = 256;
+/** Depth of the grid of a scene without ground below its centre, in its radii. */
+const GRID_BELOW = 1.15;
 
 /** Static data of a scene, fetched once. */
 export interface LoadedScene {
@@ -46,6 +48,8 @@ export class SceneGraph {
   readonly radius: number;
   private readonly groundPlanes = new Map<number, GroundPlane>();
   private readonly obstacles = new Map<number, ObstacleMesh>();
+  /** Grid below a scene without ground; not part of it. */
+  private readonly grid: GroundPlane | null;
   private readonly markers: DeviceMarker[];
   private readonly arrows = new Arrows(ARROW_CAPACITY);
   frame: Frame | null = null;
@@ -86,6 +90,7 @@ export class SceneGraph {
       this.scene.add(obstacle.group);
       this.casters.add(obstacle.shadow);
     });
+    this.grid = this.groundPlanes.size > 0 ? null : this.referenceGrid(up);
     this.markers = scene.devices.map((info) => new DeviceMarker(info, this.radius, up));
     for (const object of this.objects) {
       this.scene.add(object.group);
@@ -96,6 +101,16 @@ export class SceneGraph {
       this.casters.add(marker.shadow);
     }
     this.scene.add(this.arrows.group);
+  }
+
+  /** Faint level grid below the scene, against which motions and turns of the view are seen. */
+  private referenceGrid(up: Vector3): GroundPlane {
+    const grid = new GroundPlane(this.center, this.radius, up, false, true);
+    const { x, y, z } = this.center.clone().addScaledVector(up, -GRID_BELOW * this.radius);
+    const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 1, 0), up);
+    grid.setPose([x, y, z, turn.x, turn.y, turn.z, turn.w]);
+    this.scene.add(grid.group);
+    return grid;
   }
 
   /** Shows a frame; throws `FrameMismatch` without change if it belongs to another scene. */
@@ -153,6 +168,7 @@ export class SceneGraph {
     });
     for (const obstacle of this.obstacles.values()) obstacle.colour = palette.obstacle;
     for (const ground of this.groundPlanes.values()) ground.applyTheme(palette);
+    this.grid?.applyTheme(palette);
     for (const marker of this.markers) marker.applyTheme(palette);
     this.drawArrows(settings, palette);
   }
@@ -209,6 +225,7 @@ export class SceneGraph {
 
   dispose(): void {
     for (const part of [...this.objects, ...this.groundPlanes.values(), ...this.obstacles.values(), ...this.markers]) part.dispose();
+    this.grid?.dispose();
     this.arrows.dispose();
   }
 }

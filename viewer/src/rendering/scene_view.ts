@@ -52,11 +52,10 @@ export class SceneView {
   private readonly colourScales = new ColourScales();
   private scales = newScales({ objects: [] });
   private forceRange: DisplayRange = new AutoRange(LEAST_FORCE);
-  /** Whether the scale of the force vectors only grows, as for logs. */
-  keepsForceRange = false;
+  /** Whether logs are shown: the scale of their force vectors only grows, until it is fixed. */
+  showsLogs = false;
   /** Hook that is told where the colour bar is [px]; null without one. */
   colourBarMoved: ((box: Rectangle | null) => void) | null = null;
-  private fixedRange: number | null = null;
   private rangePending = false;
   private rangeUpdatedAt = -1;
   private dirty = true;
@@ -84,7 +83,7 @@ export class SceneView {
     this.graphs[index]?.dispose();
     if (index === 0) {
       this.scales = this.colourScales.of(loaded.scene);
-      this.forceRange = this.keepsForceRange ? new GrowingRange(LEAST_FORCE) : new AutoRange(LEAST_FORCE);
+      this.forceRange = this.showsLogs ? new GrowingRange(LEAST_FORCE) : new AutoRange(LEAST_FORCE);
     }
     const longest = ARROW_LENGTH * (index === 0 ? loaded.scene : this.graphs[0].info).view.radius;
     const graph = new SceneGraph(loaded, this.limits, this.reconstructsOnGpu, this.orbit.up, this.forceRange, longest);
@@ -169,13 +168,17 @@ export class SceneView {
     this.dirty = true;
   }
 
-  setFixedRange(range: number | null): void {
-    this.fixedRange = range;
-  }
-
   /** Scale of the colours that are shown; null without colours. */
   get colourScale(): GrowingRange | null {
     return this.settings.colour === "plain" ? null : this.scales[this.settings.colour];
+  }
+
+  /** Fixes the scales of logs by their largest displacement [m], strain and force [N]. */
+  fixScales(largest: { displacement: number; strain: number; force: number }): void {
+    this.scales.displacement.fix(largest.displacement);
+    this.scales.strain.fix(largest.strain);
+    if (this.forceRange instanceof GrowingRange) this.forceRange.fix(largest.force);
+    this.requestRender();
   }
 
   /** Locks the scale of the colours, or fits it anew. */
@@ -189,7 +192,7 @@ export class SceneView {
 
   get colourRange(): number {
     if (this.settings.colour === "plain") return 0;
-    return this.fixedRange ?? this.scales[this.settings.colour].value;
+    return this.scales[this.settings.colour].value;
   }
 
   /** Draws if anything changed; `now` [s]. */
@@ -207,7 +210,7 @@ export class SceneView {
     renderer.setScissorTest(false);
     renderer.setViewport(0, 0, size.width, size.height);
     if (this.graphs.length === 0) renderer.clear();
-    if (this.settings.colour === "displacement" && this.fixedRange === null) {
+    if (this.settings.colour === "displacement" && !this.scales.displacement.locked) {
       const estimates = this.graphs.flatMap((graph) => graph.objects.map((object) => object.approximateDisplacement));
       this.scales.displacement.update(Math.max(0, ...estimates));
     }
@@ -245,7 +248,7 @@ export class SceneView {
   /** Updates the colour range at intervals. */
   private updateRange(now: number): void {
     const mode = this.settings.colour;
-    if (mode === "plain" || this.fixedRange !== null || this.rangePending) return;
+    if (mode === "plain" || this.scales[mode].locked || this.rangePending) return;
     if (this.graphs.length === 0 || (now >= this.rangeUpdatedAt && now < this.rangeUpdatedAt + RANGE_INTERVAL_S && this.rangeUpdatedAt >= 0)) return;
     if (this.rangeUpdatedAt < 0 && this.graphs.every((graph) => graph.frame !== null)) {
       // First frame: updated synchronously.

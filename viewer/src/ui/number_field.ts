@@ -49,7 +49,7 @@ export function numberField(label: string, unit: string, tooltip: string, bounds
       refuse(found);
       return;
     }
-    message.hidden = true;
+    accept();
     onChange(input.valueAsNumber);
   });
   // Enter commits and leaves the field, so that keys act on the scene again.

@@ -63,7 +63,8 @@ export class PageLayout {
       iconButton("help", "Help and shortcuts (?)", actions.help),
     );
     this.viewArea.append(sceneView.canvas, sceneView.overlay, this.overlayTop, this.overlayBottom);
-    this.page.append(header, this.controls, this.viewArea, this.measurements, this.toolbar);
+    // The scene first, so that the keyboard reaches it in a few Tabs.
+    this.page.append(header, this.viewArea, this.toolbar, this.controls, this.measurements);
     releaseFocusAfterPointer(this.page);
     this.sidebar = window.matchMedia("(max-width: 899px)").matches ? null : "controls";
   }

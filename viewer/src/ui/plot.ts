@@ -15,7 +15,7 @@ export interface PlotSeries {
 }
 
 export class Plot {
-  private readonly canvas = element("div", { class: "plot" });
+  private readonly canvas = element("div", { class: "plot", role: "img" });
   private readonly legend = element("ul", { class: "legend" });
   readonly box = element("div", {}, this.canvas, this.legend);
   private readonly valueLabels: HTMLElement[] = [];
@@ -36,6 +36,7 @@ export class Plot {
   /** Sets the series, or rebuilds the plot with the current theme. */
   setSeries(series = this.series): void {
     this.series = series;
+    this.canvas.setAttribute("aria-label", `Plot over time in ${this.unit}: ${series.map(({ name }) => name).join(", ")}`);
     this.plot?.destroy();
     this.plot = null;
     this.valueLabels.length = 0;

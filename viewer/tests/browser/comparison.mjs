@@ -1,9 +1,10 @@
 // Logs that are compared, and colour scales that stay.
 
-import { assert, assertNoConsoleErrors, screenshot } from "./browser.mjs";
+import { assert, assertNoConsoleErrors, screenshot, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
-const bothShown = (page) => page.waitForFunction(() => window.palpate?.sceneView.graphs.length === 2 && window.palpate.sceneView.graphs.every((graph) => graph.frame !== null));
+const bothShown = (page) =>
+  page.waitForFunction(() => window.palpate?.sceneView.graphs.length === 2 && window.palpate.sceneView.graphs.every((graph) => graph.frame !== null), null, { timeout: 60_000 });
 const bothAt = (page, time) => page.waitForFunction((t) => window.palpate.sceneView.graphs.every((graph) => Math.abs(graph.frame.time - t) < 0.02), time);
 
 export const comparisonCases = [
@@ -46,7 +47,7 @@ export const comparisonCases = [
     },
   },
   {
-    name: "a colour scale grows and stays; locked it stays as it is, unlocked it is fitted anew",
+    name: "colour scales of logs are those of the whole log, the same in rendered images; unlocked they grow and stay",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ kind: "logs", logs: 2 }));
@@ -54,33 +55,53 @@ export const comparisonCases = [
       await bothShown(page);
       await page.keyboard.press("Space");
       await page.keyboard.press("c");
+      const lock = '[aria-label="Lock the colour scale"]';
       const range = () => page.evaluate(() => window.palpate.sceneView.colourRange);
+      const twoPictures = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
       const seek = async (time) => {
         await page.locator(".scrubber").fill(String(time));
         await bothAt(page, time);
+        await twoPictures();
       };
+      // All of the logs is measured.
+      await page.waitForSelector(`${lock}[aria-pressed="true"]`, { timeout: 60_000 });
+      const whole = await range();
+      const force = await page.evaluate(() => window.palpate.sceneView.graphs[1].forceRange.value);
+      for (const time of [0, 0.16, 1.6, 3.2]) {
+        await seek(time);
+        assert((await range()) === whole, `the scale goes from ${whole} to ${await range()}`);
+      }
+      await screenshot(page, "locked");
+
       await seek(0);
-      await page.click('[aria-label="Lock the colour scale"]');
-      await page.click('[aria-label="Lock the colour scale"]');
+      await page.click(lock);
       // The cube has not moved yet.
       await page.waitForFunction(() => window.palpate.sceneView.colourRange < 5e-4);
       await seek(1.6);
       await page.waitForFunction(() => window.palpate.sceneView.colourRange > 2e-3);
-      const pressed = await range();
       await seek(0);
-      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-      assert((await range()) === pressed, `the scale shrinks from ${pressed} to ${await range()}`);
-      await page.click('[aria-label="Lock the colour scale"]');
-      assert((await page.getAttribute('[aria-label="Lock the colour scale"]', "aria-pressed")) === "true", "not locked");
-      await page.click('[aria-label="Lock the colour scale"]');
-      await page.waitForFunction(() => window.palpate.sceneView.colourRange < 5e-4);
-      await page.click('[aria-label="Lock the colour scale"]');
+      await page.waitForFunction(() => window.palpate.sceneView.colourRange > 2e-3);
+      await page.click(lock);
       const locked = await range();
-      await seek(1.6);
-      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+      await seek(0.16);
       assert((await range()) === locked, `the locked scale goes from ${locked} to ${await range()}`);
-      await screenshot(page, "locked");
       assertNoConsoleErrors(page);
+      await page.context().close();
+
+      const single = browser.keep(await start({ kind: "logs", logs: 1 }));
+      const alone = await browser.page(single.url);
+      await waitForScene(alone);
+      await alone.keyboard.press("Space");
+      await alone.keyboard.press("c");
+      await alone.waitForSelector(`${lock}[aria-pressed="true"]`, { timeout: 60_000 });
+      const scales = (of) => of.evaluate(() => [window.palpate.sceneView.colourRange, window.palpate.sceneView.graphs[0].forceRange.value]);
+      const shown = await scales(alone);
+      await alone.context().close();
+      const render = browser.keep(await start({ kind: "render", render: { frames: [2, 3], width: 640, height: 360, camera: null, colour: "displacement", dark: false } }));
+      const drawn = await browser.page(render.url);
+      await drawn.waitForSelector('html[data-render="done"]', { timeout: 120_000 });
+      assert(JSON.stringify(await scales(drawn)) === JSON.stringify(shown), `rendered ${await scales(drawn)}, shown ${shown}`);
+      assert(whole >= shown[0] && force >= shown[1], `two logs: ${whole} m, ${force} N; one of them: ${shown}`);
     },
   },
 ];

@@ -219,7 +219,7 @@ export const handCases = [
       const page = await browser.page(server.url);
       await waitForScene(page);
       let paused = false;
-      for (const control of ["text=Contact points", ".toolbar .segmented label:nth-child(2)", "#controls summary >> text=Material", "text=Strain", '[aria-label="Lock the colour scale"]']) {
+      for (const control of ["text=Contact points", ".toolbar .segmented label:nth-child(2)", "#controls summary >> text=Material", "text=Max. principal strain", '[aria-label="Lock the colour scale"]']) {
         await page.click(control);
         await page.waitForFunction(() => document.activeElement === document.body || document.activeElement.tagName === "CANVAS");
         await page.keyboard.press("Space");

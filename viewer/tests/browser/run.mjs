@@ -9,12 +9,13 @@ import { handCases } from "./hand.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
 import { touchCases } from "./touching.mjs";
+import { robustCases } from "./robust.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const real = Boolean(process.env.PALPATE);
 const filter = process.argv[2] ?? "";
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;

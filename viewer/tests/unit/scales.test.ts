@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import { larger, sampleFrames } from "../../src/playback/log_scales";
 import { AutoRange, GrowingRange } from "../../src/rendering/auto_range";
 import { ColourScales } from "../../src/rendering/colour_scales";
 import type { SceneObject } from "../../src/protocol/messages";
@@ -38,4 +39,20 @@ test("a scene finds its scales again, another material has its own", () => {
   expect(scales.of(scene(2000)).displacement.value).toBe(5e-3);
   expect(scales.of(scene(9000)).displacement.value).toBe(2e-4);
   expect(scales.of({ ...scene(2000), title: "Other", id: "other" }).displacement.value).toBe(2e-4);
+});
+
+test("a fixed range is locked, and not below its least end", () => {
+  const range = new GrowingRange(0.01);
+  range.fix(0.3);
+  expect([range.value, range.locked, range.update(7)]).toEqual([0.5, true, false]);
+  range.fix(0);
+  expect(range.value).toBe(0.01);
+});
+
+test("samples of a log are spread evenly, with its ends", () => {
+  expect(sampleFrames(4)).toEqual([0, 1, 2, 3]);
+  expect(sampleFrames(0)).toEqual([]);
+  const some = sampleFrames(1000, 5);
+  expect(some).toEqual([0, 250, 500, 749, 999]);
+  expect(larger({ displacement: 1, strain: 5, force: 0 }, { displacement: 2, strain: 4, force: 3 })).toEqual({ displacement: 2, strain: 5, force: 3 });
 });
