@@ -5,7 +5,7 @@ import { decodeFrame } from "../protocol/frame";
 import type { PageMode } from "./page_mode";
 import { FrameCache } from "../playback/frame_cache";
 import { fetchFrames, fetchSeries } from "../playback/log_requests";
-import { larger, largestOfLog, type Largest } from "../playback/log_scales";
+import { larger, largestOfLog, LogProgress, type Largest } from "../playback/log_scales";
 import { Player } from "../playback/player";
 import { Timeline } from "../playback/timeline";
 import { element } from "../ui/elements";
@@ -22,7 +22,6 @@ import type { SceneView } from "../rendering/scene_view";
 import { PointerEvents } from "../interaction/pointer_events";
 
 const SERIES_RETRY_MS = 1500;
-const FRAMES_RETRY_MS = 400;
 
 interface Log {
   scene: SceneMessage;
@@ -50,6 +49,8 @@ export class LogMode implements PageMode {
   private loading: Promise<void> = Promise.resolve();
   /** Largest values of each log. */
   private readonly scaled: Promise<Largest | null>[] = [];
+  /** Progress of the computation of each log, by the name of its job. */
+  private readonly progresses = new Map<string, LogProgress>();
 
   constructor(
     private readonly sceneView: SceneView,
@@ -75,6 +76,7 @@ export class LogMode implements PageMode {
     document.title = `${this.names.join(", ")} · palpate`;
     this.sceneView.clear();
     this.scaled.length = 0;
+    this.progresses.clear();
     for (const log of this.logs.splice(0)) {
       log.caption.remove();
       for (const part of log.plots?.sections ?? []) part.remove();
@@ -138,12 +140,14 @@ export class LogMode implements PageMode {
   private async measure(index: number, log: Log): Promise<Largest | null> {
     const graph = this.sceneView.graphs[index];
     const isShown = () => this.logs[index] === log && this.sceneView.graphs[index] === graph;
-    const wait = async () => {
-      await new Promise((wake) => setTimeout(wake, FRAMES_RETRY_MS));
-      return isShown();
-    };
-    const largest = await largestOfLog(index, graph, this.sceneView, wait, () => graph.frame);
+    const largest = await largestOfLog(index, graph, this.sceneView, this.progressOf(`log ${index}`));
     return isShown() ? largest : null;
+  }
+
+  private progressOf(job: string): LogProgress {
+    const progress = this.progresses.get(job) ?? new LogProgress();
+    this.progresses.set(job, progress);
+    return progress;
   }
 
   /** Gives all logs the same scales, those of the largest values in any of them. */
@@ -181,6 +185,7 @@ export class LogMode implements PageMode {
 
   progress(progress: Progress): void {
     this.jobs.update(progress);
+    this.progressOf(progress.job).update(progress);
     if (progress.done !== true) return;
     this.logs.forEach((log, index) => {
       log.seriesLoaded = false;

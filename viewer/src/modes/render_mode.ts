@@ -3,7 +3,7 @@
 
 import type { PageMode } from "./page_mode";
 import { fetchFrames } from "../playback/log_requests";
-import { largestOfLog } from "../playback/log_scales";
+import { largestOfLog, LogProgress } from "../playback/log_scales";
 import { isColourMode } from "../rendering/colours";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import type { SceneView } from "../rendering/scene_view";
@@ -15,15 +15,12 @@ import { decodeFrame, type Frame } from "../protocol/frame";
 const RETRY_INTERVAL_MS = 250;
 const FRAME_TIMEOUT_MS = 300_000;
 const BATCH_SIZE = 30;
-/** Silence after which the rest of a log is not waited for. */
-const SILENCE_MS = 10_000;
 
 /** Page mode of `palpate render`, without controls. */
 export class RenderMode implements PageMode {
   private request: RenderRequest | null = null;
   private started = false;
-  private progressedAt = performance.now();
-  private complete = false;
+  private readonly logProgress = new LogProgress();
 
   constructor(private readonly sceneView: SceneView) {}
 
@@ -65,15 +62,9 @@ export class RenderMode implements PageMode {
     if (camera !== null && camera !== undefined) sceneView.orbit.lookFrom(camera.from, camera.to);
 
     // First pass: scales of the whole log. Second pass: draw.
-    sceneView.fixScales(await largestOfLog(0, graph, sceneView, () => this.waitForFrames(), () => null));
+    sceneView.fixScales(await largestOfLog(0, graph, sceneView, this.logProgress));
     let number = 0;
     for await (const frame of decodedFrames(request.frames)) await this.post(graph, frame, number++);
-  }
-
-  /** Waits for frames that are being computed; false if none has come for a while: the log ends early. */
-  private async waitForFrames(): Promise<boolean> {
-    await new Promise((wake) => setTimeout(wake, RETRY_INTERVAL_MS));
-    return !this.complete && performance.now() - this.progressedAt < SILENCE_MS;
   }
 
   private async post(graph: SceneGraph, frame: Frame, number: number): Promise<void> {
@@ -91,9 +82,8 @@ export class RenderMode implements PageMode {
 
   assigned(): void {}
 
-  progress({ done }: Progress): void {
-    this.progressedAt = performance.now();
-    this.complete ||= done === true;
+  progress(progress: Progress): void {
+    this.logProgress.update(progress);
   }
 
   connectionLost(): void {}

@@ -27,7 +27,7 @@ export class Hint {
     const details = element("details", {}, element("summary", { text: "How" }), element("ul", {}, ...gestures(touchScreen).map((text) => element("li", { text }))));
     const accuracy = element("button", { class: "link", type: "button", text: "certificate", on: { click: this.showAccuracy } });
     this.box.replaceChildren(
-      element("div", {}, element("strong", { text: `${verb} the ${name} and drag.` }), element("p", {}, `${why(scene)} (`, accuracy, ")."), details),
+      element("div", {}, element("strong", { text: `${verb} the ${name} and drag.` }), element("p", {}, `${why(scene)} `, element("span", { class: "together" }, "(", accuracy, ").")), details),
       iconButton("close", "Hide this hint", () => this.dismiss()),
     );
     this.box.hidden = false;

@@ -254,7 +254,7 @@ export const handCases = [
     },
   },
   {
-    name: "a machine that is too slow is told, and one that keeps up is not",
+    name: "a scene that is slower than real time says so until it is paused",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ pace: 0.4 }));
