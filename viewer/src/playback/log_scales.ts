@@ -1,5 +1,5 @@
-// Scales of a log: the largest displacement, strain and force of frames that are spread evenly over it. They depend on the log alone, so that the
-// page and `palpate render` draw the same colours and arrows, whatever part of it they show.
+// Scales of a log: the largest displacement, strain and force of frames that are spread evenly over it. They depend on the frames of the log alone,
+// so that the page and `palpate render` draw the same colours and arrows, whatever part of it they show.
 
 import { decodeFrame, type Frame } from "../protocol/frame";
 import type { Progress } from "../protocol/messages";
