@@ -171,9 +171,11 @@ export class GhostFinger {
     context.lineJoin = "round";
     context.lineWidth = 3.5;
     context.strokeStyle = palette.halo;
-    context.strokeText("ghost finger", x + 32, y + 22);
+    // Below the hand: labels of forces stand to the right of their arrows.
+    context.textAlign = "center";
+    context.strokeText("ghost finger", x, y + 56);
     context.fillStyle = palette.text;
-    context.fillText("ghost finger", x + 32, y + 22);
+    context.fillText("ghost finger", x, y + 56);
     context.restore();
   }
 }

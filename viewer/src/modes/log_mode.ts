@@ -125,7 +125,9 @@ export class LogMode implements PageMode {
     this.player.duration = Math.max(...durations);
     this.player.frameSeconds = this.logs[0]?.scene.frame_interval_s ?? 1 / 60;
     this.accuracy.update(this.logs.filter((known) => known !== undefined).map((known) => known.scene));
-    if (!this.started) {
+    const all = this.logs.filter((known) => known !== undefined).length === this.names.length;
+    // A short log would end the playback before a longer one is there.
+    if (!this.started && all) {
       this.started = true;
       this.player.playing = true;
     }
@@ -133,7 +135,7 @@ export class LogMode implements PageMode {
     const measured = this.measure(index, log);
     measured.catch(() => undefined); // Told where it is used.
     this.scaled[index] = measured;
-    if (this.logs.filter((known) => known !== undefined).length === this.names.length) void this.fixScales([...this.scaled]);
+    if (all) void this.fixScales([...this.scaled]);
   }
 
   /** Largest values of a log, once all of it is computed; null if another scene has taken its place. */
