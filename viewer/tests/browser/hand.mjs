@@ -129,14 +129,51 @@ export const handCases = [
     },
   },
   {
+    name: "a held patch is a disc that lies on the surface, a touching finger a ball",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      await waitForRest(page);
+      await page.evaluate(() => window.palpate.sceneView.orbit.rotate(0, 0.5));
+      const { x, y } = await pixelOf(page, 0, 0.35);
+      await page.mouse.move(x, y);
+      for (const [mode, disc] of [
+        ["touch", false],
+        ["held", true],
+      ]) {
+        await page.mouse.down();
+        // Of the top face: its axis is upright.
+        await page.waitForFunction(
+          ([wanted, lying]) => {
+            const [graph] = window.palpate.sceneView.graphs;
+            const i = graph.frame?.devices.findIndex((device) => device.mode === wanted) ?? -1;
+            if (i < 0) return false;
+            const marker = graph.markers[i];
+            const { x: a, z: b } = marker.disc.quaternion;
+            return marker.disc.visible === lying && marker.proxy.visible === !lying && (!lying || 1 - 2 * (a * a + b * b) > 0.9);
+          },
+          [mode, disc],
+        );
+        await page.mouse.up();
+        await released(page);
+        await page.keyboard.press("g");
+      }
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
     name: "an object that was thrown away is followed, or brought back, and V shows it",
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
       await waitForScene(page);
+      assert(await page.evaluate(() => window.palpate.sceneView.graphs[0].grid === null), "a second grid");
       await page.click("text=Weightless cube");
       await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame !== null && window.palpate.sceneView.graphs[0].info.id === "float");
+      // Motions of a scene without ground are seen against a grid; a ground has its own.
+      assert(await page.evaluate(() => window.palpate.sceneView.graphs[0].grid !== null), "there is no grid");
       const inView = () => {
         const { sceneView } = window.palpate;
         const { x, y } = sceneView.toPixels(sceneView.graphs[0].objects[0].group.position);
