@@ -29,7 +29,7 @@ const PLACES: readonly (readonly [number, number])[] = [
 
 /** Where it may press. */
 export interface GhostConditions {
-  /** Whether the scene moves and no one else touches it. */
+  /** Whether the scene is one of the built-in ones, moves, and no one else touches it. */
   free: boolean;
 }
 

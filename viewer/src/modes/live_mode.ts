@@ -294,7 +294,7 @@ export class LiveMode implements PageMode {
     this.keyboard.animate(now);
     this.gamepads.animate(now);
     this.touches.animate(now);
-    this.ghost.animate(now, { free: !this.toolbar.isPaused && !this.isTouched() });
+    this.ghost.animate(now, { free: this.isBuiltIn() && !this.toolbar.isPaused && !this.isTouched() });
     const graph = this.sceneView.graphs[0];
     if (this.frameIsNew && this.frame !== null && graph !== undefined) {
       this.frameIsNew = false;
@@ -315,6 +315,11 @@ export class LiveMode implements PageMode {
       this.lostCheckedAt = now;
       this.lostObjects.show(this.sceneView.lostObjects());
     }
+  }
+
+  /** Whether the server lists the scene: in scenes of the user's own nothing moves by itself. */
+  private isBuiltIn(): boolean {
+    return typeof this.requestedScene?.id === "string";
   }
 
   /** Whether a pointer other than the ghost touches the scene. */

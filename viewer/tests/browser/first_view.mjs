@@ -72,6 +72,26 @@ export const firstViewCases = [
     },
   },
   {
+    name: "a scene of the user's own is left alone",
+    standinOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start());
+      server.scene.message.id = null;
+      const page = await browser.page(server.url, { ghost: true });
+      await recordSent(page);
+      await waitForScene(page);
+      await waitForSteps(page, 6000);
+      assert((await presses(page)) === 0, "the ghost finger presses");
+      const { x, y } = await pixelOf(page, 0, 0.2);
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await page.waitForFunction(anyPressed);
+      await page.mouse.up();
+      assert((await presses(page)) === 1, "a press is not recorded");
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
     name: "the hint names what is special in one line, leads to the certificate, and stays closed",
     async run(browser) {
       const server = browser.keep(await start());
