@@ -61,7 +61,8 @@ export async function largestOfLog(log: number, graph: SceneGraph, sceneView: Sc
     }
     const before = graph.frame;
     largest = larger(largest, measure(decodeFrame(bytes), graph, sceneView));
-    if (before !== null) graph.setFrame(before, 0);
+    if (before === null) graph.frame = null;
+    else graph.setFrame(before, 0);
   }
   return largest;
 }

@@ -80,6 +80,12 @@ export async function waitForScene(page) {
   await latestFrame(page);
 }
 
+/** Pauses the playback of logs, which may have come to its end. */
+export async function pausePlayback(page) {
+  if (await page.isVisible('[aria-label="Pause (Space)"]')) await page.keyboard.press("Space");
+  await page.waitForSelector('[aria-label="Play (Space)"]');
+}
+
 /** Collects the messages that the page sends from now on in `window.sent`. */
 export function recordSent(page) {
   return page.evaluate(() => {

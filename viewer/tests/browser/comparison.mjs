@@ -1,6 +1,6 @@
 // Logs that are compared, and colour scales that stay.
 
-import { assert, assertNoConsoleErrors, screenshot, waitForScene } from "./browser.mjs";
+import { assert, assertNoConsoleErrors, pausePlayback, screenshot, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 const bothShown = (page) =>
@@ -19,7 +19,7 @@ export const comparisonCases = [
       ]) {
         const page = await browser.page(server.url, options);
         await bothShown(page);
-        await page.keyboard.press("Space");
+        await pausePlayback(page);
         const names = page.locator("#measurements details:first-of-type .legend .name");
         await names.nth(2).waitFor();
         assert(JSON.stringify(await names.allTextContents()) === JSON.stringify(["pressed.mcap", "pressed-wider.mcap", "Difference"]), `${await names.allTextContents()}`);
@@ -53,7 +53,7 @@ export const comparisonCases = [
       const server = browser.keep(await start({ kind: "logs", logs: 2 }));
       const page = await browser.page(server.url);
       await bothShown(page);
-      await page.keyboard.press("Space");
+      await pausePlayback(page);
       await page.keyboard.press("c");
       const lock = '[aria-label="Lock the colour scale"]';
       const range = () => page.evaluate(() => window.palpate.sceneView.colourRange);
@@ -91,7 +91,7 @@ export const comparisonCases = [
       const single = browser.keep(await start({ kind: "logs", logs: 1 }));
       const alone = await browser.page(single.url);
       await waitForScene(alone);
-      await alone.keyboard.press("Space");
+      await pausePlayback(alone);
       await alone.keyboard.press("c");
       await alone.waitForSelector(`${lock}[aria-pressed="true"]`, { timeout: 60_000 });
       const scales = (of) => of.evaluate(() => [window.palpate.sceneView.colourRange, window.palpate.sceneView.graphs[0].forceRange.value]);
