@@ -171,11 +171,11 @@ export class GhostFinger {
     context.lineJoin = "round";
     context.lineWidth = 3.5;
     context.strokeStyle = palette.halo;
-    // Below the hand: labels of forces stand to the right of their arrows.
-    context.textAlign = "center";
-    context.strokeText("ghost finger", x, y + 56);
+    // To the left: labels of forces stand to the right of their arrows.
+    context.textAlign = "right";
+    context.strokeText("ghost finger", x - 22, y + 24);
     context.fillStyle = palette.text;
-    context.fillText("ghost finger", x, y + 56);
+    context.fillText("ghost finger", x - 22, y + 24);
     context.restore();
   }
 }
