@@ -69,7 +69,7 @@ export class PointerEvents {
     if (this.touches?.has(this.key(event)) === true) {
       const { x, y } = this.sceneView.toNdc(event.clientX, event.clientY);
       this.touches.move(this.key(event), x, y);
-      if (event.pointerType === "pen" && event.pressure > 0) this.touches.press(this.key(event), event.pressure);
+      if (event.pointerType === "pen" && event.pressure > 0) this.touches.pressWith(this.key(event), event.pressure);
       return;
     }
     const pointer = this.cameraPointers.get(event.pointerId);
@@ -84,7 +84,7 @@ export class PointerEvents {
     const down = (event.clientY - pointer.y) / height;
     const others = [...this.cameraPointers.values()].filter((other) => other !== pointer);
     if (others.length === 0) {
-      if (pointer.pans) orbit.pan(right, down);
+      if (pointer.pans) this.pan(right, down);
       else orbit.rotate(ROTATION_PER_HEIGHT * right, ROTATION_PER_HEIGHT * down);
     } else {
       // Two-finger gesture: pinch zooms, parallel motion pans.
@@ -92,10 +92,15 @@ export class PointerEvents {
       const before = Math.hypot(pointer.x - other.x, pointer.y - other.y);
       const after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
       if (before > 8 && after > 8) orbit.zoom(before / after);
-      orbit.pan(right / 2, down / 2);
+      this.pan(right / 2, down / 2);
     }
     pointer.x = event.clientX;
     pointer.y = event.clientY;
+  }
+
+  private pan(right: number, down: number): void {
+    this.sceneView.stopFollowing();
+    this.sceneView.orbit.pan(right, down);
   }
 
   private hover(event: PointerEvent): void {

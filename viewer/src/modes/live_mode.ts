@@ -17,17 +17,24 @@ import { MaterialPanel } from "../ui/material_panel";
 import { AccuracyPanel } from "../ui/accuracy_panel";
 import { PlotPanels } from "../ui/plot_panels";
 import { TimingPanel } from "../ui/timing_panel";
+import { LostObjects } from "../ui/lost_objects";
+import { OwnSettings } from "../ui/physics_settings";
+import { Pace, paceText } from "../ui/pace";
+import { ScaleLock } from "../ui/scale_lock";
 import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
 import type { SceneView } from "../rendering/scene_view";
 import { GamepadPointers } from "../interaction/gamepad_pointers";
+import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
 import { PointerEvents } from "../interaction/pointer_events";
 import { Touches } from "../interaction/touches";
 import type { PageMode } from "./page_mode";
 
-const OUT_OF_VIEW_INTERVAL_MS = 700;
+const LOST_INTERVAL_MS = 700;
+/** Message at a press while the scene is paused. */
+const PAUSED = "Paused: the press acts when time goes on (Space), or step by step (.)";
 
 /** Page mode of a running scene. */
 export class LiveMode implements PageMode {
@@ -36,7 +43,8 @@ export class LiveMode implements PageMode {
   private readonly keyboard: KeyboardPointer;
   private readonly gamepads: GamepadPointers;
   private readonly toolbar: LiveToolbar;
-  private readonly hint = new Hint();
+  private readonly ghost: GhostFinger;
+  private readonly hint: Hint;
   private readonly forceReadout = new ForceReadout();
   private readonly jobs = new JobList(() => this.cancelJob());
   private readonly meshUpload: MeshUpload;
@@ -47,8 +55,11 @@ export class LiveMode implements PageMode {
   private readonly timing = new TimingPanel();
   private readonly accuracy = new AccuracyPanel();
   private readonly viewers = element("span", { class: "chip" });
-  private readonly outOfView = element("button", { class: "button out-of-view", type: "button", text: "Object out of view: show it" });
-  private outOfViewCheckedAt = 0;
+  private readonly paceChip = element("span", { class: "chip slow", role: "status", title: "This machine computes the scene more slowly than it should run" });
+  private readonly pace = new Pace();
+  private readonly lostObjects: LostObjects;
+  private lostCheckedAt = 0;
+  private readonly ownSettings = new OwnSettings();
   private readonly loading = element("div", { class: "loading", role: "status" });
   private loadAbort: AbortController | null = null;
   private requestedScene: SceneMessage | null = null;
@@ -66,7 +77,12 @@ export class LiveMode implements PageMode {
   ) {
     const send = connection.send.bind(connection);
     const first: TouchMode = window.matchMedia("(pointer: coarse)").matches ? "hold" : "touch";
-    this.touches = new Touches(sceneView, send);
+    this.touches = new Touches(sceneView, send, { first: 0, count: GHOST_POINTER.first });
+    this.ghost = new GhostFinger(sceneView, send);
+    this.hint = new Hint(() => this.showAccuracy());
+    if (this.hint.isDismissed || !wantsGhost(window.location.href, window.matchMedia("(prefers-reduced-motion: reduce)").matches)) this.ghost.stop();
+    // Before the canvas gets the press, so that the device slot is free.
+    document.addEventListener("pointerdown", (event) => event.target === sceneView.canvas && this.ghost.stop(), { capture: true });
     this.pointers = new PointerEvents(sceneView, this.touches);
     this.pointers.mode = first;
     const mode = () => this.pointers.mode;
@@ -75,7 +91,11 @@ export class LiveMode implements PageMode {
       const force = this.frame?.devices[device]?.force ?? [0, 0, 0];
       return Math.hypot(...force) / (sceneView.graphs[0]?.forceRange.value ?? 1);
     });
-    this.touches.onBegin = () => this.hint.dismiss();
+    this.touches.onBegin = () => {
+      this.ghost.stop();
+      this.hint.dismiss();
+      if (this.toolbar.isPaused) this.notifications.notify(PAUSED);
+    };
     this.touches.onRefused = () => this.notifications.notify("All device slots of this scene are in use. Try again when another pointer is released.");
     this.toolbar = new LiveToolbar(
       send,
@@ -83,34 +103,62 @@ export class LiveMode implements PageMode {
       (chosen) => {
         this.pointers.mode = chosen;
       },
+      () => this.reset(),
       () => sceneView.resetView(),
+    );
+    this.lostObjects = new LostObjects(
+      () => sceneView.followObjects(),
+      () => this.restart(),
     );
     this.scenes = new ScenesPanel((id) => send({ type: "open_scene", scene: id }));
     this.physics = new PhysicsPanel(send);
+    notifications.onError = (text) => this.physics.refused(text);
     this.material = new MaterialPanel(send);
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
     this.viewers.hidden = true;
-    this.outOfView.hidden = true;
-    this.outOfView.addEventListener("click", () => sceneView.resetView());
+    this.paceChip.hidden = true;
     this.loading.hidden = true;
-    layout.chips.append(this.viewers);
+    layout.chips.append(this.paceChip, this.viewers);
     layout.toolbar.append(...this.toolbar.parts);
     layout.overlayTop.append(this.forceReadout.box, this.hint.box, this.jobs.box);
-    layout.overlayBottom.append(this.outOfView);
-    layout.viewArea.append(this.loading);
+    layout.overlayBottom.append(this.lostObjects.box);
+    layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
     layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section);
     layout.measurements.append(...this.plots.sections, this.timing.section, this.accuracy.section);
     layout.page.append(meshUpload.dialog);
     sceneView.drawOverlay = (context, view) => {
       this.keyboard.draw(context, view);
       this.gamepads.draw(context, view, performance.now());
+      this.touches.draw(context, view);
+      this.ghost.draw(context, view);
     };
   }
 
+  /** Opens the certificates. */
+  private showAccuracy(): void {
+    this.layout.sidebar = "measurements";
+    this.accuracy.section.open = true;
+    this.accuracy.section.scrollIntoView();
+  }
+
+  /** Begins the scene again with the settings that it came with, and shows it as at first. */
+  private reset(): void {
+    const scene = this.requestedScene;
+    const restoration = scene === null ? null : this.ownSettings.restoration(scene);
+    if (restoration !== null) this.connection.send(restoration);
+    this.restart();
+  }
+
+  /** Begins the scene again with its present settings. */
+  private restart(): void {
+    this.connection.send({ type: "reset" });
+    this.sceneView.resetToStart();
+  }
+
   hello(hello: Hello): void {
-    this.touches.clear();
+    this.suspend();
     this.scenes.setScenes(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
     this.meshUpload.section.hidden = !hello.records;
@@ -128,13 +176,24 @@ export class LiveMode implements PageMode {
   }
 
   visibilityChanged(): void {
-    if (document.hidden) this.touches.endAll();
+    if (document.hidden) {
+      this.touches.endAll();
+      this.ghost.interrupt();
+      this.ghost.resume();
+    }
     this.stream();
+  }
+
+  /** Lets presses wait for the next frame of a scene that is loaded. */
+  private suspend(): void {
+    this.touches.suspend();
+    this.ghost.interrupt();
+    this.frameIsNew = false;
   }
 
   scene(scene: SceneMessage): void {
     this.loadAbort?.abort();
-    this.touches.clear();
+    this.suspend();
     this.pointers.clear();
     const loadAbort = new AbortController();
     this.loadAbort = loadAbort;
@@ -143,7 +202,10 @@ export class LiveMode implements PageMode {
     this.layout.about.textContent = scene.about;
     this.layout.about.title = scene.about;
     document.title = `${scene.title} · palpate`;
-    this.scenes.setCurrent(scene.id);
+    this.ownSettings.note(scene);
+    const again = scene.id === null ? this.meshUpload.again(scene.title) : undefined;
+    if (again !== undefined) this.scenes.addUpload(scene.title, again);
+    this.scenes.setCurrent(scene.id, scene.title);
     this.physics.update(scene);
     this.material.update(scene);
     this.accuracy.update([scene]);
@@ -165,7 +227,7 @@ export class LiveMode implements PageMode {
         this.plots.reset(scene);
         this.frame = null;
         this.showLoading(null);
-        this.hint.show(scene.objects[0]?.name ?? "object", Math.round(1 / scene.step_s), scene.devices.some((device) => device.pointer));
+        this.hint.show(scene);
       })
       .catch((error: unknown) => {
         if (loadAbort.signal.aborted) return;
@@ -198,13 +260,23 @@ export class LiveMode implements PageMode {
   status(status: Status): void {
     this.toolbar.update(status);
     this.timing.update(status);
+    this.showPace(status);
     this.viewers.hidden = !(status.viewers > 1);
     this.viewers.textContent = `${status.viewers} viewers`;
     this.viewers.title = "Everybody who has this page open sees and touches the same scene";
   }
 
+  private showPace(status: Status): void {
+    const scene = this.requestedScene;
+    const pace = scene === null ? null : this.pace.update(status, scene.step_s, performance.now() / 1000);
+    const text = paceText(pace, status.slowdown);
+    this.paceChip.hidden = text === null;
+    this.paceChip.textContent = text;
+  }
+
   assigned(message: DeviceAssigned): void {
     this.touches.assign(message.pointer, message.device);
+    this.ghost.assign(message.pointer, message.device);
   }
 
   progress(progress: Progress): void {
@@ -212,8 +284,8 @@ export class LiveMode implements PageMode {
   }
 
   connectionLost(): void {
-    this.touches.clear();
-    this.pointers.clear();
+    this.suspend();
+    this.paceChip.hidden = true;
     this.jobs.clear();
     this.timing.clear();
     this.forceReadout.show(null, null, []);
@@ -223,12 +295,15 @@ export class LiveMode implements PageMode {
     this.keyboard.animate(now);
     this.gamepads.animate(now);
     this.touches.animate(now);
+    this.ghost.animate(now, { free: this.isBuiltIn() && !this.toolbar.isPaused && !this.isTouched() });
     const graph = this.sceneView.graphs[0];
     if (this.frameIsNew && this.frame !== null && graph !== undefined) {
       this.frameIsNew = false;
       try {
         graph.setFrame(this.frame, now / 1000);
         this.sceneView.requestRender();
+        this.touches.resume();
+        this.ghost.resume();
         this.onForces?.(this.frame);
       } catch (error) {
         if (!(error instanceof FrameMismatch)) throw error;
@@ -237,10 +312,21 @@ export class LiveMode implements PageMode {
     }
     this.forceReadout.show(this.frame, graph?.info ?? null, this.touches.devices);
     this.plots.animate(now);
-    if (now - this.outOfViewCheckedAt > OUT_OF_VIEW_INTERVAL_MS) {
-      this.outOfViewCheckedAt = now;
-      this.outOfView.hidden = !this.sceneView.isOutOfView;
+    if (now - this.lostCheckedAt > LOST_INTERVAL_MS) {
+      this.lostCheckedAt = now;
+      this.lostObjects.show(this.sceneView.lostObjects());
     }
+  }
+
+  /** Whether the server lists the scene: in scenes of the user's own nothing moves by itself. */
+  private isBuiltIn(): boolean {
+    return typeof this.requestedScene?.id === "string";
+  }
+
+  /** Whether a pointer other than the ghost touches the scene. */
+  private isTouched(): boolean {
+    const info = this.sceneView.graphs[0]?.info;
+    return this.frame?.devices.some(({ mode }, i) => mode !== "inactive" && info?.devices[i]?.pointer === true && i !== this.ghost.device) ?? false;
   }
 
   applyTheme(): void {

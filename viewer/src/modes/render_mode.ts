@@ -3,13 +3,13 @@
 
 import type { PageMode } from "./page_mode";
 import { fetchFrames } from "../playback/log_requests";
+import { largestOfLog, LogProgress } from "../playback/log_scales";
 import { isColourMode } from "../rendering/colours";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
-import { niceCeil } from "../rendering/auto_range";
 import type { SceneView } from "../rendering/scene_view";
 import type { SceneGraph } from "../rendering/scene_graph";
 import { serverUrl } from "../protocol/urls";
-import type { Hello, RenderRequest, SceneMessage } from "../protocol/messages";
+import type { Hello, Progress, RenderRequest, SceneMessage } from "../protocol/messages";
 import { decodeFrame, type Frame } from "../protocol/frame";
 
 const RETRY_INTERVAL_MS = 250;
@@ -20,6 +20,7 @@ const BATCH_SIZE = 30;
 export class RenderMode implements PageMode {
   private request: RenderRequest | null = null;
   private started = false;
+  private readonly logProgress = new LogProgress();
 
   constructor(private readonly sceneView: SceneView) {}
 
@@ -51,6 +52,7 @@ export class RenderMode implements PageMode {
     const { width, height, camera } = request;
     sceneView.settings = { colour: isColourMode(request.colour) ? request.colour : "displacement", arrows: true, contactPoints: false, wireframe: false, dark: request.dark };
     sceneView.showsTime = true;
+    sceneView.showsLogs = true;
     document.body.append(sceneView.canvas, sceneView.overlay);
     const loaded = await loadScene(scene, sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);
     sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
@@ -59,13 +61,8 @@ export class RenderMode implements PageMode {
     sceneView.orbit.reset();
     if (camera !== null && camera !== undefined) sceneView.orbit.lookFrom(camera.from, camera.to);
 
-    // First pass: common colour and force range of all images. Second pass: draw.
-    let largest = 0;
-    for await (const frame of decodedFrames(request.frames)) {
-      graph.setFrame(frame, 0);
-      largest = Math.max(largest, sceneView.maxValue());
-    }
-    sceneView.setFixedRange(niceCeil(largest));
+    // First pass: scales of the whole log. Second pass: draw.
+    sceneView.fixScales(await largestOfLog(0, graph, sceneView, this.logProgress));
     let number = 0;
     for await (const frame of decodedFrames(request.frames)) await this.post(graph, frame, number++);
   }
@@ -85,7 +82,9 @@ export class RenderMode implements PageMode {
 
   assigned(): void {}
 
-  progress(): void {}
+  progress(progress: Progress): void {
+    this.logProgress.update(progress);
+  }
 
   connectionLost(): void {}
 

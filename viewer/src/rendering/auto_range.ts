@@ -1,4 +1,4 @@
-// Display ranges of 1, 2 or 5 times a power of ten, with hysteresis.
+// Display ranges of 1, 2 or 5 times a power of ten: growing ones, which can be locked, and ones with hysteresis.
 
 const STEPS = [1, 2, 5, 10];
 
@@ -11,10 +11,54 @@ export function niceCeil(value: number): number {
   return Number((step * power).toPrecision(1));
 }
 
+/** Display range that follows values. */
+export interface DisplayRange {
+  readonly value: number;
+  /** Adds a value at time `now` [s]; returns true if the range has changed. */
+  update(value: number, now: number): boolean;
+}
+
+/** Range that only grows, and not at all while it is locked: a colour or an arrow means the same from then on. */
+export class GrowingRange implements DisplayRange {
+  private range: number;
+  private isLocked = false;
+
+  constructor(private readonly least: number) {
+    this.range = niceCeil(least);
+  }
+
+  get value(): number {
+    return this.range;
+  }
+
+  get locked(): boolean {
+    return this.isLocked;
+  }
+
+  /** Locks the range; unlocked it is fitted anew, from its least value. */
+  set locked(locked: boolean) {
+    if (this.isLocked && !locked) this.range = niceCeil(this.least);
+    this.isLocked = locked;
+  }
+
+  /** Sets the end of the range for a largest value, and locks it. */
+  fix(largest: number): void {
+    this.range = Math.max(niceCeil(this.least), niceCeil(largest));
+    this.isLocked = true;
+  }
+
+  update(value: number): boolean {
+    const wanted = niceCeil(value);
+    if (this.isLocked || !(wanted > this.range)) return false;
+    this.range = wanted;
+    return true;
+  }
+}
+
 const SHRINK_DELAY_S = 2.5;
 
 /** Range with hysteresis: grows at once, shrinks after being too large for `SHRINK_DELAY_S`. */
-export class AutoRange {
+export class AutoRange implements DisplayRange {
   private range: number;
   private largest = 0;
   private since = 0;
@@ -27,7 +71,6 @@ export class AutoRange {
     return this.range;
   }
 
-  /** Adds a value at time `now` [s]; returns true if the range has changed. */
   update(value: number, now: number): boolean {
     const wanted = niceCeil(Math.max(value, this.least));
     if (wanted > this.range) {

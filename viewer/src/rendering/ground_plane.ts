@@ -78,6 +78,8 @@ export class GroundPlane {
     private readonly radius: number,
     private readonly up: Vector3,
     shaded: boolean,
+    /** Whether it is only a faint grid, to judge motions by. */
+    faint = false,
   ) {
     this.shadow = shaded ? new ShadowMap() : null;
     const reach = 9 * radius;
@@ -94,10 +96,11 @@ export class GroundPlane {
       darkness: { value: 0 },
       tone: { value: 1 },
     };
-    for (const [side, backFace] of [
-      [FrontSide, 0],
+    const faces = [
+      [FrontSide, faint ? 1 : 0],
       [BackSide, 1],
-    ] as const) {
+    ] as const;
+    for (const [side, backFace] of faces) {
       const material = new RawShaderMaterial({
         glslVersion: GLSL3,
         vertexShader: VERTEX,
@@ -112,7 +115,7 @@ export class GroundPlane {
       });
       const mesh = new Mesh(this.geometry, material);
       mesh.frustumCulled = false;
-      mesh.renderOrder = backFace === 0 ? -2 : 3;
+      mesh.renderOrder = backFace === 0 || faint ? -2 : 3;
       this.group.add(mesh);
     }
   }

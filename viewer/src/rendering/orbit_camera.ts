@@ -22,6 +22,8 @@ export class OrbitCamera {
   private distance = 1;
   private center = new Vector3();
   private radius = 0.1;
+  /** Radius of the sphere that the default distance shows. */
+  private framed = 0.1;
   /** Minimum elevation [rad]; above the floor if there is one. */
   private minElevation = -MAX_ELEVATION;
   changed = true;
@@ -40,9 +42,10 @@ export class OrbitCamera {
     this.reset();
   }
 
-  /** Returns to the default view, optionally about another centre. */
-  reset(center = this.center): void {
+  /** Returns to the default view, optionally of another sphere. */
+  reset(center = this.center, radius = this.radius): void {
     this.target.copy(center);
+    this.framed = radius;
     this.azimuth = DEFAULT_AZIMUTH;
     this.elevation = DEFAULT_ELEVATION;
     this.distance = this.fitDistance();
@@ -60,10 +63,21 @@ export class OrbitCamera {
     this.update();
   }
 
+  /** Turns about a sphere from the present direction, and shows all of it. */
+  follow(center: Vector3, radius: number): void {
+    if (this.target.equals(center) && radius <= this.framed) return;
+    this.target.copy(center);
+    if (radius > this.framed) {
+      this.framed = radius;
+      this.distance = Math.max(this.distance, this.fitDistance());
+    }
+    this.update();
+  }
+
   private fitDistance(): number {
     const half = (FIELD_OF_VIEW * Math.PI) / 360;
     const across = Math.atan(Math.tan(half) * Math.min(1, this.camera.aspect));
-    return (this.radius / Math.sin(across)) * FIT_MARGIN;
+    return (this.framed / Math.sin(across)) * FIT_MARGIN;
   }
 
   resize(aspect: number): void {
@@ -91,7 +105,7 @@ export class OrbitCamera {
   }
 
   zoom(factor: number): void {
-    this.distance = Math.min(60 * this.radius, Math.max(0.15 * this.radius, this.distance * factor));
+    this.distance = Math.min(Math.max(60 * this.radius, 4 * this.framed), Math.max(0.15 * this.radius, this.distance * factor));
     this.update();
   }
 
@@ -120,7 +134,7 @@ export class OrbitCamera {
       .addScaledVector(this.up, this.distance * Math.sin(this.elevation));
     this.camera.up.copy(this.up);
     this.camera.near = Math.max(this.distance * 0.02, this.radius * 1e-3);
-    this.camera.far = this.distance + 80 * this.radius;
+    this.camera.far = this.distance + Math.max(80 * this.radius, 2 * this.framed);
     this.camera.lookAt(this.target);
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();

@@ -67,20 +67,25 @@ function overlap(a: Rectangle, b: Rectangle): boolean {
   return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 }
 
-const TITLES: Record<ColourMode, string> = { plain: "", displacement: "displacement", strain: "max. principal strain" };
+const TITLES: Record<ColourMode, string> = { plain: "", displacement: "Displacement", strain: "Max. principal strain" };
 
 function rangeLabel(mode: ColourMode, value: number): string {
   return mode === "strain" ? `${digits(100 * value, 2)}\u202f%` : withUnit(value, "m", 0, 2);
 }
 
-/** Colour bar at the lower left; returns its height [px]. */
+/** Colour bar at the lower left of a viewport [px]. */
+export function colourBarBox(viewport: Rectangle): Rectangle {
+  const size = textScale(viewport);
+  const height = BAR_HEIGHT * size;
+  return { x: viewport.x + MARGIN, y: viewport.y + viewport.height - MARGIN - 16 * size - height, width: BAR_WIDTH * size, height };
+}
+
+/** Draws the colour bar; returns its height with captions [px]. */
 export function drawColourBar(context: CanvasRenderingContext2D, mode: ColourMode, range: number, viewport: Rectangle, palette: Palette): number {
   if (mode === "plain" || !(range > 0)) return 0;
   const size = textScale(viewport);
-  const width = BAR_WIDTH * size;
-  const height = BAR_HEIGHT * size;
-  const x = viewport.x + MARGIN;
-  const y = viewport.y + viewport.height - MARGIN - 16 * size;
+  const { x, y: top, width, height } = colourBarBox(viewport);
+  const y = top + height;
   const gradient = context.createLinearGradient(x, 0, x + width, 0);
   RAMP.forEach((colour, i) => gradient.addColorStop(i / (RAMP.length - 1), colour));
   context.font = `500 ${12 * size}px ${FONT}`;

@@ -1,8 +1,8 @@
 // three.js scene graph of one palpate scene: elastic objects, planes, obstacles, device markers, force arrows.
 
-import { Color, type Object3D, Scene, Vector3, type Vector4, type WebGLRenderer } from "three";
+import { Color, type Object3D, Quaternion, Scene, Vector3, type Vector4, type WebGLRenderer } from "three";
 import type { SceneMessage } from "../protocol/messages";
-import type { Frame } from "../protocol/frame";
+import type { DeviceFrame, Frame } from "../protocol/frame";
 import type { ModeShapes, Surface } from "../protocol/surface";
 import { Arrows } from "./arrows";
 import { DARK, LIGHT, type ColourMode, type Palette } from "./colours";
@@ -10,12 +10,16 @@ import { ElasticMesh, FrameMismatch } from "./elastic/elastic_mesh";
 import type { TextureLimits } from "./elastic/texture_layout";
 import { DeviceMarker } from "./device_marker";
 import { drawForces, largestForce, type Label } from "./force_arrows";
+import { sphereAround, type Sphere } from "./framing";
 import { GroundPlane } from "./ground_plane";
+import { nearestNode, normalAtNode } from "./held_patch";
 import { ObstacleMesh } from "./obstacle_mesh";
-import { AutoRange } from "./auto_range";
+import type { DisplayRange } from "./auto_range";
 
 const MAX_SHADOWS = 2;
 const ARROW_CAPACITY = 256;
+/** Depth of the grid of a scene without ground below its centre, in its radii. */
+const GRID_BELOW = 1.15;
 
 /** Static data of a scene, fetched once. */
 export interface LoadedScene {
@@ -44,14 +48,25 @@ export class SceneGraph {
   readonly radius: number;
   private readonly groundPlanes = new Map<number, GroundPlane>();
   private readonly obstacles = new Map<number, ObstacleMesh>();
+  /** Grid below a scene without ground; not part of it. */
+  private readonly grid: GroundPlane | null;
   private readonly markers: DeviceMarker[];
   private readonly arrows = new Arrows(ARROW_CAPACITY);
-  readonly forceRange = new AutoRange(0.02);
   frame: Frame | null = null;
   labels: Label[] = [];
   private shadowsDirty = true;
+  /** Object that each device holds, with the normal of the patch, body. */
+  private readonly heldPatches: ({ object: ElasticMesh; normal: Vector3 } | null)[] = [];
 
-  constructor(loaded: LoadedScene, limits: TextureLimits, onGpu: boolean, up: Vector3) {
+  /** `forceRange` [N] and `maxArrowLength` [m]: scale of the force vectors, one for all scenes that are shown. */
+  constructor(
+    loaded: LoadedScene,
+    limits: TextureLimits,
+    onGpu: boolean,
+    up: Vector3,
+    readonly forceRange: DisplayRange,
+    readonly maxArrowLength: number,
+  ) {
     const { scene } = loaded;
     this.info = scene;
     this.center = new Vector3(...scene.view.center);
@@ -75,6 +90,7 @@ export class SceneGraph {
       this.scene.add(obstacle.group);
       this.casters.add(obstacle.shadow);
     });
+    this.grid = this.groundPlanes.size > 0 ? null : this.referenceGrid(up);
     this.markers = scene.devices.map((info) => new DeviceMarker(info, this.radius, up));
     for (const object of this.objects) {
       this.scene.add(object.group);
@@ -85,6 +101,16 @@ export class SceneGraph {
       this.casters.add(marker.shadow);
     }
     this.scene.add(this.arrows.group);
+  }
+
+  /** Faint level grid below the scene, against which motions and turns of the view are seen. */
+  private referenceGrid(up: Vector3): GroundPlane {
+    const grid = new GroundPlane(this.center, this.radius, up, false, true);
+    const { x, y, z } = this.center.clone().addScaledVector(up, -GRID_BELOW * this.radius);
+    const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 1, 0), up);
+    grid.setPose([x, y, z, turn.x, turn.y, turn.z, turn.w]);
+    this.scene.add(grid.group);
+    return grid;
   }
 
   /** Shows a frame; throws `FrameMismatch` without change if it belongs to another scene. */
@@ -103,19 +129,35 @@ export class SceneGraph {
       this.groundPlanes.get(i)?.setPose(pose);
       this.obstacles.get(i)?.setPose(pose);
     });
-    this.markers.forEach((marker, i) => marker.setFrame(devices[i]));
+    this.markers.forEach((marker, i) => marker.setFrame(devices[i], this.heldNormal(i, devices[i])));
     this.forceRange.update(largestForce(frame), now);
     this.shadowsDirty = true;
+  }
+
+  /** Outward normal of the patch that a device holds, world; null if it holds none. */
+  private heldNormal(device: number, { mode, proxy }: DeviceFrame): Vector3 | null {
+    if (mode !== "held") {
+      this.heldPatches[device] = null;
+      return null;
+    }
+    const point = new Vector3(...proxy);
+    let patch = this.heldPatches[device] ?? null;
+    if (patch === null) {
+      let least = Infinity;
+      for (const object of this.objects) {
+        const { node, distance } = nearestNode(object.surface, object.group.worldToLocal(point.clone()));
+        if (distance >= least) continue;
+        least = distance;
+        patch = { object, normal: normalAtNode(object.surface, node) };
+      }
+      this.heldPatches[device] = patch;
+    }
+    return patch === null ? null : patch.normal.clone().applyQuaternion(patch.object.group.quaternion);
   }
 
   /** Obstacle meshes that block picking rays. */
   get obstacleMeshes(): Object3D[] {
     return [...this.obstacles.values()].map((obstacle) => obstacle.solid);
-  }
-
-  /** Arrow length at the full force range [m]. */
-  get maxArrowLength(): number {
-    return 0.7 * this.radius;
   }
 
   applyTheme(settings: DisplaySettings, colourRange: number): void {
@@ -126,6 +168,7 @@ export class SceneGraph {
     });
     for (const obstacle of this.obstacles.values()) obstacle.colour = palette.obstacle;
     for (const ground of this.groundPlanes.values()) ground.applyTheme(palette);
+    this.grid?.applyTheme(palette);
     for (const marker of this.markers) marker.applyTheme(palette);
     this.drawArrows(settings, palette);
   }
@@ -174,8 +217,15 @@ export class SceneGraph {
     return centre.divideScalar(this.objects.length);
   }
 
+  /** Sphere around all objects as they are now; that of the scene if it has none. */
+  sphereAroundObjects(): Sphere {
+    if (this.objects.length === 0) return { center: this.center.clone(), radius: this.radius };
+    return sphereAround(this.objects.map(({ group, info }) => ({ center: group.position, radius: info.radius })));
+  }
+
   dispose(): void {
     for (const part of [...this.objects, ...this.groundPlanes.values(), ...this.obstacles.values(), ...this.markers]) part.dispose();
+    this.grid?.dispose();
     this.arrows.dispose();
   }
 }

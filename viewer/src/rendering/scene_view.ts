@@ -6,17 +6,25 @@ import { OrbitCamera } from "./orbit_camera";
 import { DARK, LIGHT, type Palette } from "./colours";
 import { textureLimits } from "./elastic/gpu_reconstruction";
 import type { TextureLimits } from "./elastic/texture_layout";
-import { drawArrowScale, drawColourBar, drawLabels, drawTime, type Rectangle } from "./overlay";
-import { AutoRange } from "./auto_range";
+import { colourBarBox, drawArrowScale, drawColourBar, drawLabels, drawTime, type Rectangle } from "./overlay";
+import { AutoRange, GrowingRange, type DisplayRange } from "./auto_range";
+import { ColourScales, newScales } from "./colour_scales";
+import { isFarAway, isOutOfView } from "./framing";
 import { SceneGraph, type LoadedScene, type DisplaySettings } from "./scene_graph";
 
 const RANGE_INTERVAL_S = 0.15;
+// Full range of the force vectors before any force [N], and its length in radii of the scene.
+const LEAST_FORCE = 0.02;
+const ARROW_LENGTH = 0.7;
 // Viewports up to this width [px] place the legend below the scene, if their aspect (height per width) allows it.
 const NARROW_WIDTH = 480;
 const MIN_ASPECT_FOR_LEGEND_BELOW = 1.3;
 // Height of a legend at the top: caption and force scale, and with the colour bar [px].
 const LEGEND_HEIGHT = 62;
 const LEGEND_HEIGHT_WITH_BAR = 116;
+
+// Distance of an object from the scene's centre, in its radii, from which on it has moved away.
+const MOVED_AWAY = 1.5;
 
 export interface ViewSize {
   width: number;
@@ -41,12 +49,18 @@ export class SceneView {
   drawOverlay: ((context: CanvasRenderingContext2D, viewport: Rectangle) => void) | null = null;
   private readonly context: CanvasRenderingContext2D;
   private size: ViewSize = { width: 1, height: 1, ratio: 1 };
-  private readonly ranges = { displacement: new AutoRange(1e-4), strain: new AutoRange(2e-3) };
-  private fixedRange: number | null = null;
+  private readonly colourScales = new ColourScales();
+  private scales = newScales({ objects: [] });
+  private forceRange: DisplayRange = new AutoRange(LEAST_FORCE);
+  /** Whether logs are shown: the scale of their force vectors only grows, until it is fixed. */
+  showsLogs = false;
+  /** Hook that is told where the colour bar is [px]; null without one. */
+  colourBarMoved: ((box: Rectangle | null) => void) | null = null;
   private rangePending = false;
   private rangeUpdatedAt = -1;
   private dirty = true;
   lost = false;
+  private following = false;
 
   constructor(settings: DisplaySettings) {
     this.settings = settings;
@@ -67,12 +81,13 @@ export class SceneView {
   /** Replaces the scene graph of a viewport. */
   setScene(index: number, loaded: LoadedScene): SceneGraph {
     this.graphs[index]?.dispose();
-    const graph = new SceneGraph(loaded, this.limits, this.reconstructsOnGpu, this.orbit.up);
-    this.graphs[index] = graph;
     if (index === 0) {
-      this.ranges.displacement = new AutoRange(2e-3 * Math.max(...graph.objects.map((o) => o.info.radius), 1e-3));
-      this.ranges.strain = new AutoRange(5e-3);
+      this.scales = this.colourScales.of(loaded.scene);
+      this.forceRange = this.showsLogs ? new GrowingRange(LEAST_FORCE) : new AutoRange(LEAST_FORCE);
     }
+    const longest = ARROW_LENGTH * (index === 0 ? loaded.scene : this.graphs[0].info).view.radius;
+    const graph = new SceneGraph(loaded, this.limits, this.reconstructsOnGpu, this.orbit.up, this.forceRange, longest);
+    this.graphs[index] = graph;
     this.rangeUpdatedAt = -1;
     this.requestRender();
     return graph;
@@ -89,19 +104,42 @@ export class SceneView {
     this.requestRender();
   }
 
-  /** Resets the camera to the scene's centre, or to its objects if they have moved away. */
+  /** Resets the camera to the scene, or to all its objects if one has moved away. */
   resetView(): void {
+    this.following = false;
     const [graph] = this.graphs;
-    const movedAway = graph !== undefined && graph.objectsCentre().distanceTo(graph.center) > 1.5 * graph.radius;
-    this.orbit.reset(movedAway ? graph.objectsCentre() : undefined);
+    const moved = graph?.objects.some((object) => object.group.position.distanceTo(graph.center) > MOVED_AWAY * graph.radius) ?? false;
+    if (graph === undefined || !moved) {
+      this.orbit.reset();
+      return;
+    }
+    const around = graph.sphereAroundObjects();
+    this.orbit.reset(around.center, around.radius);
   }
 
-  /** Whether the objects have left the view. */
-  get isOutOfView(): boolean {
+  /** Resets the camera to the scene as it begins. */
+  resetToStart(): void {
+    this.following = false;
+    this.orbit.reset();
+  }
+
+  /** Keeps all objects in view until the view is reset or panned. */
+  followObjects(): void {
+    this.resetView();
+    this.following = true;
+    this.requestRender();
+  }
+
+  stopFollowing(): void {
+    this.following = false;
+  }
+
+  /** Names of the objects that are out of view, and of those that are far away. */
+  lostObjects(): { outOfView: string[]; farAway: string[] } {
     const [graph] = this.graphs;
-    if (graph === undefined || graph.objects.length === 0) return false;
-    const at = graph.objectsCentre().project(this.orbit.camera);
-    return Math.abs(at.x) > 1.15 || Math.abs(at.y) > 1.15 || Math.abs(at.z) > 1;
+    if (graph === undefined || graph.frame === null) return { outOfView: [], farAway: [] };
+    const names = (lost: (position: Vector3) => boolean) => graph.objects.filter(({ group }) => lost(group.position)).map(({ info }) => info.name);
+    return { outOfView: names((position) => isOutOfView(position, this.orbit.camera)), farAway: names((position) => isFarAway(position, graph)) };
   }
 
   fitCamera(): void {
@@ -130,17 +168,39 @@ export class SceneView {
     this.dirty = true;
   }
 
-  setFixedRange(range: number | null): void {
-    this.fixedRange = range;
+  /** Scale of the colours that are shown; null without colours. */
+  get colourScale(): GrowingRange | null {
+    return this.settings.colour === "plain" ? null : this.scales[this.settings.colour];
+  }
+
+  /** Fixes the scales of logs by their largest displacement [m], strain and force [N]. */
+  fixScales(largest: { displacement: number; strain: number; force: number }): void {
+    this.scales.displacement.fix(largest.displacement);
+    this.scales.strain.fix(largest.strain);
+    if (this.forceRange instanceof GrowingRange) this.forceRange.fix(largest.force);
+    this.requestRender();
+  }
+
+  /** Locks the scale of the colours, or fits it anew. */
+  lockColourScale(locked: boolean): void {
+    const scale = this.colourScale;
+    if (scale === null) return;
+    scale.locked = locked;
+    this.rangeUpdatedAt = -1;
+    this.requestRender();
   }
 
   get colourRange(): number {
     if (this.settings.colour === "plain") return 0;
-    return this.fixedRange ?? this.ranges[this.settings.colour].value;
+    return this.scales[this.settings.colour].value;
   }
 
   /** Draws if anything changed; `now` [s]. */
   draw(now: number): void {
+    if (this.following && this.graphs[0]?.frame != null) {
+      const { center, radius } = this.graphs[0].sphereAroundObjects();
+      this.orbit.follow(center, radius);
+    }
     if (this.lost || !(this.dirty || this.orbit.changed)) return;
     this.dirty = this.orbit.changed = false;
     const { context, renderer, palette, size } = this;
@@ -150,9 +210,9 @@ export class SceneView {
     renderer.setScissorTest(false);
     renderer.setViewport(0, 0, size.width, size.height);
     if (this.graphs.length === 0) renderer.clear();
-    if (this.settings.colour === "displacement" && this.fixedRange === null) {
+    if (this.settings.colour === "displacement" && !this.scales.displacement.locked) {
       const estimates = this.graphs.flatMap((graph) => graph.objects.map((object) => object.approximateDisplacement));
-      this.ranges.displacement.update(Math.max(0, ...estimates), now);
+      this.scales.displacement.update(Math.max(0, ...estimates));
     }
     this.graphs.forEach((graph, i) => this.drawScene(graph, i));
     this.updateRange(now);
@@ -174,6 +234,7 @@ export class SceneView {
     // One colour bar and scale for all scenes.
     const legend = this.legendAreaOf(index);
     const bar = index > 0 ? 0 : drawColourBar(context, settings.colour, this.colourRange, legend, palette);
+    if (index === 0) this.colourBarMoved?.(bar > 0 ? colourBarBox(legend) : null);
     if (settings.arrows && graph.labels.length > 0) {
       const pixels = (graph.maxArrowLength / this.orbit.viewHeightAt(camera.position.distanceTo(graph.center))) * viewport.height;
       drawArrowScale(context, graph.forceRange.value, pixels, legend, bar, palette);
@@ -187,20 +248,21 @@ export class SceneView {
   /** Updates the colour range at intervals. */
   private updateRange(now: number): void {
     const mode = this.settings.colour;
-    if (mode === "plain" || this.fixedRange !== null || this.rangePending) return;
+    if (mode === "plain" || this.scales[mode].locked || this.rangePending) return;
     if (this.graphs.length === 0 || (now >= this.rangeUpdatedAt && now < this.rangeUpdatedAt + RANGE_INTERVAL_S && this.rangeUpdatedAt >= 0)) return;
     if (this.rangeUpdatedAt < 0 && this.graphs.every((graph) => graph.frame !== null)) {
       // First frame: updated synchronously.
       this.rangeUpdatedAt = now;
-      if (this.ranges[mode].update(this.maxValue(), now)) this.requestRender();
+      if (this.scales[mode].update(this.maxValue())) this.requestRender();
       return;
     }
     this.rangeUpdatedAt = now;
     this.rangePending = true;
+    const scale = this.scales[mode];
     const objects = this.graphs.flatMap((graph) => graph.objects);
     Promise.all(objects.map((object) => object.maxValueAsync(this.renderer, mode)))
       .then((largest) => {
-        if (this.ranges[mode].update(Math.max(0, ...largest), now)) this.requestRender();
+        if (scale.update(Math.max(0, ...largest))) this.requestRender();
       })
       .catch(() => undefined) // The scene was replaced meanwhile.
       .finally(() => {

@@ -23,7 +23,7 @@ export class DisplayPanel {
       [
         { value: "plain", text: "Material", title: "Look of the material" },
         { value: "displacement", text: "Displacement", title: "Distance of each node from its rest position in the body frame" },
-        { value: "strain", text: "Strain", title: "Max. principal strain of the surface, elongation or compression" },
+        { value: "strain", text: "Max. principal strain", title: "Of the surface, elongation or compression" },
       ],
       (colour) => this.set({ colour }),
     );

@@ -50,6 +50,8 @@ const ICONS = {
   close: "M6 6l12 12M18 6L6 18",
   sliders: "M4 7h10M18 7h2M4 17h2M10 17h10M16 5v4M8 15v4",
   chart: "M4 19h16M5 15l4-5 4 3 6-8",
+  locked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 8 0v3M12 15v2",
+  unlocked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 7.700-1.500M12 15v2",
   stepBack: "M18 5v14l-9-7zM6 5v14",
 } as const;
 export type IconName = keyof typeof ICONS;
@@ -80,49 +82,6 @@ export function section(title: string, open: boolean, ...children: Child[]): HTM
   const created = element("details", { class: "section" }, element("summary", {}, element("h2", { text: title })), ...children);
   created.open = open;
   return created;
-}
-
-export interface NumberField {
-  row: HTMLElement;
-  value: number;
-  readonly input: HTMLInputElement;
-}
-
-/** Number input with unit; `onChange` is called only with values within the bounds. */
-export function numberField(
-  label: string,
-  unit: string,
-  tooltip: string,
-  bounds: { min: number; max: number; step: number | "any" },
-  onChange: (value: number) => void,
-): NumberField {
-  const input = element("input", {
-    type: "number",
-    attributes: { min: String(bounds.min), max: String(bounds.max), step: String(bounds.step), inputmode: "decimal" },
-  });
-  input.addEventListener("change", () => {
-    const value = input.valueAsNumber;
-    const valid = Number.isFinite(value) && value >= bounds.min && value <= bounds.max;
-    input.setCustomValidity(valid ? "" : `between ${bounds.min} and ${bounds.max}`);
-    if (valid) onChange(value);
-    else input.reportValidity();
-  });
-  const row = element(
-    "label",
-    { class: "field", title: tooltip },
-    element("span", { class: "name", text: label }),
-    element("span", { class: "number-input" }, input, element("span", { class: "unit", text: unit })),
-  );
-  return {
-    row,
-    input,
-    get value() {
-      return input.valueAsNumber;
-    },
-    set value(value: number) {
-      if (document.activeElement !== input) input.value = String(Number(value.toPrecision(6)));
-    },
-  };
 }
 
 /** Segmented control: a radio group of a few options. */

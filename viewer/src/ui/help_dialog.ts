@@ -3,14 +3,14 @@
 import { element, iconButton } from "./elements";
 
 const GESTURES: readonly [string, string][] = [
-  ["Press on an object", "Touches it, or holds it: choose Touch or Hold. Shift or the right button uses the other mode."],
-  ["Drag", "Moves the pointer across the view; on an object it strokes, pulls and throws."],
+  ["Press on an object", "Touch: a finger presses against the surface. Hold: takes hold of it, to lift, pull and throw. Shift or the right button uses the other mode. A press while the scene is paused acts when it goes on."],
+  ["Drag", "Touch: the finger follows the surface under the pointer at its depth. Hold: the held patch follows the pointer."],
   ["Wheel while pressing", "Changes the depth of the press. A pen does so by its pressure."],
   ["Several fingers", "On a touch screen each finger is a pointer: pinch an object between two."],
   ["Drag beside the object", "Rotates the view; with the right button or Shift it pans. The wheel zooms."],
   ["Gamepad", "Left stick moves a pointer, right stick changes its depth, a trigger presses."],
 ];
-const VIEW_GESTURES = GESTURES.slice(4, 5);
+const VIEW_GESTURES = GESTURES.filter(([name]) => name === "Drag beside the object");
 
 const LIVE_KEYS: readonly [string, string][] = [
   ["Arrow keys, Enter", "In the scene: move a pointer, press and release"],
@@ -19,12 +19,13 @@ const LIVE_KEYS: readonly [string, string][] = [
   ["Space", "Pause and resume"],
   [".", "Single step while paused"],
   ["[ and ]", "Slower and faster"],
-  ["R", "Reset the scene"],
+  ["R", "Reset: the scene from its start, with its own settings and view"],
 ];
 
 const LOG_KEYS: readonly [string, string][] = [
   ["Space", "Play and pause"],
   ["← and →", "Previous and next frame; with Shift ten frames"],
+  ["Press in a plot", "To that time; drag to scrub"],
   ["Home and End", "To the start, to the end"],
   ["[ and ]", "Slower and faster"],
 ];

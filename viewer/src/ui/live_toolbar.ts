@@ -14,14 +14,15 @@ export class LiveToolbar {
   private readonly step: HTMLButtonElement;
   private readonly speed = element("select", { title: "Speed of simulated time: slower with [, faster with ]", attributes: { "aria-label": "Speed of simulated time" } });
   private paused = false;
-  private slowdown = 1;
+  slowdown = 1;
   mode: TouchMode;
 
   constructor(
     private readonly send: (message: ClientMessage) => void,
     mode: TouchMode,
     private readonly onModeChange: (mode: TouchMode) => void,
-    private readonly resetView: () => void,
+    readonly reset: () => void,
+    resetView: () => void,
   ) {
     this.mode = mode;
     this.modes = segmentedControl<TouchMode>(
@@ -46,9 +47,13 @@ export class LiveToolbar {
       this.pause,
       this.step,
       this.speed,
-      iconButton("reset", "Reset (R)", () => this.reset(), "Reset"),
+      iconButton("reset", "Reset (R)", reset, "Reset"),
       iconButton("resetView", "Reset view (V)", resetView),
     ];
+  }
+
+  get isPaused(): boolean {
+    return this.paused;
   }
 
   setMode(mode: TouchMode): void {
@@ -68,11 +73,6 @@ export class LiveToolbar {
   singleStep(): void {
     if (!this.paused) this.togglePause();
     this.send({ type: "single_step" });
-  }
-
-  reset(): void {
-    this.send({ type: "reset" });
-    this.resetView();
   }
 
   setSlowdown(slowdown: number): void {

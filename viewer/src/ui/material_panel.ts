@@ -1,7 +1,8 @@
 // Material of an object; a change is recorded again in the background.
 
 import type { Material, SceneMessage, ClientMessage } from "../protocol/messages";
-import { element, numberField, section } from "./elements";
+import { element, section } from "./elements";
+import { numberField } from "./number_field";
 
 export const PRESETS: readonly (Material & { name: string })[] = [
   { name: "Jelly", young: 2e3, poisson: 0.45, density: 110 },

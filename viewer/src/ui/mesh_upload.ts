@@ -24,6 +24,8 @@ export class MeshUpload {
   private readonly fileName = element("strong");
   private file: File | null = null;
   private upload: AbortController | null = null;
+  /** Uploads that the server has taken, by file name. */
+  private readonly accepted = new Map<string, () => void>();
   /** Number of this viewer: the recording is cancelled when the page leaves. */
   viewer = 0;
 
@@ -107,30 +109,40 @@ export class MeshUpload {
   private async post(): Promise<void> {
     const material = this.fields.value;
     if (this.file === null || material === null) return;
-    const query = new URLSearchParams({
+    const query = {
       name: this.file.name,
       young: String(material.young),
       poisson: String(material.poisson),
       density: String(material.density),
       scale: this.scale.value,
       modes: this.modes.value,
-      viewer: String(this.viewer),
-    });
-    const job = { type: "progress", job: "upload", phase: this.file.name, fraction: null } as const;
+    };
+    await this.send(this.file, query);
+  }
+
+  private async send(file: File, query: Record<string, string>): Promise<void> {
+    const job = { type: "progress", job: "upload", phase: file.name, fraction: null } as const;
     const upload = new AbortController();
     this.upload = upload;
     this.jobs.update(job);
     try {
-      const response = await fetch(serverUrl(`record?${query}`), { method: "POST", body: this.file, signal: upload.signal });
+      const address = `record?${new URLSearchParams({ ...query, viewer: String(this.viewer) })}`;
+      const response = await fetch(serverUrl(address), { method: "POST", body: file, signal: upload.signal });
       if (!response.ok) throw new Error((await response.text()) || `${response.status} ${response.statusText}`);
-      this.notifications.notify(`${this.file.name} is being recorded`);
+      this.notifications.notify(`${file.name} is being recorded`);
+      this.accepted.set(file.name, () => void this.send(file, query));
     } catch (error) {
-      if (upload.signal.aborted) this.notifications.notify(`The upload of ${this.file.name} was cancelled`);
-      else this.notifications.notify(`${this.file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
+      if (upload.signal.aborted) this.notifications.notify(`The upload of ${file.name} was cancelled`);
+      else this.notifications.notify(`${file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
     } finally {
       this.jobs.update({ ...job, done: true });
       if (this.upload === upload) this.upload = null;
     }
+  }
+
+  /** Function that uploads a file of this name again, if the server has taken one. */
+  again(name: string): (() => void) | undefined {
+    return this.accepted.get(name);
   }
 
   /** Cancels an upload that is under way. */

@@ -10,6 +10,8 @@ export class Notifications {
   readonly banner = element("div", { class: "banner", role: "alert" });
   readonly warnings = element("div", { class: "warnings", role: "status" });
   private readonly notifiedOnce = new Set<string>();
+  /** Listener of errors. */
+  onError: (text: string) => void = () => undefined;
 
   constructor() {
     this.banner.hidden = true;
@@ -17,6 +19,7 @@ export class Notifications {
   }
 
   notify(text: string, kind: "info" | "error" = "info"): void {
+    if (kind === "error") this.onError(text);
     for (const old of this.list.children) if (old.firstChild?.textContent === text) old.remove();
     const notification = element("div", { class: `notification ${kind}` }, element("span", { text }));
     const close = () => notification.remove();

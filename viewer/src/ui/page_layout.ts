@@ -2,6 +2,7 @@
 
 import type { SceneView } from "../rendering/scene_view";
 import { element, icon, iconButton } from "./elements";
+import { releaseFocusAfterPointer } from "./pointer_focus";
 
 export type Sidebar = "controls" | "measurements";
 
@@ -14,7 +15,7 @@ export class PageLayout {
   readonly measurements = element("aside", { class: "sidebar", id: "measurements", attributes: { "aria-label": "Measurements" } });
   readonly toolbar = element("footer", { class: "toolbar", role: "toolbar", attributes: { "aria-label": "Press mode and time" } });
   readonly viewArea = element("main", { class: "scene-view" });
-  /** Overlays of the scene view. Top: banner, force readout, hint, jobs, notifications; bottom: the out-of-view button. */
+  /** Overlays of the scene view. Top: banner, force readout, hint, jobs, notifications; bottom: the offer for lost objects. */
   readonly overlayTop = element("div", { class: "overlay-top" });
   readonly overlayBottom = element("div", { class: "overlay-bottom" });
   private readonly tabs = new Map<Sidebar, HTMLButtonElement>();
@@ -62,7 +63,9 @@ export class PageLayout {
       iconButton("help", "Help and shortcuts (?)", actions.help),
     );
     this.viewArea.append(sceneView.canvas, sceneView.overlay, this.overlayTop, this.overlayBottom);
-    this.page.append(header, this.controls, this.viewArea, this.measurements, this.toolbar);
+    // The scene first, so that the keyboard reaches it in a few Tabs.
+    this.page.append(header, this.viewArea, this.toolbar, this.controls, this.measurements);
+    releaseFocusAfterPointer(this.page);
     this.sidebar = window.matchMedia("(max-width: 899px)").matches ? null : "controls";
   }
 

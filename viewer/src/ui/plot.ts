@@ -7,8 +7,15 @@ import { element } from "./elements";
 
 const SERIES_COLOURS = ["--series-1", "--series-2", "--series-3", "--series-4", "--series-5", "--series-6"];
 
+/** Curve of a plot. */
+export interface PlotSeries {
+  name: string;
+  title: string;
+  dashed?: boolean;
+}
+
 export class Plot {
-  private readonly canvas = element("div", { class: "plot" });
+  private readonly canvas = element("div", { class: "plot", role: "img" });
   private readonly legend = element("ul", { class: "legend" });
   readonly box = element("div", {}, this.canvas, this.legend);
   private readonly valueLabels: HTMLElement[] = [];
@@ -21,7 +28,7 @@ export class Plot {
   constructor(
     private readonly unit: string,
     private readonly height: number,
-    private series: readonly { name: string; title: string }[],
+    private series: readonly PlotSeries[],
   ) {
     new ResizeObserver(() => this.resize()).observe(this.canvas);
   }
@@ -29,13 +36,14 @@ export class Plot {
   /** Sets the series, or rebuilds the plot with the current theme. */
   setSeries(series = this.series): void {
     this.series = series;
+    this.canvas.setAttribute("aria-label", `Plot over time in ${this.unit}: ${series.map(({ name }) => name).join(", ")}`);
     this.plot?.destroy();
     this.plot = null;
     this.valueLabels.length = 0;
     this.legend.replaceChildren(
-      ...series.map(({ name, title }, i) => {
-        const swatch = element("i");
-        swatch.style.background = `var(${SERIES_COLOURS[i % SERIES_COLOURS.length]})`;
+      ...series.map(({ name, title, dashed }, i) => {
+        const swatch = element("i", { class: dashed === true ? "dashed" : "" });
+        swatch.style.color = `var(${SERIES_COLOURS[i % SERIES_COLOURS.length]})`;
         const label = element("b");
         this.valueLabels.push(label);
         return element("li", { title }, swatch, element("span", { class: "name", text: name }), label);
@@ -56,7 +64,7 @@ export class Plot {
     });
   }
 
-  setData(data: readonly (readonly number[])[], window: [number, number] | null): void {
+  setData(data: readonly (readonly (number | null)[])[], window: [number, number] | null): void {
     this.data = data as unknown as uPlot.AlignedData;
     this.window = window;
     this.draw();
@@ -119,8 +127,9 @@ export class Plot {
         ],
         series: [
           {},
-          ...this.series.map(({ name }, i) => ({
+          ...this.series.map(({ name, dashed }, i) => ({
             label: name,
+            ...(dashed === true ? { dash: [6, 4] } : {}),
             stroke: colour(SERIES_COLOURS[i % SERIES_COLOURS.length]),
             width: 1.5,
             points: { show: false },
@@ -132,7 +141,17 @@ export class Plot {
       this.canvas,
     );
     const plot = this.plot;
-    plot.over.addEventListener("click", (event) => this.onSeek?.(plot.posToVal(event.offsetX, "x")));
+    // A press seeks, a drag scrubs.
+    const seek = (event: PointerEvent) => this.onSeek?.(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
+    plot.over.addEventListener("pointerdown", (event) => {
+      if (this.onSeek === null || event.button !== 0) return;
+      plot.over.setPointerCapture(event.pointerId);
+      seek(event);
+    });
+    plot.over.addEventListener("pointermove", (event) => {
+      if (plot.over.hasPointerCapture(event.pointerId)) seek(event);
+    });
+    plot.over.classList.toggle("seekable", this.onSeek !== null);
   }
 
   private drawMarker(plot: uPlot, colour: string): void {
@@ -143,6 +162,7 @@ export class Plot {
     plot.ctx.save();
     plot.ctx.strokeStyle = colour;
     plot.ctx.lineWidth = 2 * devicePixelRatio;
+    plot.ctx.setLineDash([]);
     plot.ctx.beginPath();
     plot.ctx.moveTo(x, top);
     plot.ctx.lineTo(x, top + height);

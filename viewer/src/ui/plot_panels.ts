@@ -24,12 +24,8 @@ export class PlotPanels {
   private drawnAt = 0;
   private latest: Frame | null = null;
 
-  constructor(prefix = "") {
-    const titled = (text: string) => (prefix === "" ? text : `${prefix}: ${text.toLowerCase()}`);
-    this.sections = [
-      section(titled("Force on the hands"), true, this.force.box),
-      section(titled("Energy"), true, this.energy.box, this.balance),
-    ];
+  constructor() {
+    this.sections = [section("Force on the hands", true, this.force.box), section("Energy", true, this.energy.box, this.balance)];
     for (const part of this.sections) part.addEventListener("toggle", () => this.draw());
   }
 

@@ -1,4 +1,4 @@
-// List of the scenes that can be opened.
+// List of the scenes that can be opened, with the meshes that this page has uploaded.
 
 import type { SceneSummary } from "../protocol/messages";
 import { element, section } from "./elements";
@@ -7,32 +7,49 @@ export class ScenesPanel {
   readonly list = element("ul", { class: "scenes" });
   readonly section = section("Scenes", true, this.list);
   private readonly buttons = new Map<string, HTMLButtonElement>();
+  private scenes: readonly SceneSummary[] = [];
+  /** Uploads by title, and what opens them again. */
+  private readonly uploads = new Map<string, () => void>();
 
   constructor(private readonly open: (id: string) => void) {
     this.section.hidden = true;
   }
 
   setScenes(scenes: readonly SceneSummary[]): void {
-    this.section.hidden = scenes.length === 0;
+    this.scenes = scenes;
+    this.show();
+  }
+
+  /** Keeps an uploaded mesh in the list; a newer one of its title takes its place. */
+  addUpload(title: string, open: () => void): void {
+    this.uploads.set(title, open);
+    this.show();
+  }
+
+  private show(): void {
+    this.section.hidden = this.scenes.length === 0 && this.uploads.size === 0;
     this.buttons.clear();
+    const entry = (key: string, title: string, about: string, open: () => void) => {
+      const button = element("button", { class: "scene", type: "button", on: { click: open } }, element("strong", { text: title }), element("span", { text: about }));
+      this.buttons.set(key, button);
+      return element("li", {}, button);
+    };
     this.list.replaceChildren(
-      ...scenes.map(({ id, title, about }) => {
-        const button = element(
-          "button",
-          { class: "scene", type: "button", on: { click: () => this.open(id) } },
-          element("strong", { text: title }),
-          element("span", { text: about }),
-        );
-        this.buttons.set(id, button);
-        return element("li", {}, button);
-      }),
+      ...this.scenes.map(({ id, title, about }) => entry(id, title, about, () => this.open(id))),
+      ...[...this.uploads].map(([title, open]) => entry(uploadKey(title), title, "Your own mesh, kept while this page is open.", open)),
     );
   }
 
-  setCurrent(id: string): void {
+  /** Marks a scene; `id` is null for a scene that the server does not list. */
+  setCurrent(id: string | null, title: string): void {
+    const current = id ?? uploadKey(title);
     for (const [name, button] of this.buttons) {
-      if (name === id) button.setAttribute("aria-current", "true");
+      if (name === current) button.setAttribute("aria-current", "true");
       else button.removeAttribute("aria-current");
     }
   }
+}
+
+function uploadKey(title: string): string {
+  return `upload ${title}`;
 }

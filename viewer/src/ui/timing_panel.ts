@@ -50,8 +50,8 @@ export class TimingPanel {
       row("Compute time", "Time to compute one step", timing.compute_us),
       row("Lateness", "Delay of a step's start after its deadline, caused by the operating system", timing.lateness_us),
     );
-    const overruns = timing.overruns === 0 ? "no overruns" : `${count(timing.overruns)} overruns, ${count(timing.compute_overruns)} of them by compute time`;
-    this.summary.textContent = `${count(status.steps)} steps, ${overruns}. ${timing.realtime_priority ? "With" : "Without"} real-time priority.`;
+    const overruns = timing.overruns === 0 ? "none" : `${count(timing.overruns)}, ${count(timing.compute_overruns)} of them by compute time`;
+    this.summary.textContent = `Steps: ${count(status.steps)}. Overruns: ${overruns}. ${timing.realtime_priority ? "With" : "Without"} real-time priority.`;
     this.summary.title = "Overrun: a step that ends after the next one should have begun";
   }
 

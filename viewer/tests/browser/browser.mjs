@@ -23,11 +23,12 @@ export class Browser {
     return browser;
   }
 
-  /** Page in its own context; console errors are collected in `consoleErrors`. */
-  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1 } = {}) {
+  /** Page in its own context; console errors are collected in `consoleErrors`. Without its ghost finger, which would touch the scene. */
+  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1, ghost = false, calm = false } = {}) {
     const context = await this.chromium.newContext({
       viewport: { width, height },
       colorScheme: dark ? "dark" : "light",
+      reducedMotion: calm ? "reduce" : "no-preference",
       hasTouch: touch,
       isMobile: touch,
       deviceScaleFactor: scale,
@@ -40,7 +41,9 @@ export class Browser {
     page.on("console", (message) => {
       if (message.type() === "error") page.consoleErrors.push(message.text());
     });
-    await page.goto(url);
+    const address = new URL(url);
+    if (!ghost) address.searchParams.set("ghost", "off");
+    await page.goto(address.href);
     return page;
   }
 
@@ -75,6 +78,24 @@ export async function screenshot(page, name) {
 /** Waits until the scene is loaded and a frame of it is shown. */
 export async function waitForScene(page) {
   await latestFrame(page);
+}
+
+/** Pauses the playback of logs, which may have come to its end. */
+export async function pausePlayback(page) {
+  if (await page.isVisible('[aria-label="Pause (Space)"]')) await page.keyboard.press("Space");
+  await page.waitForSelector('[aria-label="Play (Space)"]');
+}
+
+/** Collects the messages that the page sends from now on in `window.sent`. */
+export function recordSent(page) {
+  return page.evaluate(() => {
+    const { send } = WebSocket.prototype;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) {
+      window.sent.push(JSON.parse(text));
+      return send.call(this, text);
+    };
+  });
 }
 
 /** Summary of the newest frame; waits for the first one of a scene that the page is loading (again). */

@@ -2,7 +2,7 @@
 
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { assert, waitForScene, latestFrame, assertNoConsoleErrors, screenshot } from "./browser.mjs";
+import { assert, waitForScene, latestFrame, assertNoConsoleErrors, pausePlayback, screenshot } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 const time = (page) => page.evaluate(() => window.palpate.sceneView.graphs[0].frame.time);
@@ -29,7 +29,7 @@ export const logCases = [
       await waitForScene(page);
       const began = await time(page);
       await page.waitForFunction((t) => window.palpate.sceneView.graphs[0].frame?.time > t + 0.1, began);
-      await page.keyboard.press("Space");
+      await pausePlayback(page);
       await page.locator(".scrubber").fill("2.4");
       await page.waitForFunction(() => Math.abs(window.palpate.sceneView.graphs[0].frame?.time - 2.4) < 0.02);
       await page.locator("canvas[tabindex]").focus();
@@ -57,7 +57,8 @@ export const logCases = [
         ["phone", { width: 390, height: 844, touch: true, scale: 2, dark: true }],
       ]) {
         const page = await browser.page(server.url, options);
-        await page.waitForFunction(() => window.palpate?.sceneView.graphs.length === 2 && window.palpate.sceneView.graphs.every((w) => w.frame !== null));
+        await page.waitForFunction(() => window.palpate?.sceneView.graphs.length === 2 && window.palpate.sceneView.graphs.every((w) => w.frame !== null), null, { timeout: 60_000 });
+        await pausePlayback(page);
         await page.locator(".scrubber").fill("1.6");
         await page.waitForFunction(() => window.palpate.sceneView.graphs.every((w) => Math.abs(w.frame?.time - 1.6) < 0.3));
         await page.waitForTimeout(500);

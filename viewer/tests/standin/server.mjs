@@ -1,4 +1,5 @@
 // Stand-in server: speaks docs/viewer-protocol.md with a simplified model of a box.
+// `pace`: simulated time per real time, as on a slow machine.
 //   node tests/standin/server.mjs [--port 8123] [--kind live|logs|render] [--logs 2] [--cells 12] [--modes 60] [--garbage]
 
 import { createReadStream, existsSync, readFileSync, statSync } from "node:fs";
@@ -25,7 +26,7 @@ function argument(name, otherwise) {
   return at < 0 ? otherwise : (process.argv[at + 1] ?? "");
 }
 
-export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null, warnings = [] } = {}) {
+export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 60, garbage = false, render = null, warnings = [], pace = 1 } = {}) {
   const options = { cells, modes, warnings };
   let generation = 1;
   let scene = makeScene("bounce", generation, options);
@@ -44,12 +45,23 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     return boxBytes;
   };
 
-  function open(id) {
+  /** Opens a scene by its id, or the box under the name of an uploaded mesh. */
+  function open(id, upload = null) {
     generation++;
-    const { gravity } = scene.box;
+    const { gravity, friction, coupling } = scene.box;
     const same = id === scene.message.id;
     scene = makeScene(id, generation, options);
-    if (same) scene.box.gravity = gravity;
+    if (upload !== null) Object.assign(scene.message, { id: null, title: upload, about: "Your own mesh." });
+    // A reset keeps changed settings.
+    if (same) Object.assign(scene.box, { gravity, friction, coupling });
+    tell();
+  }
+
+  /** Sends the scene with its present settings; pointers are free. */
+  function tell() {
+    const { gravity, friction, coupling, devices } = scene.box;
+    for (const device of devices) device.mode = 0;
+    Object.assign(scene.message, { generation, gravity, devices: scene.message.devices.map((device) => ({ ...device, friction, coupling })) });
     for (const viewer of viewers) viewer.pointers.clear();
     broadcast(scene.message);
   }
@@ -74,7 +86,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       request.on("end", () => {
         const drawn = url.pathname.match(/^\/image\/(\d+)$/);
         if (drawn !== null) images[drawn[1]] = Buffer.concat(parts);
-        else record(url.searchParams.get("name") ?? "mesh");
+        else record("mesh", url.searchParams.get("name") ?? "mesh");
         response.writeHead(drawn !== null ? 204 : 202).end();
       });
       return undefined;
@@ -85,7 +97,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     return createReadStream(file).pipe(response);
   });
 
-  function record(job) {
+  function record(job, upload = null) {
     let share = 0;
     const timer = setInterval(() => {
       share += 0.1;
@@ -93,7 +105,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       if (share < 1) return broadcast({ type: "progress", job, phase, fraction: share });
       clearInterval(timer);
       broadcast({ type: "progress", job, phase: "certificate", fraction: 1, done: true });
-      return open(scene.message.id);
+      return open(scene.message.id, upload);
     }, 300);
     timer.unref();
     recording = { job, timer };
@@ -145,13 +157,16 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       slowdown = message.slowdown;
       status();
     },
-    reset: () => open(scene.message.id),
+    reset: () => open(scene.message.id, scene.message.id === null ? scene.message.title : null),
     cancel_job: cancelJob,
     open_scene: (_, message) => open(message.scene),
-    set_physics: (_, { gravity, friction, coupling }) => {
+    set_physics: (viewer, { gravity, step, friction, coupling }) => {
+      if (step !== undefined) return send(viewer, { type: "error", text: `the step is ${step} s, the stand-in has 0.001 s only` });
       if (gravity !== undefined) scene.box.gravity = gravity;
       if (friction !== undefined) scene.box.friction = friction;
       if (coupling !== undefined) scene.box.coupling = coupling;
+      generation++;
+      return tell();
     },
     set_material: () => record("cube"),
     stream: (viewer, { format, stride }) => Object.assign(viewer, { format, stride }),
@@ -201,7 +216,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
   }
   function live() {
     const now = performance.now();
-    if (!paused) pendingTime += Math.min(0.1, (now - last) / 1000) / slowdown;
+    if (!paused) pendingTime += (pace * Math.min(0.1, (now - last) / 1000)) / slowdown;
     last = now;
     for (; pendingTime >= 0.001; pendingTime -= 0.001) scene.box.advance();
     for (const viewer of viewers) {
