@@ -58,7 +58,8 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
         "palpate-verify",
         &["palpate", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene", "palpate-testkit"],
     ),
-    ("palpate-export", &["palpate", "palpate-mesh"]),
+    ("palpate-sound", &["palpate"]),
+    ("palpate-export", &["palpate", "palpate-mesh", "palpate-sound"]),
     (
         "palpate-scene",
         &["palpate", "palpate-fem", "palpate-mesh", "palpate-store", "palpate-haptics", "palpate-export"],
@@ -91,6 +92,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-verify",
             "palpate-reproduce",
             "palpate-export",
+            "palpate-sound",
             "palpate-scene",
             "palpate-render",
         ],
