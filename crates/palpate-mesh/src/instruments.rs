@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Bar along x with an arch cut into its underside (y), as of a vibraphone or marimba: the arch tunes the second mode.
+/// Bar along x with an arch cut into its underside (y), as of a vibraphone or marimba.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArchedBar {
     /// Length [m].
@@ -60,13 +60,13 @@ pub struct Bell {
 }
 
 impl Default for ArchedBar {
-    /// Of aluminium a bar of a vibraphone with A4, whose second mode is two octaves above the first.
+    /// Of aluminium a bar of a vibraphone with A4, 440 Hz.
     fn default() -> Self {
         Self {
             length: 0.28,
             thickness: 0.013,
             width: 0.04,
-            arch_depth: 0.0066,
+            arch_depth: 0.00631,
             arch_length: 0.18,
             cells: [28, 2, 3],
         }
@@ -76,7 +76,14 @@ impl Default for ArchedBar {
 impl Default for TuningFork {
     /// Of aluminium a fork with A4, 440 Hz.
     fn default() -> Self {
-        Self { tine_length: 0.0813, tine_thickness: 0.004, gap: 0.008, depth: 0.006, foot: 0.008, stem: 0.04 }
+        Self {
+            tine_length: 0.08395,
+            tine_thickness: 0.004,
+            gap: 0.008,
+            depth: 0.006,
+            foot: 0.008,
+            stem: 0.04,
+        }
     }
 }
 

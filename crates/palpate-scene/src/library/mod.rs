@@ -3,6 +3,7 @@
 //! A scene is represented by its text: a change edits the text, which is read as any scene file.
 
 mod built_in;
+mod instruments;
 mod pointers;
 
 use crate::error::{SceneError, SceneErrorKind};
