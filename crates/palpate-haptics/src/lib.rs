@@ -24,6 +24,7 @@
 //! | write, read or replay a log | [`log`] |
 //! | choose a stable virtual coupling | [`stability`] |
 
+mod buffer_pool;
 mod clock;
 mod deformation_process;
 pub mod device;
@@ -46,11 +47,12 @@ mod snapshot;
 pub mod stability;
 pub mod timing;
 
+pub use buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
 pub use clock::Clock;
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 #[doc(no_inline)]
 pub use error::{Error, LogError};
-pub use force_process::{ForceProcess, ObstacleTrajectory};
+pub use force_process::{ForceProcess, ObstacleTrajectory, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
 pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;

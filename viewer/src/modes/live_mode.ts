@@ -17,6 +17,8 @@ import { MaterialPanel } from "../ui/material_panel";
 import { AccuracyPanel } from "../ui/accuracy_panel";
 import { PlotPanels } from "../ui/plot_panels";
 import { TimingPanel } from "../ui/timing_panel";
+import type { SoundBlock } from "../sound/sound_block";
+import { SoundControl } from "../sound/sound_control";
 import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
@@ -36,6 +38,7 @@ export class LiveMode implements PageMode {
   private readonly keyboard: KeyboardPointer;
   private readonly gamepads: GamepadPointers;
   private readonly toolbar: LiveToolbar;
+  private readonly sound: SoundControl;
   private readonly hint = new Hint();
   private readonly forceReadout = new ForceReadout();
   private readonly jobs = new JobList(() => this.cancelJob());
@@ -54,8 +57,6 @@ export class LiveMode implements PageMode {
   private requestedScene: SceneMessage | null = null;
   private frame: Frame | null = null;
   private frameIsNew = false;
-  /** Hook for sonification, called once per shown frame. Unused. */
-  onForces: ((frame: Frame) => void) | null = null;
 
   constructor(
     private readonly sceneView: SceneView,
@@ -85,6 +86,7 @@ export class LiveMode implements PageMode {
       },
       () => sceneView.resetView(),
     );
+    this.sound = new SoundControl(send, notifications);
     this.scenes = new ScenesPanel((id) => send({ type: "open_scene", scene: id }));
     this.physics = new PhysicsPanel(send);
     this.material = new MaterialPanel(send);
@@ -96,7 +98,7 @@ export class LiveMode implements PageMode {
     this.outOfView.addEventListener("click", () => sceneView.resetView());
     this.loading.hidden = true;
     layout.chips.append(this.viewers);
-    layout.toolbar.append(...this.toolbar.parts);
+    layout.toolbar.append(...this.toolbar.parts, ...this.sound.parts);
     layout.overlayTop.append(this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.outOfView);
     layout.viewArea.append(this.loading);
@@ -113,6 +115,7 @@ export class LiveMode implements PageMode {
     this.touches.clear();
     this.scenes.setScenes(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
+    this.sound.connected();
     this.stream();
   }
 
@@ -185,6 +188,10 @@ export class LiveMode implements PageMode {
     if (scene !== null) this.scene(scene);
   }
 
+  soundReceived(block: SoundBlock): void {
+    this.sound.play(block);
+  }
+
   frameReceived(frame: Frame): void {
     const graph = this.sceneView.graphs[0];
     // A restarted server counts generations from the start again, so the generation alone is not enough.
@@ -228,7 +235,6 @@ export class LiveMode implements PageMode {
       try {
         graph.setFrame(this.frame, now / 1000);
         this.sceneView.requestRender();
-        this.onForces?.(this.frame);
       } catch (error) {
         if (!(error instanceof FrameMismatch)) throw error;
         this.notifications.notifyOnce("frame mismatch", `The server sent a frame that does not fit the scene; it was dropped: ${error.message}`);

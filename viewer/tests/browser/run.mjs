@@ -5,13 +5,14 @@ import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
+import { soundCases } from "./sound.mjs";
 import { touchCases } from "./touching.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const real = Boolean(process.env.PALPATE);
 const filter = process.argv[2] ?? "";
-const cases = [...liveCases, ...touchCases, ...reconstructionCases, ...logCases].filter(({ name }) => name.includes(filter));
+const cases = [...liveCases, ...touchCases, ...reconstructionCases, ...logCases, ...soundCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;

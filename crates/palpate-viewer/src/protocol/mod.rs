@@ -4,6 +4,7 @@ mod bytes;
 mod description;
 mod frame;
 mod messages;
+mod sound;
 mod surface;
 
 pub use description::{
@@ -15,4 +16,5 @@ pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, dec
 pub(crate) use messages::{
     ClientMessage, Hello, LogEntry, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status,
 };
+pub(crate) use sound::encode_sound;
 pub(crate) use surface::{mode_shapes_bytes, surface_bytes};

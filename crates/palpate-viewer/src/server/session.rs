@@ -67,6 +67,8 @@ struct PageSession<'s> {
     /// Every n-th frame is sent; 0: none.
     stride: u32,
     frames: u32,
+    /// Whether it gets the sound.
+    hears: bool,
     /// Time of the newest message or pong.
     heard: Instant,
 }
@@ -82,6 +84,7 @@ impl<'s> PageSession<'s> {
             format: FrameFormat::Modal,
             stride: 1,
             frames: 0,
+            hears: false,
             heard: Instant::now(),
         }
     }
@@ -113,6 +116,7 @@ impl<'s> PageSession<'s> {
                     self.close(close_code::AGAIN, "too many pages show this scene already").await;
                 }
                 self.count_vertex_stream(live, false);
+                self.switch_sound(live, false);
                 live.viewers.all.fetch_sub(1, Ordering::Relaxed);
                 lock(&live.pointers).release_viewer(self.viewer);
                 live.job_slot.cancel_of(self.viewer);
@@ -132,6 +136,7 @@ impl<'s> PageSession<'s> {
         self.send(Message::Binary(first)).await?;
         live.commands.push(Command::SendStatus);
         let mut pings = self.pings();
+        let mut sound = live.sound.subscribe();
         loop {
             tokio::select! {
                 biased;
@@ -148,6 +153,12 @@ impl<'s> PageSession<'s> {
                         let scene = live.current.borrow().message.clone();
                         self.send(Message::text(&*scene)).await?;
                     }
+                    Err(RecvError::Closed) => return Err(SessionEnd),
+                },
+                block = sound.recv(), if self.hears => match block {
+                    Ok(block) => self.send(Message::Binary(block)).await?,
+                    // What is late is not heard any more.
+                    Err(RecvError::Lagged(_)) => sound = sound.resubscribe(),
                     Err(RecvError::Closed) => return Err(SessionEnd),
                 },
                 changed = modal.changed(), if self.format == FrameFormat::Modal && self.stride > 0 => {
@@ -277,6 +288,10 @@ impl<'s> PageSession<'s> {
                 (self.format, self.stride) = (format, stride);
                 return Ok(());
             }
+            ClientMessage::Sound { on } => {
+                self.switch_sound(live, on);
+                return Ok(());
+            }
             ClientMessage::Pause { paused } => {
                 live.playback.set_paused(paused);
                 Command::SendStatus
@@ -348,6 +363,14 @@ impl<'s> PageSession<'s> {
         }
         let point = SurfacePoint { triangle, weights: weights.map(|weight| weight / sum) };
         recording.is_movable(&point).then_some(Grasp { object, point })
+    }
+
+    /// Begins or ends to send the sound.
+    fn switch_sound(&mut self, live: &LiveScene, on: bool) {
+        if on != self.hears {
+            self.hears = on;
+            live.sound.count(on);
+        }
     }
 
     /// Updates the number of vertex streams; `wanted`: whether this page streams vertex frames from now on.

@@ -143,6 +143,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         state: None,
         playback: Arc::default(),
         cycles: None,
+        listener: None,
     };
     let (report, written) = watch(session, log, steps)?;
     let links = server.map(|server| server.counts());
