@@ -98,7 +98,9 @@ mod tests {
             samples.skip(48_000).fold(0.0, f32::max)
         };
         // |H| = f/√(f² + (20 Hz)²) of the first order.
-        for (frequency, expected) in [(1.0, 0.04994), (20.0, 0.70711), (440.0, 0.99897), (4000.0, 1.0)] {
+        for (frequency, expected) in
+            [(1.0, 0.04994), (20.0, core::f64::consts::FRAC_1_SQRT_2), (440.0, 0.99897), (4000.0, 1.0)]
+        {
             let found = f64::from(largest(frequency)) / 0.1;
             assert!((found - expected).abs() < 3e-3, "{frequency} Hz: {found}");
         }

@@ -21,6 +21,9 @@ use tokio::sync::broadcast;
 /// Interval of the blocks.
 const BLOCK_INTERVAL: Duration = Duration::from_millis(4);
 
+/// Interval at which the thread looks for pages that listen, while none does.
+const IDLE_INTERVAL: Duration = Duration::from_millis(20);
+
 /// Capacity of the pool of step records [s, steps]: several blocks.
 const POOL_S: f64 = 0.05;
 const POOL_STEPS: (usize, usize) = (32, 512);
@@ -128,7 +131,8 @@ impl SoundMaker {
     fn run(mut self, stop: &AtomicBool) {
         while !stop.load(Ordering::Relaxed) {
             self.make_block();
-            std::thread::sleep(BLOCK_INTERVAL);
+            let is_idle = !self.blocks.has_listeners();
+            std::thread::sleep(if is_idle { IDLE_INTERVAL } else { BLOCK_INTERVAL });
         }
     }
 
