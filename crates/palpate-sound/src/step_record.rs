@@ -1,6 +1,5 @@
 //! Record of a step for the sound: what a force process hands to another thread.
 
-use crate::synthesiser::Synthesiser;
 use alloc::vec::Vec;
 use palpate::{OscillatorState, State};
 
@@ -16,7 +15,7 @@ pub struct StepRecord {
 #[derive(Debug, Clone)]
 pub(crate) struct BodyRecord {
     /// Index of the first audible mode in the recording.
-    first: usize,
+    pub(crate) first: usize,
     pub(crate) states: Vec<OscillatorState>,
     /// Held forces p [N/√kg].
     pub(crate) forces: Vec<f64>,
@@ -24,17 +23,6 @@ pub(crate) struct BodyRecord {
 }
 
 impl StepRecord {
-    /// Record with room for the steps that a synthesiser takes.
-    pub fn new(synthesiser: &Synthesiser) -> Self {
-        let bodies = synthesiser.radiators().map(|radiator| BodyRecord {
-            first: radiator.first,
-            states: alloc::vec![OscillatorState::default(); radiator.len()],
-            forces: alloc::vec![0.0; radiator.len()],
-            is_asleep: false,
-        });
-        Self { step: 0, bodies: bodies.collect() }
-    }
-
     /// Copy the last step of a state of the synthesiser's scene.
     ///
     /// # Real time

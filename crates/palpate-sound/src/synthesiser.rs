@@ -4,9 +4,9 @@ use crate::SoundParameters;
 use crate::oscillator_bank::{LaneSums, OscillatorBank};
 use crate::output_stage::OutputStage;
 use crate::radiation::Radiator;
-use crate::step_record::StepRecord;
+use crate::step_record::{BodyRecord, StepRecord};
 use alloc::vec::Vec;
-use palpate::{Model, State};
+use palpate::{Model, OscillatorState, State};
 
 /// Share of a sample up to which instants are taken for equal: far above the round-off of a day of samples, far below what one hears.
 const SAME_INSTANT: f64 = 1e-4;
@@ -96,6 +96,19 @@ impl Synthesiser {
         for (bank, body) in self.banks.iter_mut().zip(&record.bodies) {
             bank.states.copy_from_slice(&body.states);
         }
+    }
+}
+
+impl StepRecord {
+    /// Record with room for the steps that a synthesiser takes.
+    pub fn new(synthesiser: &Synthesiser) -> Self {
+        let bodies = synthesiser.radiators().map(|radiator| BodyRecord {
+            first: radiator.first,
+            states: alloc::vec![OscillatorState::default(); radiator.len()],
+            forces: alloc::vec![0.0; radiator.len()],
+            is_asleep: false,
+        });
+        Self { step: 0, bodies: bodies.collect() }
     }
 }
 

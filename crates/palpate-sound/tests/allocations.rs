@@ -1,4 +1,4 @@
-//! What the force process does for the sound allocates nothing; neither does the synthesis, once its buffers have grown.
+//! Capture on the force process, and synthesis once its buffers have grown: neither allocates.
 
 use palpate::{Input, Model, ModelParameters, State, step};
 use palpate_sound::{SoundParameters, StepRecord, Synthesiser};

@@ -1,4 +1,4 @@
-//! What tests hear: the amplitude of a tone, the frequency of a partial, and clicks.
+//! Amplitude of a tone, frequency of a partial, and clicks, in samples.
 
 use std::f64::consts::TAU;
 
