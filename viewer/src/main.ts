@@ -69,6 +69,7 @@ function start(): void {
   const listener: ConnectionListener = {
     message: (message) => handleMessage(message),
     frame: (frame) => mode?.frameReceived(frame),
+    sound: (block) => mode?.soundReceived?.(block),
     state: (state) => showState(state),
     decodeFailed: (what) => notifications.notifyOnce("unreadable", `The server sent a message that this page cannot read; it was dropped (${what}).`),
   };

@@ -1,4 +1,4 @@
-//! Build of the runtime for a target without an operating system.
+//! Build of the runtime and of its sound for a target without an operating system.
 //!
 //! The runtime is `no_std` with `alloc`. A target of rustup's is used where one is installed; else `core` and `alloc` are built from
 //! the standard library's source.
@@ -20,7 +20,7 @@ pub fn build() -> Result<(), String> {
     }
     let target = installed.unwrap_or(TARGETS[0]);
     let mut cargo = check(target, root().join("target/bare"));
-    cargo.args(["--package", "palpate", "--lib"]);
+    cargo.args(["--package", "palpate", "--package", "palpate-sound", "--lib"]);
     if installed.is_none() && !build_std(&mut cargo, "core,alloc")? {
         println!(
             "skipped: neither a bare target ({}) is installed (`rustup target add {target}`), nor {HINT}",
@@ -28,6 +28,6 @@ pub fn build() -> Result<(), String> {
         );
         return Ok(());
     }
-    println!("building the runtime for {target}");
+    println!("building the runtime and its sound for {target}");
     run(&mut cargo)
 }

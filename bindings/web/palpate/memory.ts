@@ -12,6 +12,7 @@ export const enum Sent {
   Text = 2,
   Frame = 3,
   Data = 4,
+  Sound = 5,
 }
 
 /** Functions of the module; handles and addresses are numbers. */

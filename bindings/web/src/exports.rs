@@ -23,6 +23,7 @@ const JSON: u32 = 1;
 const TEXT: u32 = 2;
 const FRAME: u32 = 3;
 const DATA: u32 = 4;
+const SOUND: u32 = 5;
 
 #[link(wasm_import_module = "palpate")]
 unsafe extern "C" {
@@ -47,6 +48,7 @@ fn send_message(message: PageMessage) {
     match message {
         PageMessage::Text(text) => send(TEXT, text.as_bytes()),
         PageMessage::Frame(frame) => send(FRAME, &frame),
+        PageMessage::Sound(block) => send(SOUND, &block),
     }
 }
 

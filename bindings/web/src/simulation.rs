@@ -1,9 +1,7 @@
 //! Simulation: a scene that the caller steps, with its input and output in flat arrays.
 
 use glam::{DQuat, DVec3};
-use palpate::{
-    Collider, DeviceInput, DeviceMode, Grasp, Input, Pose, ResidualFieldCache, State, step,
-};
+use palpate::{Collider, DeviceInput, DeviceMode, Grasp, Input, Pose, ResidualFieldCache, State, step};
 use palpate_scene::Scene;
 use std::sync::Arc;
 

@@ -50,6 +50,14 @@ pub enum ExportError {
     /// The time window is empty, or its frame rate is not positive.
     #[error(transparent)]
     TimeWindow(#[from] TimeWindowError),
+    /// A WAV file states its length in 32 bits.
+    #[error("cannot write {}: it would have {:.0} s of sound, a WAV file has 44739 s (12 hours) of 48 kHz at most", path.display(), seconds)]
+    SoundTooLong {
+        /// Path of the output.
+        path: PathBuf,
+        /// Duration of the run [s].
+        seconds: f64,
+    },
     /// A GLB file states its length in 32 bits.
     #[error("{} would have {:.1} GB, a GLB file has 4.29 GB at most", path.display(), 1e-9 * *bytes as f64)]
     GlbTooLarge {

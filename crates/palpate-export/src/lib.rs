@@ -1,4 +1,5 @@
-//! Steps of a simulation as files: CSV for numbers, VTU for ParaView, glTF (GLB) for everything that shows animations.
+//! Steps of a simulation as files: CSV for numbers, VTU for ParaView, glTF (GLB) for everything that shows animations, WAV for
+//! the sound.
 //!
 //! A [`SceneExporter`] takes the state after each step and writes rows and frames; [`SceneLabels`] give the parts of the model
 //! their names. Every file is an [`AtomicFile`]: it takes its name when it is complete, and until then nothing stands there.
@@ -18,6 +19,7 @@ mod output_folder;
 mod part_file;
 mod rigid_surface;
 mod scene_export;
+mod sound_file;
 mod standard_output;
 mod temporary_folder;
 mod unfinished;

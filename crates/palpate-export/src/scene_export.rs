@@ -6,9 +6,11 @@ use crate::error::ExportError;
 use crate::frame::{Frame, TimeWindow};
 use crate::glb_scene::{GlbScene, GlbWarning};
 use crate::labels::SceneLabels;
+use crate::sound_file::SoundFile;
 use crate::vtu_scene::VtuScene;
 use glam::DVec3;
 use palpate::{Input, Model, State};
+use palpate_sound::SoundParameters;
 use std::path::{Path, PathBuf};
 
 /// Files to write, and the steps that they show.
@@ -22,13 +24,17 @@ pub struct ExportOptions<'a> {
     pub vtu: Option<&'a Path>,
     /// Animated GLB file.
     pub gltf: Option<&'a Path>,
+    /// WAV file with the sound.
+    pub sound: Option<&'a Path>,
+    /// Listener and full scale of the sound.
+    pub sound_parameters: SoundParameters,
     /// Steps and frame rate.
     pub window: TimeWindow,
 }
 
 /// Written file.
 pub struct WrittenFile {
-    /// Kind: `csv`, `contacts`, `vtu` or `gltf`.
+    /// Kind: `csv`, `contacts`, `vtu`, `gltf` or `sound`.
     pub kind: &'static str,
     /// Path; of a series its index.
     pub path: PathBuf,
@@ -40,6 +46,7 @@ pub struct SceneExporter {
     contacts: Option<ContactsCsv>,
     vtu: Option<VtuScene>,
     glb: Option<GlbScene>,
+    sound: Option<SoundFile>,
     labels: SceneLabels,
     warning: Option<GlbWarning>,
     window: TimeWindow,
@@ -54,7 +61,12 @@ impl ExportOptions<'_> {
     /// [`ExportError::TimeWindow`] and [`ExportError::SameFile`].
     pub fn check(&self) -> Result<(), ExportError> {
         self.window.check()?;
-        check_distinct(&[("csv", self.csv), ("contacts", self.contacts), ("gltf", self.gltf)])
+        check_distinct(&[
+            ("csv", self.csv),
+            ("contacts", self.contacts),
+            ("gltf", self.gltf),
+            ("sound", self.sound),
+        ])
     }
 }
 
@@ -83,6 +95,13 @@ impl SceneExporter {
             csv: options.csv.map(|path| StepsCsv::new(path, &labels)).transpose()?,
             contacts: options.contacts.map(|path| ContactsCsv::new(path, &labels)).transpose()?,
             vtu: options.vtu.map(|folder| VtuScene::new(folder, parts, state, input)).transpose()?,
+            sound: options
+                .sound
+                .map(|path| {
+                    let of_run = (model, state);
+                    SoundFile::new(path, &labels.input_paths(), of_run, &options.sound_parameters, steps)
+                })
+                .transpose()?,
             window: options.window,
             frames: 0,
             displacements: model
@@ -98,6 +117,11 @@ impl SceneExporter {
     /// Warning about the expected size of the GLB file.
     pub fn warning(&self) -> Option<&GlbWarning> {
         self.warning.as_ref()
+    }
+
+    /// Largest size of a sample of the sound so far [1, of full scale]; none without a file for it.
+    pub fn sound_peak(&self) -> Option<f32> {
+        self.sound.as_ref().map(SoundFile::peak)
     }
 
     /// Number of frames so far.
@@ -119,6 +143,9 @@ impl SceneExporter {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.write(&self.labels, output)?;
+        }
+        if let Some(sound) = &mut self.sound {
+            sound.write(state)?;
         }
         self.write_frame_if_due(model, input, state)
     }
@@ -166,6 +193,9 @@ impl SceneExporter {
         }
         if let Some(glb) = self.glb {
             note("gltf", glb.finish()?);
+        }
+        if let Some(sound) = self.sound {
+            note("sound", sound.finish()?);
         }
         Ok(written)
     }

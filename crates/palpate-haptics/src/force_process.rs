@@ -11,6 +11,9 @@ use std::sync::Arc;
 /// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
 pub type ObstacleTrajectory = Box<dyn Fn(f64) -> Pose + Send>;
 
+/// Listener to the state after every step. It must not allocate, lock or call the system.
+pub type StepListener = Box<dyn FnMut(&State) + Send>;
+
 /// Steps of the warm-up.
 const WARM_UP_STEPS: usize = 50;
 
@@ -46,6 +49,7 @@ pub struct ForceProcess {
     /// Gravity over simulated time [m/s²], if it changes.
     gravity: Option<MotionPath>,
     steps: u64,
+    listener: Option<StepListener>,
     /// Silence of a device [s] after which it is inactive.
     device_timeout_s: f64,
     /// Ball around the objects at the start.
@@ -108,6 +112,7 @@ impl ForceProcess {
             bases: vec![None; objects],
             gravity: None,
             steps: 0,
+            listener: None,
             device_timeout_s,
         }
     }
@@ -142,6 +147,11 @@ impl ForceProcess {
     /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
     pub fn change_gravity(&mut self, over_time: MotionPath) {
         self.gravity = Some(over_time);
+    }
+
+    /// Hands the state after every step to a listener.
+    pub fn listen(&mut self, listener: StepListener) {
+        self.listener = Some(listener);
     }
 
     /// State of the scene.
@@ -251,7 +261,10 @@ impl ForceProcess {
                 absorbed_j: slot.proxy_work_j + stored,
             });
         }
-        output
+        if let Some(listener) = &mut self.listener {
+            listener(&self.state);
+        }
+        self.state.output()
     }
 }
 

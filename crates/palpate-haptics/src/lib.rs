@@ -29,6 +29,7 @@
 // Parts that only drivers and links use.
 #![cfg_attr(not(feature = "real-time"), allow(dead_code))]
 
+mod buffer_pool;
 #[cfg(feature = "real-time")]
 mod clock;
 #[cfg(feature = "real-time")]
@@ -60,6 +61,7 @@ mod snapshot;
 pub mod stability;
 pub mod timing;
 
+pub use buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
 #[cfg(feature = "real-time")]
 pub use clock::Clock;
 #[cfg(feature = "real-time")]
@@ -67,7 +69,7 @@ pub use cycle_channel::{CycleReceiver, CycleSender, cycle_channel};
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 #[doc(no_inline)]
 pub use error::{Error, LogError};
-pub use force_process::{ForceProcess, ObstacleTrajectory};
+pub use force_process::{ForceProcess, ObstacleTrajectory, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
 pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;

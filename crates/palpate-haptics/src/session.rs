@@ -4,7 +4,7 @@ use crate::clock::Clock;
 use crate::cycle_channel::CycleSender;
 use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::{Error, SessionError};
-use crate::force_process::{ForceProcess, ObstacleTrajectory};
+use crate::force_process::{ForceProcess, ObstacleTrajectory, StepListener};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
 use crate::log::{LogSender, LogSummary, LogWriter, WrittenLog};
 use crate::motion_path::MotionPath;
@@ -87,6 +87,8 @@ pub struct Session {
     pub playback: Arc<Playback>,
     /// Channel for the timing of the force process's cycles.
     pub cycles: Option<CycleSender>,
+    /// Listener to the state after every step.
+    pub listener: Option<StepListener>,
 }
 
 /// Report of a session.
@@ -194,6 +196,7 @@ impl Session {
             process.move_bases(self.base_paths);
         }
         self.gravity.into_iter().for_each(|gravity| process.change_gravity(gravity));
+        self.listener.into_iter().for_each(|listener| process.listen(listener));
         let (snapshot_writer, mut snapshots) =
             snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));
         let (log_sender, writer) = log.unzip();
@@ -322,8 +325,7 @@ struct ForceLoop<'a> {
 impl ForceLoop<'_> {
     fn run(self, scheduling: Scheduling) -> ForceResult {
         let Self { mut process, clock, mut log_sender, mut snapshot_writer, ticks_per_frame, .. } = self;
-        let Self { step_limit, stop, steps, .. } = self;
-        let (playback, mut cycles) = (self.playback, self.cycles);
+        let Self { step_limit, stop, steps, playback, mut cycles, .. } = self;
         let granted = scheduling.apply();
         if let Some(cycles) = &mut cycles {
             cycles.send_granted(granted.clone());

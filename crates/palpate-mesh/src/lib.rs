@@ -4,7 +4,7 @@
 //! - [`Mesh`]: tetrahedra with regions and groups; [`Mesh::checked`] holds it to be one sound body.
 //! - [`SurfaceMesh`]: triangles; [`tetrahedralise`] fills them with tetrahedra.
 //! - [`Mesh::to_vtk`], [`Mesh::to_gmsh`]: files for other programs.
-//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`]: generated meshes.
+//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`], [`ArchedBar`], [`TuningFork`], [`Bell`]: generated meshes.
 #![doc = "\n"]
 #![doc = include_str!("../README.md")]
 #![deny(missing_docs)]
@@ -19,6 +19,7 @@ mod files;
 mod format;
 mod gltf;
 mod gmsh;
+mod instruments;
 mod medit;
 mod mesher;
 mod mid_edge;
@@ -46,6 +47,7 @@ mod write;
 pub use error::{FilePosition, MeshError};
 pub use files::Files;
 pub use format::{Format, Recognised, recognise};
+pub use instruments::{ArchedBar, Bell, TuningFork};
 pub use mesher::{MeshingParameters, MeshingReport, WatchFn, tetrahedralise};
 pub use mid_edge::QuadraticTet;
 pub use pieces::Piece;

@@ -36,7 +36,7 @@ impl CellSplit {
     }
 
     /// Tetrahedra of a cell by its corners (0 or 1 along each axis); `odd` is the parity of the sum of its indices.
-    fn of_cell(self, odd: u32) -> Vec<[[u32; 3]; 4]> {
+    pub(crate) fn of_cell(self, odd: u32) -> Vec<[[u32; 3]; 4]> {
         match self {
             Self::Five => {
                 let mut split = [

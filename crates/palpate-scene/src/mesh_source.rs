@@ -1,9 +1,10 @@
-//! Mesh sources: primitives as text (`box:…`, `sphere:…`) and mesh files.
+//! Mesh sources: primitives as text (`box:…`, `sphere:…`, `instrument:…`) and mesh files.
 
 use crate::error::{SceneError, SceneErrorKind};
 use palpate_fem::Progress;
 use palpate_mesh::{
-    CellSplit, Files, Mesh, MeshError, MeshFile, MeshingParameters, SurfaceMesh, ball_mesh, split_box_mesh,
+    ArchedBar, Bell, CellSplit, Files, Mesh, MeshError, MeshFile, MeshingParameters, SurfaceMesh, TuningFork,
+    ball_mesh, split_box_mesh,
 };
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -143,6 +144,19 @@ fn primitive(source: &str) -> Result<Option<Mesh>, SceneError> {
         };
         return ball_mesh(radius, layers).map(Some).map_err(refused);
     }
+    if let Some(name) = source.strip_prefix("instrument:") {
+        let mesh = match name {
+            "bar" => ArchedBar::default().mesh(),
+            "fork" => TuningFork::default().mesh(),
+            "bell" => Bell::default().mesh(),
+            _ => {
+                return Err(mesh_error(format!(
+                    "{source:?} is no instrument; write instrument:bar, instrument:fork or instrument:bell"
+                )));
+            }
+        };
+        return mesh.map(Some).map_err(refused);
+    }
     Ok(None)
 }
 
@@ -174,14 +188,15 @@ fn mesh_error(message: impl std::fmt::Display) -> SceneError {
     SceneError::new(SceneErrorKind::Mesh, message)
 }
 
+/// Whether a text names a primitive, not a file.
+pub(crate) fn is_primitive(source: &str) -> bool {
+    ["box:", "sphere:", "instrument:"].iter().any(|kind| source.starts_with(kind))
+}
+
 /// Name of a source in a recording: without folders.
 pub fn source_name(source: &str) -> String {
     let file = Path::new(source).file_name().and_then(|name| name.to_str());
-    if source.starts_with("box:") || source.starts_with("sphere:") {
-        source.to_string()
-    } else {
-        file.unwrap_or(source).to_string()
-    }
+    if is_primitive(source) { source.to_string() } else { file.unwrap_or(source).to_string() }
 }
 
 fn triple<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
@@ -213,6 +228,11 @@ mod tests {
                 .starts_with("\"box:1x2/1x2x3\" is no box; write box:LXxLYxLZ/NXxNYxNZ")
         );
         assert!(text(read_mesh("sphere:x/2")).contains("write sphere:RADIUS/N"));
+        for name in ["bar", "fork", "bell"] {
+            let mesh = read_mesh(&format!("instrument:{name}"));
+            assert!(mesh.is_ok_and(|mesh| mesh.tets.len() > 500), "{name}");
+        }
+        assert!(text(read_mesh("instrument:drum")).contains("write instrument:bar, instrument:fork"));
         assert!(text(read_mesh("no-such-file.msh")).starts_with("cannot read mesh no-such-file.msh"));
     }
 }

@@ -1,12 +1,12 @@
 //! Recipes: recordings that are made when they are needed, and cached.
 
 use crate::error::{SceneError, SceneErrorKind};
-use crate::mesh_source::{read_body, source_name};
+use crate::mesh_source::{is_primitive, read_body, source_name};
 use crate::progress::WithoutRemarks;
 use crate::recording_file::read_recording;
 use palpate::{Damping, Material, Recording, Support};
 use palpate_export::write_atomically;
-use palpate_fem::{ElementOrder, Precision, Progress, RecordParameters, record};
+use palpate_fem::{ElementOrder, Precision, Progress, RecordParameters, ResidualChoice, record};
 use palpate_mesh::{Mesh, MeshingParameters, Repair};
 use std::path::{Path, PathBuf};
 
@@ -31,12 +31,22 @@ pub struct RecordingRecipe {
     pub precision: Precision,
 }
 
+/// Radius within which the residual compliance of an instrument is kept [m]: about the thickness of its parts. None for other bodies.
+fn near_field_radius_m(source: &str) -> Option<f64> {
+    match source {
+        "instrument:bar" => Some(0.008),
+        "instrument:fork" => Some(0.0032),
+        "instrument:bell" => Some(0.005),
+        _ => None,
+    }
+}
+
 impl RecordingRecipe {
     /// Recipe of a recording of a free primitive of one material; none for others.
     pub fn of(recording: &Recording) -> Option<Self> {
         let metadata = &recording.metadata;
         let source = &metadata.provenance.source;
-        let primitive = source.starts_with("box:") || source.starts_with("sphere:");
+        let primitive = is_primitive(source);
         let [material] = metadata.materials.as_slice() else { return None };
         (primitive && metadata.support == Support::Free && material.stiffness_pa.is_none()).then(|| Self {
             source: source.clone(),
@@ -70,9 +80,15 @@ impl RecordingRecipe {
     /// Parameters of [`record`], for a mesh with `regions` regions.
     pub fn parameters(&self, regions: usize) -> RecordParameters {
         let material = Material { region: String::new(), ..self.material.clone() };
+        // Bodies that ring are thin, and have many nodes: of their residual compliance what is near, in a small file.
+        let (residual, precision) = match near_field_radius_m(&self.source) {
+            Some(radius) => (ResidualChoice::NearField(radius), Precision::Compact),
+            None => (ResidualChoice::Automatic, self.precision),
+        };
         RecordParameters {
             source: source_name(&self.source),
-            precision: self.precision,
+            residual,
+            precision,
             ..RecordParameters::new(vec![material; regions], self.order, self.modes, self.damping)
         }
     }

@@ -15,6 +15,8 @@ mod subdivision;
 mod waiting;
 
 #[cfg(feature = "record")]
+mod aluminium_bar;
+#[cfg(feature = "record")]
 mod body_set;
 #[cfg(feature = "record")]
 mod material;
@@ -37,6 +39,8 @@ pub use scenes::{
 pub use subdivision::{subdivided, subdivided_near_field};
 pub use waiting::wait_until;
 
+#[cfg(feature = "record")]
+pub use aluminium_bar::{BAR_DAMPING, BAR_MATERIAL, BAR_SIZE_M, aluminium_bar};
 #[cfg(feature = "record")]
 pub use body_set::{BodyShape, Fineness, SOFT};
 #[cfg(feature = "record")]

@@ -9,15 +9,16 @@ use crate::page_requests::{Effect, SceneControls, SceneRequest, unreadable};
 use crate::pointers::{Pointers, lock};
 use crate::protocol::{
     FrameEncoder, FrameFormat, Hello, MaterialDescription, PROTOCOL, PhysicsSettings, ProcessTiming,
-    SceneSummary, ServerMessage, Status,
+    SceneSummary, ServerMessage, Status, encode_sound,
 };
 use crate::scene_provider::{ViewerDevice, ViewerScene};
 use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, initial_snapshot, is_resumable};
 use crate::static_data::StaticData;
-use palpate::{DeviceMode, ObjectSnapshot, State};
+use palpate::{DeviceMode, Model, ObjectSnapshot, State};
 use palpate_haptics::{
     Cycle, DevicePort, ForcePort, ForceProcess, ObstacleTrajectory, Overrun, Playback, Snapshot, Timing, port,
 };
+use palpate_sound::{SoundParameters, StepRecord, Synthesiser};
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -26,6 +27,9 @@ const MAX_BACKLOG_S: f64 = 0.05;
 
 /// Longest time in which steps are made without a look at the page's messages [s].
 const MAX_BURST_S: f64 = 0.01;
+
+/// Shortest block of sound [s].
+const SOUND_BLOCK_S: f64 = 0.004;
 
 /// Interval of status messages [s].
 const STATUS_INTERVAL_S: f64 = 0.5;
@@ -40,6 +44,8 @@ pub enum PageMessage {
     Text(String),
     /// Encoded frame.
     Frame(Vec<u8>),
+    /// Encoded block of sound.
+    Sound(Vec<u8>),
 }
 
 /// Request of the page for another scene, which the caller makes and starts.
@@ -73,6 +79,30 @@ pub struct LocalScene {
     /// Every n-th frame is sent; 0: none.
     stride: u32,
     frames: u32,
+    /// Sound, while the page wants it.
+    sound: Option<LocalSound>,
+}
+
+/// Sound of the steps since the last block.
+struct LocalSound {
+    synthesiser: Synthesiser,
+    record: StepRecord,
+    sample_rate_hz: u32,
+    samples: Vec<f32>,
+}
+
+impl LocalSound {
+    fn new(model: &Model, state: &State) -> Self {
+        let parameters = SoundParameters::default();
+        let synthesiser = Synthesiser::new(model, state, &parameters);
+        let record = StepRecord::new(&synthesiser);
+        Self { synthesiser, record, sample_rate_hz: parameters.sample_rate_hz as u32, samples: Vec::new() }
+    }
+
+    fn add(&mut self, state: &State) {
+        self.record.capture(state);
+        self.synthesiser.synthesise(&self.record, &mut self.samples);
+    }
 }
 
 impl LocalScene {
@@ -100,6 +130,7 @@ impl LocalScene {
             format: FrameFormat::Modal,
             stride: 1,
             frames: 0,
+            sound: None,
         })
     }
 
@@ -126,6 +157,7 @@ impl LocalScene {
         self.snapshot = initial_snapshot(&current.scene, process.state());
         (self.current, self.process, self.timing) = (current, process, Timing::default());
         (self.tick, self.frame_at, self.frame_step) = (0, 0, 0);
+        self.switch_sound(self.sound.is_some());
         self.send_scene(send);
         Ok(())
     }
@@ -166,6 +198,7 @@ impl LocalScene {
             Effect::None | Effect::Scene(SceneRequest::CancelJob) => {}
             Effect::Reply(text) => send(PageMessage::Text(text)),
             Effect::Stream(format, stride) => (self.format, self.stride) = (format, stride),
+            Effect::Sound(on) => self.switch_sound(on),
             Effect::Scene(SceneRequest::SendStatus) => self.send_status(send),
             Effect::Scene(SceneRequest::Reset) => {
                 let scene = self.current.scene.clone();
@@ -201,6 +234,7 @@ impl LocalScene {
             self.cycle(time_s, now_s, send);
             time_s = now_s();
         }
+        self.send_sound(send);
         if time_s >= self.status_at_s {
             self.status_at_s = time_s + STATUS_INTERVAL_S;
             self.send_status(send);
@@ -240,6 +274,11 @@ impl LocalScene {
         let is_due = self.playback.is_due(self.tick);
         if is_due {
             self.process.cycle(time_s);
+            // In slow motion and in a pause its frequencies would be wrong.
+            let is_heard = self.playback.slowdown() == 1 && !self.playback.is_paused();
+            if let Some(sound) = self.sound.as_mut().filter(|_| is_heard) {
+                sound.add(self.process.state());
+            }
         }
         let is_paused = self.playback.is_paused();
         let has_news = self.frame_step < self.process.steps();
@@ -265,6 +304,20 @@ impl LocalScene {
         }
         self.snapshot.capture(self.process.steps(), self.process.input(), self.process.state());
         send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+    }
+
+    fn switch_sound(&mut self, on: bool) {
+        self.sound = on.then(|| LocalSound::new(&self.current.scene.model, self.process.state()));
+    }
+
+    /// Sends the sound of some milliseconds: blocks of single steps would be a thousand messages a second.
+    fn send_sound(&mut self, send: &mut dyn FnMut(PageMessage)) {
+        let Some(sound) = &mut self.sound else { return };
+        if sound.samples.len() as f64 >= SOUND_BLOCK_S * f64::from(sound.sample_rate_hz) {
+            let block = encode_sound(self.current.generation, sound.sample_rate_hz, &sound.samples);
+            sound.samples.clear();
+            send(PageMessage::Sound(block));
+        }
     }
 
     fn send_scene(&mut self, send: &mut dyn FnMut(PageMessage)) {

@@ -50,6 +50,8 @@ pub(crate) enum Effect {
     Reply(String),
     /// Change of the page's stream of frames.
     Stream(FrameFormat, u32),
+    /// Begin or end of the page's sound.
+    Sound(bool),
     /// Request to whoever runs the scene.
     Scene(SceneRequest),
 }
@@ -72,6 +74,7 @@ impl SceneControls<'_> {
             }
             ClientMessage::Release { pointer } => lock(self.pointers).release((viewer, pointer)),
             ClientMessage::Stream { format, stride } => return Effect::Stream(format, stride),
+            ClientMessage::Sound { on } => return Effect::Sound(on),
             ClientMessage::Pause { paused } => {
                 self.playback.set_paused(paused);
                 return Effect::Scene(SceneRequest::SendStatus);

@@ -18,6 +18,7 @@ struct Page {
     now_s: Cell<f64>,
     texts: Vec<Value>,
     frames: Vec<Vec<u8>>,
+    sounds: Vec<Vec<u8>>,
 }
 
 fn viewer_scene(text: &str) -> ViewerScene {
@@ -33,7 +34,8 @@ fn viewer_scene(text: &str) -> ViewerScene {
 impl Page {
     fn new(text: &str) -> Self {
         let scene = LocalScene::new(viewer_scene(text)).expect("pointers only");
-        let mut page = Self { scene, now_s: Cell::new(0.0), texts: Vec::new(), frames: Vec::new() };
+        let mut page =
+            Self { scene, now_s: Cell::new(0.0), texts: Vec::new(), frames: Vec::new(), sounds: Vec::new() };
         page.call(|scene, _, send| scene.greet(Vec::new(), send));
         page
     }
@@ -42,10 +44,11 @@ impl Page {
         &mut self,
         run: impl FnOnce(&mut LocalScene, &Cell<f64>, &mut dyn FnMut(PageMessage)) -> T,
     ) -> T {
-        let (texts, frames) = (&mut self.texts, &mut self.frames);
+        let (texts, frames, sounds) = (&mut self.texts, &mut self.frames, &mut self.sounds);
         run(&mut self.scene, &self.now_s, &mut |message| match message {
             PageMessage::Text(text) => texts.push(serde_json::from_str(&text).expect("JSON")),
             PageMessage::Frame(frame) => frames.push(frame),
+            PageMessage::Sound(block) => sounds.push(block),
         })
     }
 
@@ -179,4 +182,27 @@ fn another_scene_goes_on_from_the_state_where_both_allow_it() {
     assert!((after - before).abs() < 0.03 && after < 0.2, "{before} {after}");
     let request = page.receive(r#"{"type":"open_scene","scene":"other"}"#);
     assert_eq!(request, Some(LocalRequest::Open("other".into())));
+}
+
+#[test]
+fn sound_goes_with_the_steps_while_the_page_wants_it() {
+    let mut page = Page::new(SCENE);
+    page.run(0.1);
+    assert!(page.sounds.is_empty());
+    page.receive(r#"{"type":"sound","on":true}"#);
+    page.run(0.5);
+    let samples: usize = page.sounds.iter().map(|block| (block.len() - 16) / 4).sum();
+    assert!((23_000..=24_300).contains(&samples), "{samples} samples in half a second of 48 kHz");
+    page.receive(r#"{"type":"slow_motion","slowdown":2}"#);
+    let heard = page.sounds.len();
+    page.run(0.2);
+    assert!(page.sounds.len() <= heard + 1, "silence in slow motion");
+    page.receive(r#"{"type":"slow_motion","slowdown":1}"#);
+    page.receive(r#"{"type":"reset"}"#);
+    page.run(0.2);
+    assert!(page.sounds.len() > heard + 10, "it goes on after a reset");
+    page.receive(r#"{"type":"sound","on":false}"#);
+    let heard = page.sounds.len();
+    page.run(0.2);
+    assert_eq!(page.sounds.len(), heard);
 }

@@ -220,6 +220,13 @@ impl State {
     pub fn modal_state(&self, object: usize) -> &[OscillatorState] {
         self.objects[object].response.modes()
     }
+
+    /// Modal forces p [N/√kg] that were held over the last step of an object, Φᵀ·f with gravity; none for one that uses a table. With the
+    /// states at the start of the step they give its motion at any time within the step ([`SampledOscillator`](crate::SampledOscillator)). An
+    /// object that sleeps keeps those of its last step.
+    pub fn held_modal_forces(&self, object: usize) -> &[f64] {
+        self.objects[object].response.held_modal_forces()
+    }
 }
 
 impl Model {

@@ -52,16 +52,25 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ("palpate-fem", &["palpate", "palpate-mesh"]),
     ("palpate-store", &["palpate"]),
     ("palpate-haptics", &["palpate"]),
-    ("palpate-viewer", &["palpate", "palpate-haptics", "palpate-scene"]),
+    ("palpate-viewer", &["palpate", "palpate-haptics", "palpate-scene", "palpate-sound"]),
     ("palpate-testkit", &["palpate", "palpate-fem", "palpate-mesh"]),
     (
         "palpate-verify",
         &["palpate", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene", "palpate-testkit"],
     ),
-    ("palpate-export", &["palpate", "palpate-mesh"]),
+    ("palpate-sound", &["palpate"]),
+    ("palpate-export", &["palpate", "palpate-mesh", "palpate-sound"]),
     (
         "palpate-scene",
-        &["palpate", "palpate-fem", "palpate-mesh", "palpate-store", "palpate-haptics", "palpate-export"],
+        &[
+            "palpate",
+            "palpate-fem",
+            "palpate-mesh",
+            "palpate-store",
+            "palpate-haptics",
+            "palpate-export",
+            "palpate-sound",
+        ],
     ),
     ("palpate-render", &["palpate", "palpate-haptics", "palpate-viewer", "palpate-export", "palpate-scene"]),
     (
@@ -91,6 +100,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
             "palpate-verify",
             "palpate-reproduce",
             "palpate-export",
+            "palpate-sound",
             "palpate-scene",
             "palpate-render",
         ],
@@ -186,9 +196,11 @@ fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
 }
 
 #[test]
-fn the_runtime_has_no_standard_library_thread_clock_or_unsafe_code() {
+fn runtime_and_sound_have_no_standard_library_thread_clock_or_unsafe_code() {
     let mut files = Vec::new();
-    sources(&root().join("crates/palpate/src"), &mut files);
+    for folder in ["crates/palpate/src", "crates/palpate-sound/src"] {
+        sources(&root().join(folder), &mut files);
+    }
     assert!(files.len() > 10, "the sources are in another folder");
     for path in files {
         let text = std::fs::read_to_string(&path).expect("a source file");

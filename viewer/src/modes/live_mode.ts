@@ -21,6 +21,8 @@ import { LostObjects } from "../ui/lost_objects";
 import { OwnSettings } from "../ui/physics_settings";
 import { Pace, paceText } from "../ui/pace";
 import { ScaleLock } from "../ui/scale_lock";
+import type { SoundBlock } from "../sound/sound_block";
+import { SoundControl } from "../sound/sound_control";
 import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
@@ -44,6 +46,7 @@ export class LiveMode implements PageMode {
   private readonly gamepads: GamepadPointers;
   private readonly toolbar: LiveToolbar;
   private readonly ghost: GhostFinger;
+  private readonly sound: SoundControl;
   private readonly hint: Hint;
   private readonly forceReadout = new ForceReadout();
   private readonly jobs = new JobList(() => this.cancelJob());
@@ -65,8 +68,6 @@ export class LiveMode implements PageMode {
   private requestedScene: SceneMessage | null = null;
   private frame: Frame | null = null;
   private frameIsNew = false;
-  /** Hook for sonification, called once per shown frame. Unused. */
-  onForces: ((frame: Frame) => void) | null = null;
 
   constructor(
     private readonly sceneView: SceneView,
@@ -110,6 +111,7 @@ export class LiveMode implements PageMode {
       () => sceneView.followObjects(),
       () => this.restart(),
     );
+    this.sound = new SoundControl(send, notifications);
     this.scenes = new ScenesPanel((id) => send({ type: "open_scene", scene: id }));
     this.physics = new PhysicsPanel(send);
     notifications.onError = (text) => this.physics.refused(text);
@@ -121,7 +123,7 @@ export class LiveMode implements PageMode {
     this.paceChip.hidden = true;
     this.loading.hidden = true;
     layout.chips.append(this.paceChip, this.viewers);
-    layout.toolbar.append(...this.toolbar.parts);
+    layout.toolbar.append(...this.toolbar.parts, ...this.sound.parts);
     layout.overlayTop.append(this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
@@ -162,6 +164,7 @@ export class LiveMode implements PageMode {
     this.scenes.setScenes(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
     this.meshUpload.section.hidden = !hello.records;
+    this.sound.connected();
     this.stream();
   }
 
@@ -248,6 +251,10 @@ export class LiveMode implements PageMode {
     if (scene !== null) this.scene(scene);
   }
 
+  soundReceived(block: SoundBlock): void {
+    this.sound.play(block);
+  }
+
   frameReceived(frame: Frame): void {
     const graph = this.sceneView.graphs[0];
     // A restarted server counts generations from the start again, so the generation alone is not enough.
@@ -304,7 +311,6 @@ export class LiveMode implements PageMode {
         this.sceneView.requestRender();
         this.touches.resume();
         this.ghost.resume();
-        this.onForces?.(this.frame);
       } catch (error) {
         if (!(error instanceof FrameMismatch)) throw error;
         this.notifications.notifyOnce("frame mismatch", `The server sent a frame that does not fit the scene; it was dropped: ${error.message}`);

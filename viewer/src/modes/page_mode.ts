@@ -2,12 +2,14 @@
 
 import type { DeviceAssigned, Hello, Progress, SceneMessage, Status } from "../protocol/messages";
 import type { Frame } from "../protocol/frame";
+import type { SoundBlock } from "../sound/sound_block";
 
 /** Handlers of server messages and browser events. */
 export interface PageMode {
   hello(hello: Hello): void;
   scene(scene: SceneMessage): void;
   frameReceived(frame: Frame): void;
+  soundReceived?(block: SoundBlock): void;
   status(status: Status): void;
   assigned(message: DeviceAssigned): void;
   progress(progress: Progress): void;

@@ -3,6 +3,7 @@
 import { sessionUrl } from "./urls";
 import { parseMessage, type ServerMessage, type ClientMessage } from "./messages";
 import { decodeFrame, type Frame } from "./frame";
+import { decodeSound, isSound, type SoundBlock } from "../sound/sound_block";
 
 export type ConnectionState =
   | { name: "connecting" }
@@ -14,6 +15,7 @@ export type ConnectionState =
 export interface ConnectionListener {
   message(message: ServerMessage): void;
   frame(frame: Frame): void;
+  sound(block: SoundBlock): void;
   state(state: ConnectionState): void;
   decodeFailed(what: string): void;
 }
@@ -91,6 +93,10 @@ export class Connection {
     if (data instanceof ArrayBuffer) {
       let frame: Frame;
       try {
+        if (isSound(data)) {
+          this.listener.sound(decodeSound(data));
+          return;
+        }
         frame = decodeFrame(data);
       } catch (error) {
         this.listener.decodeFailed(error instanceof Error ? error.message : String(error));

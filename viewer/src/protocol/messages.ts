@@ -167,6 +167,7 @@ export type ClientMessage =
   | { type: "open_scene"; scene: string }
   | { type: "set_physics"; gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }
   | ({ type: "set_material"; object: number } & Material)
+  | { type: "sound"; on: boolean }
   | { type: "stream"; format: "modal" | "vertices"; stride: number };
 
 /** Response of `/log/K/series`: times [s], forces on the hands [N, world], energies [J]. */

@@ -1,6 +1,7 @@
 // Connection to a scene that the page runs by itself, in a Web Worker: the same messages as from a server.
 
 import type { FromWorker, ToWorker } from "../worker/messages";
+import { decodeSound } from "../sound/sound_block";
 import { decodeFrame } from "./frame";
 import { parseMessage, type ClientMessage } from "./messages";
 import type { ConnectionListener } from "./connection";
@@ -65,6 +66,9 @@ export class WorkerConnection {
       case "frame":
         this.post({ kind: "shown" });
         this.listener.frame(decodeFrame(message.frame));
+        break;
+      case "sound":
+        this.listener.sound(decodeSound(message.block));
         break;
       case "data":
         this.requests.get(message.request)?.(message.bytes);

@@ -49,6 +49,7 @@ const ICONS = {
   theme: "M12 4a8 8 0 1 0 8 8 6 6 0 0 1-8-8z",
   close: "M6 6l12 12M18 6L6 18",
   sliders: "M4 7h10M18 7h2M4 17h2M10 17h10M16 5v4M8 15v4",
+  sound: "M4 10v4h3l4 4V6L7 10zM15 9a4 4 0 0 1 0 6M17.5 6.500a8 8 0 0 1 0 11",
   chart: "M4 19h16M5 15l4-5 4 3 6-8",
   locked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 8 0v3M12 15v2",
   unlocked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 7.700-1.500M12 15v2",

@@ -37,6 +37,9 @@ export class LiveToolbar {
     this.pause = iconButton("pause", "Pause (Space)", () => this.togglePause(), "Pause");
     this.step = iconButton("step", "Single step (.)", () => this.singleStep());
     this.step.classList.add("hide-on-phone");
+    // Reset shows the whole scene as well.
+    const view = iconButton("resetView", "Reset view (V)", resetView);
+    view.classList.add("hide-on-phone");
     this.speed.append(
       ...SLOWDOWNS.map((s) => element("option", { text: slowdownLabel(s), attributes: { value: String(s) } })),
     );
@@ -48,7 +51,7 @@ export class LiveToolbar {
       this.step,
       this.speed,
       iconButton("reset", "Reset (R)", reset, "Reset"),
-      iconButton("resetView", "Reset view (V)", resetView),
+      view,
     ];
   }
 

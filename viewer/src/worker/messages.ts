@@ -15,6 +15,8 @@ export type ToWorker =
 export type FromWorker =
   | { kind: "message"; text: string }
   | { kind: "frame"; frame: ArrayBuffer }
+  /** Block of sound. */
+  | { kind: "sound"; block: ArrayBuffer }
   /** Answer to a request; null if there is no such data. */
   | { kind: "data"; request: number; bytes: ArrayBuffer | null }
   /** The scene has ended. */

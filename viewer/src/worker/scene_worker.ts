@@ -59,6 +59,10 @@ class SceneRunner {
     instance.receiver = (kind, bytes) => {
       if (kind === Sent.Text) post({ kind: "message", text: textOf(bytes) });
       else if (kind === Sent.Frame) this.frames.send(bytes.slice().buffer);
+      else if (kind === Sent.Sound) {
+        const block = bytes.slice().buffer;
+        post({ kind: "sound", block }, [block]);
+      }
     };
   }
 

@@ -11,6 +11,7 @@ import { shapesBytes, surfaceBytes } from "./box.mjs";
 import { encodeFrame } from "./frames.mjs";
 import { recordLog } from "./logs.mjs";
 import { makeScene, SCENES } from "./scenes.mjs";
+import { playTone } from "./tone.mjs";
 
 const DIST = fileURLToPath(new URL("../../dist/", import.meta.url));
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
@@ -170,6 +171,10 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     },
     set_material: () => record("cube"),
     stream: (viewer, { format, stride }) => Object.assign(viewer, { format, stride }),
+    sound: (viewer, { on }) => {
+      clearInterval(viewer.tone);
+      if (on) viewer.tone = playTone(viewer, generation);
+    },
   };
 
   const sockets = new WebSocketServer({ server: http, path: "/session" });
@@ -196,6 +201,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     });
     socket.on("close", () => {
       for (const pointer of [...viewer.pointers.keys()]) release(viewer, pointer);
+      clearInterval(viewer.tone);
       viewers.delete(viewer);
     });
   });

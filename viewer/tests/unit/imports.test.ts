@@ -12,7 +12,8 @@ const modules = (readdirSync(ROOT, { recursive: true }) as string[]).filter((pat
 function importsOf(module: string): string[] {
   const text = readFileSync(ROOT + module, "utf8");
   const specifiers = [...text.matchAll(/^(?:import|export)\b[^;]*?\bfrom "(\.[^"]+)"/gm)].map((match) => match[1]);
-  return specifiers.map((specifier) => `${posix.join(posix.dirname(module), specifier)}.ts`);
+  // A worker's address is imported with a query.
+  return specifiers.map((specifier) => `${posix.join(posix.dirname(module), specifier.split("?")[0])}.ts`);
 }
 
 /** First import cycle found by depth-first search, or null. */

@@ -3,7 +3,7 @@
 use crate::commands::run::{OutputArguments, Outputs};
 use crate::failure::Failure;
 use crate::progress::CountBar;
-use crate::standard_streams::{FOLDER, LOG_INPUT, refuse, report, takes_output};
+use crate::standard_streams::{FOLDER, LOG_INPUT, SEEKS, refuse, report, takes_output};
 use crate::terminal::{print_json, warn_of_cut};
 use clap::Args;
 use palpate_scene::{LogReplay, Progress};
@@ -38,7 +38,11 @@ pub fn replay(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure("--runs is 0, expected 1 or more".into()));
     }
     let outputs = &arguments.outputs;
-    refuse(&[("the log", Some(&arguments.log), LOG_INPUT), ("--vtu", outputs.vtu.as_deref(), FOLDER)])?;
+    refuse(&[
+        ("the log", Some(&arguments.log), LOG_INPUT),
+        ("--vtu", outputs.vtu.as_deref(), FOLDER),
+        ("--sound", outputs.sound.as_deref(), SEEKS),
+    ])?;
     let output_is_taken = takes_output(
         &[("--csv", outputs.csv.as_deref()), ("--contacts", outputs.contacts.as_deref())],
         outputs.json,

@@ -18,6 +18,7 @@ mod realtime;
 mod recording_options;
 mod reproduction;
 mod results;
+mod sound;
 mod stores;
 mod streams;
 mod viewer;

@@ -257,7 +257,10 @@ fn what_can_not_be_in_real_time_is_refused_in_words() {
     let workplace = workplace();
     let cases = [
         (&["run", "scene.toml", "--log", "a.mcap"][..], "--log is of a run in real time: add --realtime"),
-        (&["run", "scene.toml", "--realtime", "--csv", "a.csv"], "--csv, --contacts and --vtu take time"),
+        (
+            &["run", "scene.toml", "--realtime", "--csv", "a.csv"],
+            "--csv, --contacts, --vtu and --sound take time",
+        ),
         (
             &["run", "scene.toml", "--realtime", "--device-rate", "0", "--log", "a.mcap"],
             "a device is to be updated at 0 Hz, expected 50 to 5000",

@@ -13,7 +13,6 @@
 //! A log is a series of chunks, each of at most half a second and whole by itself: one that was cut is read up to its last whole
 //! chunk, and [`recover`] makes a whole one of it.
 
-mod buffer_pool;
 mod messages;
 mod reader;
 mod record_layout;

@@ -1,9 +1,9 @@
 //! Log writer: a thread beside the force process that cannot disturb it.
 
-use super::buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
 use super::messages::{ModesMessage, STEP_TOPIC, StartMessage, StepMessageOf, contacts, transforms};
 use super::records::{FrameRecord, StepRecord};
 use super::schemas;
+use crate::buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
 use crate::error::{Error, LogError, with_sources};
 use crate::scene_names::SceneNames;
 use mcap::records::{MessageHeader, Metadata};

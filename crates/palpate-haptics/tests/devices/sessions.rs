@@ -46,6 +46,7 @@ fn session(model: Arc<Model>, device: Box<dyn Device>, floor: ObstacleTrajectory
         state: None,
         playback: Arc::default(),
         cycles: None,
+        listener: None,
     }
 }
 

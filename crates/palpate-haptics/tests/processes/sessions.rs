@@ -50,6 +50,7 @@ fn session(steps: Option<u64>) -> Session {
         state: None,
         playback: Arc::default(),
         cycles: None,
+        listener: None,
     }
 }
 

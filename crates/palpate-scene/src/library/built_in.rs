@@ -1,5 +1,6 @@
 //! Built-in scenes, as scene files with recipes for their recordings and functions for their paths.
 
+use super::instruments;
 use crate::recipe::RecordingRecipe;
 use palpate::{Damping, Material};
 use palpate_fem::paper_cube::CELLS;
@@ -29,7 +30,7 @@ type Path = fn(f64) -> [f64; 3];
 const ROW_INTERVAL_S: f64 = 0.002;
 
 /// All built-in scenes; the first is the default.
-pub const BUILT_IN_SCENES: [BuiltInScene; 6] = [
+pub const BUILT_IN_SCENES: [BuiltInScene; 9] = [
     BuiltInScene {
         id: "bounce",
         title: "A soft cube falls and bounces",
@@ -283,6 +284,9 @@ path = { file = "back.csv", repeat = true }
         ],
         period_s: 1.0,
     },
+    instruments::BAR,
+    instruments::FORK,
+    instruments::BELL,
 ];
 
 /// The paper's cube with a number of cells along each side, and of modes.
@@ -336,7 +340,7 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
         "small" => of("box:0.08x0.08x0.08/8x8x8", 2500.0, 0.45, 110.0, 120, 1e-3),
         "ball" => of("sphere:0.05/8", 4000.0, 0.45, 150.0, 150, 5e-4),
         "slab" => of("box:0.24x0.02x0.12/24x2x12", 8000.0, 0.4, 150.0, 150, 2e-4),
-        _ => return None,
+        _ => return instruments::recipe(name),
     })
 }
 

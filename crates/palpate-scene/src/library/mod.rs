@@ -2,6 +2,8 @@
 
 #[cfg(feature = "native")]
 mod built_in;
+#[cfg(feature = "native")]
+mod instruments;
 mod pointers;
 #[cfg(feature = "native")]
 mod scene_library;

@@ -3,6 +3,7 @@
 use super::command_queue::CommandQueue;
 use super::frames::FramePublisher;
 use super::job::JobSlot;
+use super::sound::SoundBlocks;
 use crate::current::CurrentScene;
 use crate::pointers::SharedPointers;
 use palpate_haptics::Playback;
@@ -18,5 +19,6 @@ pub(super) struct SceneChannels {
     pub commands: Arc<CommandQueue>,
     pub pointers: SharedPointers,
     pub playback: Arc<Playback>,
+    pub sound: Arc<SoundBlocks>,
     pub job_slot: Arc<JobSlot>,
 }

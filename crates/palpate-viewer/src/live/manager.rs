@@ -182,7 +182,15 @@ impl Manager {
         let log = scene.log.as_ref().map(|open| open(&state, self.page_notifier()));
         let log =
             log.and_then(|log| log.map_err(|error| self.send_error(&SceneError::Log(Box::new(error)))).ok());
-        RunningScene::start(scene, state, inputs?, log, encoder, self.scheduling, &self.channels)
+        RunningScene::start(
+            scene,
+            state,
+            inputs?,
+            log,
+            (encoder, generation),
+            self.scheduling,
+            &self.channels,
+        )
     }
 
     fn send_status(&mut self) {

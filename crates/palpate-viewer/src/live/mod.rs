@@ -7,12 +7,14 @@ mod frames;
 mod job;
 mod manager;
 mod running;
+mod sound;
 
 pub(crate) use command::Command;
 pub(crate) use command_queue::CommandQueue;
 
 pub(crate) use frames::Viewers;
 pub(crate) use job::JobSlot;
+pub(crate) use sound::SoundBlocks;
 
 use crate::current::CurrentScene;
 use crate::pointers::SharedPointers;
@@ -42,6 +44,7 @@ pub(crate) struct LiveScene {
     pub pointers: SharedPointers,
     pub playback: Arc<Playback>,
     pub viewers: Arc<Viewers>,
+    pub sound: Arc<SoundBlocks>,
     pub job_slot: Arc<JobSlot>,
     manager: Mutex<Option<JoinHandle<()>>>,
 }
@@ -65,6 +68,7 @@ impl LiveScene {
         let pointers: SharedPointers = Arc::default();
         let playback: Arc<Playback> = Arc::default();
         let job_slot: Arc<JobSlot> = Arc::default();
+        let sound: Arc<SoundBlocks> = Arc::default();
         let channels = SceneChannels {
             current: current_sender,
             frames: FramePublisher::new(modal_sender, vertices_sender, viewers.clone()),
@@ -72,6 +76,7 @@ impl LiveScene {
             commands: commands.clone(),
             pointers: pointers.clone(),
             playback: playback.clone(),
+            sound: sound.clone(),
             job_slot: job_slot.clone(),
         };
         let mut manager = Manager::new(provider, scheduling, channels);
@@ -88,6 +93,7 @@ impl LiveScene {
             pointers,
             playback,
             viewers,
+            sound,
             job_slot,
             manager,
         })

@@ -1,6 +1,7 @@
 //! Running session of a live scene, with its pointer thread.
 
 use super::channels::SceneChannels;
+use super::sound::SoundThread;
 use crate::error::SceneError;
 use crate::pointers::{Pointers, SharedPointers, lock};
 use crate::protocol::{FrameEncoder, ProcessTiming, ServerMessage, Status};
@@ -53,6 +54,8 @@ pub(super) struct RunningScene {
     steps: Arc<AtomicU64>,
     session: JoinHandle<Option<Vec<ObjectSnapshot>>>,
     pointer_thread: JoinHandle<()>,
+    /// Ends with the scene.
+    _sound: SoundThread,
     timing: Timing,
     cycle_receiver: CycleReceiver,
 }
@@ -64,7 +67,7 @@ impl RunningScene {
         state: State,
         inputs: DeviceInputs,
         log: Option<OpenLog>,
-        mut encoder: FrameEncoder,
+        (mut encoder, generation): (FrameEncoder, u32),
         scheduling: Scheduling,
         channels: &SceneChannels,
     ) -> Result<Self, SceneError> {
@@ -73,6 +76,9 @@ impl RunningScene {
             Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
         });
         let (cycle_sender, cycle_receiver) = cycle_channel(CYCLES);
+        let (sound, listener) =
+            SoundThread::start((&scene.model, &state), generation, &channels.sound, &channels.playback)
+                .map_err(SceneError::Thread)?;
         let start = Instant::now();
         let session = Session {
             model: scene.model.clone(),
@@ -89,6 +95,7 @@ impl RunningScene {
             device_timeout_s: DEVICE_TIMEOUT_S,
             playback: channels.playback.clone(),
             cycles: Some(cycle_sender),
+            listener: Some(listener),
         };
         *lock(&channels.pointers) = Pointers::new(inputs.pointer_ports);
         let stop = Arc::new(AtomicBool::new(false));
@@ -119,7 +126,15 @@ impl RunningScene {
             }
         };
         let session = Builder::new().name("palpate session".into()).spawn(run).map_err(SceneError::Thread)?;
-        Ok(Self { stop, steps, session, pointer_thread, timing: Timing::default(), cycle_receiver })
+        Ok(Self {
+            stop,
+            steps,
+            session,
+            pointer_thread,
+            _sound: sound,
+            timing: Timing::default(),
+            cycle_receiver,
+        })
     }
 
     /// Stops the threads; returns the final object snapshots, if the session ended without error.

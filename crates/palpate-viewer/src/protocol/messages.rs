@@ -220,6 +220,9 @@ pub(crate) enum ClientMessage {
         poisson: f64,
         density: f64,
     },
+    Sound {
+        on: bool,
+    },
     Stream {
         format: FrameFormat,
         stride: u32,

@@ -4,6 +4,7 @@ mod bytes;
 mod description;
 mod frame;
 mod messages;
+mod sound;
 mod surface;
 
 pub use description::{
@@ -15,4 +16,5 @@ pub use frame::{FrameEncoder, FrameFormat};
 pub(crate) use messages::LogEntry;
 pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, decodes};
 pub(crate) use messages::{ClientMessage, Hello, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status};
+pub(crate) use sound::encode_sound;
 pub(crate) use surface::{mode_shapes_bytes, surface_bytes};

@@ -61,6 +61,8 @@ struct PageSession<'s> {
     /// Every n-th frame is sent; 0: none.
     stride: u32,
     frames: u32,
+    /// Whether it gets the sound.
+    hears: bool,
     /// Time of the newest message or pong.
     heard: Instant,
 }
@@ -76,6 +78,7 @@ impl<'s> PageSession<'s> {
             format: FrameFormat::Modal,
             stride: 1,
             frames: 0,
+            hears: false,
             heard: Instant::now(),
         }
     }
@@ -108,6 +111,7 @@ impl<'s> PageSession<'s> {
                     self.close(close_code::AGAIN, "too many pages show this scene already").await;
                 }
                 self.count_vertex_stream(live, false);
+                self.switch_sound(live, false);
                 live.viewers.all.fetch_sub(1, Ordering::Relaxed);
                 lock(&live.pointers).release_viewer(self.viewer);
                 live.job_slot.cancel_of(self.viewer);
@@ -127,6 +131,7 @@ impl<'s> PageSession<'s> {
         self.send(Message::Binary(first)).await?;
         live.commands.push(Command::SendStatus);
         let mut pings = self.pings();
+        let mut sound = live.sound.subscribe();
         loop {
             tokio::select! {
                 biased;
@@ -143,6 +148,12 @@ impl<'s> PageSession<'s> {
                         let scene = live.current.borrow().message.clone();
                         self.send(Message::text(&*scene)).await?;
                     }
+                    Err(RecvError::Closed) => return Err(SessionEnd),
+                },
+                block = sound.recv(), if self.hears => match block {
+                    Ok(block) => self.send(Message::Binary(block)).await?,
+                    // What is late is not heard any more.
+                    Err(RecvError::Lagged(_)) => sound = sound.resubscribe(),
                     Err(RecvError::Closed) => return Err(SessionEnd),
                 },
                 changed = modal.changed(), if self.format == FrameFormat::Modal && self.stride > 0 => {
@@ -250,6 +261,7 @@ impl<'s> PageSession<'s> {
                 self.count_vertex_stream(live, format == FrameFormat::Vertices && stride > 0);
                 (self.format, self.stride) = (format, stride);
             }
+            Effect::Sound(on) => self.switch_sound(live, on),
             Effect::Scene(request) => self.request(live, request),
         }
         Ok(())
@@ -266,6 +278,14 @@ impl<'s> PageSession<'s> {
             }
             SceneRequest::SendStatus => Command::SendStatus,
         });
+    }
+
+    /// Begins or ends to send the sound.
+    fn switch_sound(&mut self, live: &LiveScene, on: bool) {
+        if on != self.hears {
+            self.hears = on;
+            live.sound.count(on);
+        }
     }
 
     /// Updates the number of vertex streams; `wanted`: whether this page streams vertex frames from now on.

@@ -348,6 +348,23 @@ impl Page {
         panic!("no {kind} within {TIMEOUT:?}");
     }
 
+    /// Next block of sound, within a number of messages: generation, sample rate and samples.
+    pub fn sound(&mut self, messages: usize) -> Option<(u32, u32, Vec<f32>)> {
+        for _ in 0..messages {
+            let Message::Binary(bytes) = self.socket.read().expect("a message") else { continue };
+            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+            if number(0) != 0x5350_4c50 {
+                continue;
+            }
+            let samples = bytes[16..].chunks_exact(4);
+            let samples: Vec<f32> =
+                samples.map(|four| f32::from_le_bytes(four.try_into().expect("four bytes"))).collect();
+            assert_eq!(samples.len(), number(12) as usize);
+            return Some((number(4), number(8), samples));
+        }
+        None
+    }
+
     /// Next frame that satisfies a condition.
     pub fn frame(&mut self, shapes: &[Vec<DVec3>], mut condition: impl FnMut(&Frame) -> bool) -> Frame {
         let until = Instant::now() + TIMEOUT;

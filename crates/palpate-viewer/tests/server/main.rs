@@ -8,4 +8,5 @@ mod live;
 mod logging;
 mod logs;
 mod slow_clients;
+mod sound;
 mod tls;

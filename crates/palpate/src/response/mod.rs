@@ -383,6 +383,14 @@ impl ResponseState {
         }
     }
 
+    /// Modal forces that were held over the last step [N/√kg]; none with a table.
+    pub(crate) fn held_modal_forces(&self) -> &[f64] {
+        match self {
+            Self::Modal(state) => &state.held_forces,
+            Self::Fir(_) => &[],
+        }
+    }
+
     /// Copy of the data that determine the deformation.
     pub(crate) fn deformation(&self) -> DeformationData {
         match self {

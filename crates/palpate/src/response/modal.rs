@@ -43,8 +43,9 @@ pub(crate) struct ModalState {
     pub(super) free: Vec<f64>,
     /// Gravity [m/s², body] and step [s] of the latter; none before the prediction.
     predicted: Option<(DVec3, f64)>,
-    /// Modal forces of the step [N/√kg].
+    /// Modal forces of the step [N/√kg], and those that were held over the last one.
     forces: Vec<f64>,
+    pub(super) held_forces: Vec<f64>,
     /// Three rows J·Φ per contact point, by its slot.
     rows: Vec<f64>,
     /// Three rows J·Φ·B.
@@ -93,6 +94,7 @@ impl ModalState {
             free: vec![0.0; modes],
             predicted: None,
             forces: vec![0.0; modes],
+            held_forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
             spring_forces: BoundedVec::new(capacity + RELAXING),
@@ -353,6 +355,7 @@ impl SampledModes {
             *mode = if quiet { OscillatorState::default() } else { next };
             *q = mode.q;
         }
+        core::mem::swap(&mut state.forces, &mut state.held_forces);
         state.predicted = None;
         self.predict(&body.recording, state, next_gravity);
 

@@ -79,6 +79,8 @@ pub fn demo(arguments: &Arguments) -> Result<(), Failure> {
             contacts: None,
             vtu: Some(output.join("vtu")),
             fps: 50.0,
+            sound: None,
+            sound_full_scale: 2.0,
             json: false,
         },
         realtime: run::RealtimeArguments::default(),

@@ -23,6 +23,7 @@ pub(super) fn export(arguments: &Arguments) -> Result<(), Failure> {
         vtu: arguments.vtu.as_deref(),
         gltf: arguments.gltf.as_deref(),
         window,
+        ..ExportOptions::default()
     };
     options.check()?;
     let log = LogReplay::read(&arguments.source)?;

@@ -8,7 +8,7 @@ mod warnings;
 
 use crate::failure::Failure;
 use crate::standard_streams::{
-    FOLDER, LOG_OUTPUT, STANDARD_INPUT, is_stream, read_input, refuse, report, takes_output,
+    FOLDER, LOG_OUTPUT, SEEKS, STANDARD_INPUT, is_stream, read_input, refuse, report, takes_output,
 };
 use crate::terminal::{notify, print_json};
 use clap::Args;
@@ -88,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outputs = &arguments.outputs;
     refuse(&[
         ("--vtu", outputs.vtu.as_deref(), FOLDER),
+        ("--sound", outputs.sound.as_deref(), SEEKS),
         ("--log", arguments.realtime.log.as_deref(), LOG_OUTPUT),
     ])?;
     let output_is_taken = takes_output(

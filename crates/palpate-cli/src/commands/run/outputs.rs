@@ -6,6 +6,7 @@ use clap::Args;
 use palpate::{Input, State};
 use palpate_export::{ExportOptions, SceneExporter, TimeWindow};
 use palpate_scene::Scene;
+use palpate_sound::SoundParameters;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -24,6 +25,12 @@ pub struct OutputArguments {
     /// Frames of --vtu per second of simulated time
     #[arg(long, default_value_t = 50.0, value_name = "FPS", allow_negative_numbers = true)]
     pub fps: f64,
+    /// Write the sound of the objects: WAV, 16 bits, one channel, 48 kHz (docs/sound.md)
+    #[arg(long, value_name = "OUT.wav")]
+    pub sound: Option<PathBuf>,
+    /// Sound pressure of full scale half a metre from every object [Pa]; a smaller one makes --sound louder
+    #[arg(long, default_value_t = SoundParameters::default().full_scale_pa, value_name = "PA", allow_negative_numbers = true)]
+    pub sound_full_scale: f64,
     /// One JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -43,7 +50,16 @@ pub struct Outputs {
 impl OutputArguments {
     /// Whether a file is asked for.
     pub fn writes_files(&self) -> bool {
-        self.csv.is_some() || self.contacts.is_some() || self.vtu.is_some()
+        self.csv.is_some() || self.contacts.is_some() || self.vtu.is_some() || self.sound.is_some()
+    }
+
+    /// Refuses a full scale of the sound that is no positive number.
+    fn check_sound(&self) -> Result<(), Failure> {
+        let pressure = self.sound_full_scale;
+        if pressure > 0.0 && pressure.is_finite() {
+            return Ok(());
+        }
+        Err(Failure(format!("--sound-full-scale is {pressure} Pa, expected a positive number")))
     }
 
     fn options(&self) -> ExportOptions<'_> {
@@ -52,6 +68,11 @@ impl OutputArguments {
             contacts: self.contacts.as_deref(),
             vtu: self.vtu.as_deref(),
             gltf: None,
+            sound: self.sound.as_deref(),
+            sound_parameters: SoundParameters {
+                full_scale_pa: self.sound_full_scale,
+                ..SoundParameters::default()
+            },
             window: TimeWindow { fps: self.fps, ..TimeWindow::default() },
         }
     }
@@ -66,6 +87,7 @@ impl Outputs {
         input: &Input,
         steps: usize,
     ) -> Result<Self, Failure> {
+        arguments.check_sound()?;
         let files =
             SceneExporter::new(&arguments.options(), &scene.model, scene.labels(), state, input, steps)?;
         let summary = Summary::new(scene, steps, state.output());
@@ -91,9 +113,11 @@ impl Outputs {
 
     /// Completes all files.
     pub fn finish(mut self, scene: &Scene, state: &State) -> Result<Summary, Failure> {
+        let peak = self.files.sound_peak();
         let written = self.files.finish()?;
-        let index = written.into_iter().find(|file| file.kind == "vtu").map(|file| file.path);
-        self.summary.finish(scene, state, index);
+        let path_of =
+            |kind: &str| written.iter().find(|file| file.kind == kind).map(|file| file.path.clone());
+        self.summary.finish(scene, state, path_of("vtu"), path_of("sound").zip(peak));
         Ok(self.summary)
     }
 }

@@ -87,7 +87,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     let options = &arguments.realtime;
     if arguments.outputs.writes_files() {
         return Err(Failure(
-            "--csv, --contacts and --vtu take time that a run in real time does not have: write a log with --log, and \
+            "--csv, --contacts, --vtu and --sound take time that a run in real time does not have: write a log with --log, and \
              get them from that with palpate replay"
                 .to_string(),
         ));
@@ -143,6 +143,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         state: None,
         playback: Arc::default(),
         cycles: None,
+        listener: None,
     };
     let (report, written) = watch(session, log, steps)?;
     let links = server.map(|server| server.counts());

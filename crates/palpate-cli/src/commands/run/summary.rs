@@ -37,6 +37,8 @@ pub struct Summary {
     /// Compute time of each step [ns], sorted.
     times_ns: Vec<u32>,
     index: Option<PathBuf>,
+    /// Sound file, and the largest size of its samples [1, of full scale].
+    sound: Option<(PathBuf, f32)>,
     /// Largest sampled displacement of the surface, by object [m], and the fields that its samples share.
     deformation: Vec<f64>,
     residual_fields: Vec<ResidualFieldCache>,
@@ -65,6 +67,7 @@ impl Summary {
             start_energy: start.energy.stored(),
             times_ns: Vec::with_capacity(steps),
             index: None,
+            sound: None,
             deformation: vec![0.0; scene.object_names.len()],
             residual_fields: vec![ResidualFieldCache::default(); scene.object_names.len()],
             penetration: vec![0.0; scene.object_names.len()],
@@ -103,11 +106,17 @@ impl Summary {
     }
 
     /// Completes the summary after the last step.
-    pub(super) fn finish(&mut self, scene: &Scene, last: &State, index: Option<PathBuf>) {
+    pub(super) fn finish(
+        &mut self,
+        scene: &Scene,
+        last: &State,
+        index: Option<PathBuf>,
+        sound: Option<(PathBuf, f32)>,
+    ) {
         self.times_ns.sort_unstable();
         self.last = last.output().clone();
         self.probes = scene.probes.iter().map(|probe| probe.read(&scene.model, last)).collect();
-        self.index = index;
+        (self.index, self.sound) = (index, sound);
     }
 
     /// Samples the deformation, and with all nodes the penetration in obstacles and the distance of tips.
@@ -230,7 +239,7 @@ impl Summary {
             })
             .collect();
         let energy = &self.last.energy;
-        json!({
+        let mut json = json!({
             "steps": self.steps,
             "step_s": scene.model.parameters().step_s,
             "devices": devices,
@@ -267,7 +276,11 @@ impl Summary {
                 "steps_out_of_budget": self.steps_out_of_budget,
             },
             "warnings": warnings::json(scene, &self.warnings(scene)),
-        })
+        });
+        if let Some((path, peak)) = &self.sound {
+            json["sound"] = json!({ "path": path, "peak": peak });
+        }
+        json
     }
 
     /// Summary as text.
@@ -338,6 +351,9 @@ impl Summary {
         out += &warnings::text(&self.warnings(scene));
         if let Some(index) = &self.index {
             out += &format!("  surfaces     {} (open it in ParaView)\n", index.display());
+        }
+        if let Some((path, peak)) = &self.sound {
+            out += &format!("  sound        {}, {}\n", path.display(), loudness(*peak));
         }
         out
     }
@@ -418,6 +434,20 @@ impl Summary {
             energy.input,
             energy.defect.abs()
         )
+    }
+}
+
+/// Largest size of a sound's samples [1, of full scale] in words.
+fn loudness(peak: f32) -> String {
+    let decibels = 20.0 * peak.max(f32::MIN_POSITIVE).log10();
+    match peak {
+        0.0 => "silent: no mode from 20 Hz to 20 kHz moves".into(),
+        _ if f64::from(peak) > palpate_sound::KNEE => {
+            format!(
+                "peak {decibels:.1} dB of full scale: the limiter acts; a larger --sound-full-scale avoids that"
+            )
+        }
+        _ => format!("peak {decibels:.1} dB of full scale"),
     }
 }
 

@@ -8,20 +8,20 @@
 //! Neither end waits, locks or allocates. A producer that finds no empty buffer drops the record and counts it.
 
 /// Producing end of a buffer pool.
-pub(super) struct PoolProducer<T> {
+pub struct PoolProducer<T> {
     filled: rtrb::Producer<Box<T>>,
     empty: rtrb::Consumer<Box<T>>,
     missed: u64,
 }
 
 /// Consuming end of a buffer pool.
-pub(super) struct PoolConsumer<T> {
+pub struct PoolConsumer<T> {
     filled: rtrb::Consumer<Box<T>>,
     empty: rtrb::Producer<Box<T>>,
 }
 
 /// Buffer pool with `capacity` buffers, each from one call of `make`: a clone would not keep the capacity of its vectors.
-pub(super) fn buffer_pool<T>(capacity: usize, make: impl Fn() -> T) -> (PoolProducer<T>, PoolConsumer<T>) {
+pub fn buffer_pool<T>(capacity: usize, make: impl Fn() -> T) -> (PoolProducer<T>, PoolConsumer<T>) {
     let (filled_in, filled_out) = rtrb::RingBuffer::new(capacity);
     let (mut empty_in, empty_out) = rtrb::RingBuffer::new(capacity);
     while empty_in.push(Box::new(make())).is_ok() {}
