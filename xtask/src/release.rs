@@ -2,7 +2,7 @@
 
 use crate::files::{copy, copy_tree, empty, files, write};
 use crate::process::{cargo, cargo_command, program, root};
-use crate::{book, c_library, machine, viewer, wheel};
+use crate::{book, c_library, machine, viewer, web, wheel};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use xtask::{bill_of_materials, versions};
 const DIST: &str = "target/dist";
 
 /// Packages that are not for a registry of crates.
-const NOT_CRATES: &[&str] = &["palpate-attack", "palpate-c", "palpate-python", "xtask"];
+const NOT_CRATES: &[&str] = &["palpate-attack", "palpate-c", "palpate-python", "palpate-web", "xtask"];
 
 /// Files of the repository that every archive holds.
 const LEGAL: &[&str] = &["LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md"];
@@ -45,6 +45,10 @@ pub fn build() -> Result<(), String> {
     copy(&wheel, &dist.join(wheel.file_name().unwrap_or_default()))?;
     crates(&dist, &version)?;
     book::build()?;
+    if web::build()? {
+        let into = dist.to_string_lossy();
+        viewer::npm(&web::package(), &["pack", "--silent", "--pack-destination", &into], &[])?;
+    }
     let site = dist.join(format!("palpate-site-{version}"));
     copy_tree(&root().join("target/site"), &site)?;
     pack(&site)?;

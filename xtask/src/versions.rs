@@ -42,10 +42,13 @@ pub fn check(root: &Path) -> Result<(Vec<String>, String), String> {
     let is_dynamic = dynamic.is_some_and(|keys| keys.iter().any(|key| key.as_str() == Some("version")));
     let own = python["project"].get("version").and_then(toml::Value::as_str);
     expect("bindings/python/pyproject.toml".into(), if is_dynamic { Some(&version) } else { own });
-    let (page, lock) = (json("viewer/package.json")?, json("viewer/package-lock.json")?);
-    expect("viewer/package.json".into(), page["version"].as_str());
-    expect("viewer/package-lock.json".into(), lock["version"].as_str());
-    expect("viewer/package-lock.json: packages".into(), lock["packages"][""]["version"].as_str());
+    for folder in ["viewer", "bindings/web"] {
+        let (package, lock) = (format!("{folder}/package.json"), format!("{folder}/package-lock.json"));
+        expect(package.clone(), json(&package)?["version"].as_str());
+        let own = json(&lock)?;
+        expect(lock.clone(), own["version"].as_str());
+        expect(format!("{lock}: packages"), own["packages"][""]["version"].as_str());
+    }
     let changes = read("CHANGELOG.md")?;
     let heading = changes.lines().find_map(|line| line.strip_prefix("## ")).unwrap_or_default();
     let newest = heading.trim_start_matches("Unreleased (").split([')', ' ']).next();
@@ -82,6 +85,11 @@ mod tests {
         write("bindings/python/pyproject.toml", "[project]\nversion = \"1.1.0\"\n");
         write("viewer/package.json", "{\"version\": \"1.2.0\"}");
         write("viewer/package-lock.json", "{\"version\": \"2.0.0\", \"packages\": {\"\": {}}}");
+        write("bindings/web/package.json", "{\"version\": \"1.3.0\"}");
+        write(
+            "bindings/web/package-lock.json",
+            "{\"version\": \"2.0.0\", \"packages\": {\"\": {\"version\": \"2.0.0\"}}}",
+        );
         write("CHANGELOG.md", "# Changelog\n\n## Unreleased (2.1.0)\n");
         let expected = [
             "Cargo.toml: a: 1.9.0, expected 2.0.0",
@@ -89,6 +97,7 @@ mod tests {
             "bindings/python/pyproject.toml: 1.1.0, expected 2.0.0",
             "viewer/package.json: 1.2.0, expected 2.0.0",
             "viewer/package-lock.json: packages: none, expected 2.0.0",
+            "bindings/web/package.json: 1.3.0, expected 2.0.0",
             "CHANGELOG.md: 2.1.0, expected 2.0.0",
         ];
         assert_eq!(check(folder.path()).expect("manifests").0, expected);

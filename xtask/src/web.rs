@@ -41,7 +41,7 @@ pub fn build() -> Result<bool, String> {
     viewer::npm(&package, &["run", "build", "--silent"], &[])?;
     copy(&module, &package.join("dist/palpate.wasm"))?;
     build_page(&module)?;
-    report(&module)?;
+    report(&package)?;
     Ok(true)
 }
 
@@ -54,6 +54,8 @@ pub fn test() -> Result<(), String> {
     viewer::npm(&package(), &["run", "check", "--silent"], &[])?;
     viewer::npm(&package(), &["test", "--silent"], &[("PALPATE", &program)])?;
     let chromium = machine::need_chromium()?;
+    let examples = ["run", "test:examples", "--silent"];
+    viewer::npm(&package(), &examples, &[("CHROMIUM", &chromium)])?;
     let variables = [("PAGE", page()), ("CHROMIUM", chromium)];
     let variables = variables.each_ref().map(|(name, path)| (*name, path.as_path()));
     viewer::npm(&root().join("viewer"), &["run", "test:browser", "--silent"], &variables)
@@ -90,12 +92,14 @@ fn build_page(module: &Path) -> Result<(), String> {
     run(Command::new(palpate()?).arg("scenes").arg("--output").arg(&scenes))
 }
 
-/// Print the sizes of the package as npm would pack it, and of the page.
-fn report(module: &Path) -> Result<(), String> {
-    let bytes = fs::metadata(module).map_err(|error| format!("{}: {error}", module.display()))?.len();
-    println!("bindings/web/dist/palpate.wasm: {:.0} kB", bytes as f64 / 1e3);
-    println!(
-        "target/web/page: the page, for any file server, as `python3 -m http.server --directory target/web/page`"
-    );
+/// Print the size of the package as npm packs it, and where the page is.
+fn report(package: &Path) -> Result<(), String> {
+    let pack = ["pack", "--dry-run", "--json", "--silent"];
+    let output = Command::new("npm").args(pack).current_dir(package).output();
+    let output = output.map_err(|error| format!("npm can't be started: {error}"))?;
+    let list: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let bytes = list[0]["size"].as_f64().unwrap_or_default();
+    println!("bindings/web: the npm package, {:.0} kB packed", bytes / 1e3);
+    println!("target/web/page: for any file server, as `python3 -m http.server --directory target/web/page`");
     Ok(())
 }

@@ -42,7 +42,7 @@ test("a cycle is found", () => {
 
 test("modules import one another without cycles", () => {
   const graph = new Map(modules.map((module) => [module, importsOf(module)]));
-  expect([...graph.values()].flat().filter((module) => !graph.has(module))).toEqual([]);
+  expect([...graph.values()].flat().filter((module) => !graph.has(module) && !module.startsWith("../"))).toEqual([]);
   expect([...graph.values()].flat().length).toBeGreaterThan(modules.length);
   expect(findCycle(graph)).toBeNull();
 });

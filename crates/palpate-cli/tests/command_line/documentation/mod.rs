@@ -14,6 +14,7 @@ const KINDS: &[(&str, &[&str])] = &[
     ("rust", &["crates/palpate-cli/src/documentation.rs", "crates/palpate/tests/readme.rs"]),
     ("python", &["python/tests/test_pages.py", "bindings/python/tests/test_docs.py"]),
     ("c", &["bindings/c/tests/programs.rs"]),
+    ("js", &["bindings/web/tests/docs.test.ts"]),
     // By the tests of this module, on every page.
     ("sh", &[]),
     ("toml", &[]),
