@@ -13,9 +13,14 @@ const TARGET: &str = "wasm32-unknown-unknown";
 /// Vector instructions, which every browser has since 2023.
 const FLAGS: &str = "-Ctarget-feature=+simd128";
 
-/// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser.
-const SMALL_FLAGS: &str =
-    "-Ctarget-feature=+simd128 -Zlocation-detail=none -Zunstable-options -Cpanic=immediate-abort";
+/// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser, and no names of functions.
+const SMALL_FLAGS: &[&str] = &[
+    FLAGS,
+    "-Zlocation-detail=none",
+    "-Zunstable-options",
+    "-Cpanic=immediate-abort",
+    "-Clink-arg=--strip-all",
+];
 
 /// Folder of the npm package.
 pub fn package() -> PathBuf {
@@ -66,7 +71,7 @@ fn module() -> Result<Option<PathBuf>, String> {
     let mut cargo = cargo_command();
     cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
     if build_std(&mut cargo, "std,panic_abort")? {
-        cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS);
+        cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS.join(" "));
     } else if is_installed(TARGET)? {
         cargo.env("RUSTFLAGS", FLAGS);
     } else {

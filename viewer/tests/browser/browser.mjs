@@ -91,6 +91,11 @@ export function recordSent(page) {
   return page.evaluate(() => {
     const { send } = WebSocket.prototype;
     window.sent = [];
+    const { postMessage } = Worker.prototype;
+    Worker.prototype.postMessage = function (message, ...others) {
+      if (message.kind === "message") window.sent.push(JSON.parse(message.text));
+      return postMessage.call(this, message, ...others);
+    };
     WebSocket.prototype.send = function (text) {
       window.sent.push(JSON.parse(text));
       return send.call(this, text);

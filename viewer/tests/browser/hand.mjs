@@ -85,6 +85,7 @@ export const handCases = [
   },
   {
     name: "a press outlives a reset, and one that comes before the scene waits for it",
+    serverOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
