@@ -339,7 +339,7 @@ mod command_line_tests {
         assert!(flags(chore("words"), &given("--list")).is_ok_and(|flags| flags.has("--list")));
         let refused = |name: &str, text: &str| flags(chore(name), &given(text)).err();
         assert_eq!(refused("bare", "--fast").as_deref(), Some("unknown argument \"--fast\""));
-        let expected = "--only \"all\": expected one of build, python, viewer, c, doc, rust";
+        let expected = "--only \"all\": expected one of build, python, viewer, web, c, doc, rust";
         assert_eq!(refused("test", "--only all").as_deref(), Some(expected));
     }
 

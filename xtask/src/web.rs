@@ -45,6 +45,9 @@ pub fn build() -> Result<bool, String> {
     viewer::install(&package)?;
     viewer::npm(&package, &["run", "build", "--silent"], &[])?;
     copy(&module, &package.join("dist/palpate.wasm"))?;
+    for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        copy(&root().join(licence), &package.join("dist").join(licence))?;
+    }
     build_page(&module)?;
     report(&package)?;
     Ok(true)

@@ -24,6 +24,12 @@ export function library(): Instance {
   return loaded;
 }
 
+/** Handle in the module that was not given back yet. */
+export function alive(handle: number, kind: string): number {
+  if (handle === 0) throw new PalpateError(`the ${kind} was disposed of`);
+  return handle;
+}
+
 /** Frees the memory behind objects that nobody has any more. */
 export class Freer {
   private readonly registry: FinalizationRegistry<number>;
@@ -39,7 +45,6 @@ export class Freer {
 
   /** Frees the handle of an owner now. */
   dispose(owner: object, handle: number): void {
-    this.registry.unregister(owner);
-    this.free(handle);
+    if (this.registry.unregister(owner)) this.free(handle);
   }
 }

@@ -42,6 +42,7 @@ export interface Exports {
   simulation_array(simulation: number, array: number): number;
   simulation_array_length(simulation: number, array: number): number;
   simulation_surface(simulation: number, object: number): number;
+  simulation_surface_length(simulation: number): number;
   simulation_grasp(simulation: number, device: number, object: number, x: number, y: number, z: number): number;
   simulation_release(simulation: number, device: number): number;
   live_open(address: number, length: number, parts: number, about: number, aboutLength: number): number;
@@ -66,31 +67,55 @@ export function textOf(bytes: Uint8Array): string {
   return decoder.decode(bytes);
 }
 
+/** Address of the module, which WebAssembly hands over as a signed number. */
+export function unsigned(address: number): number {
+  return address >>> 0;
+}
+
 /** Instance of the module. */
 export class Instance {
-  readonly exports: Exports;
   /** Receives what is neither an error nor JSON. */
   receiver: Receiver = () => undefined;
+  private own: Exports | null = null;
   private error: string | null = null;
   private json: unknown = null;
+  /** Reason that the module has stopped for good: it ran out of memory, or has a bug. */
+  stopped: string | null = null;
 
-  private constructor(module: WebAssembly.Module, now: () => number) {
-    const send = (kind: Sent, address: number, length: number) => this.receive(kind, new Uint8Array(this.exports.memory.buffer, address, length));
-    const instance = new WebAssembly.Instance(module, { palpate: { send, now } });
-    this.exports = instance.exports as unknown as Exports;
-  }
+  private constructor() {}
 
   /** Compiles and starts a module; `now` reads a clock that never goes back [s]. */
   static async load(source: ModuleSource, now: () => number = () => performance.now() / 1000): Promise<Instance> {
-    return new Instance(await compile(source), now);
+    const made = new Instance();
+    const send = (kind: Sent, address: number, length: number) => made.receive(kind, new Uint8Array(made.exports.memory.buffer, unsigned(address), unsigned(length)));
+    const instance = await WebAssembly.instantiate(await compile(source), { palpate: { send, now } });
+    made.own = instance.exports as unknown as Exports;
+    return made;
+  }
+
+  /** Functions of the module; an error once it has stopped. */
+  get exports(): Exports {
+    if (this.own === null || this.stopped !== null) throw new PalpateError(this.stopped ?? "the module is not loaded");
+    return this.own;
   }
 
   /** Result of a call of the module; the error that it sends is thrown. */
   call<T>(run: (exports: Exports) => T): T {
     this.error = null;
-    const result = run(this.exports);
+    const result = this.guard(() => run(this.exports));
     if (this.error !== null) throw new PalpateError(this.error);
     return result;
+  }
+
+  /** Result of a call of the module, which stops for good where it traps: what is left in its memory is of no use. */
+  guard<T>(run: () => T): T {
+    try {
+      return run();
+    } catch (error) {
+      if (!(error instanceof WebAssembly.RuntimeError)) throw error;
+      this.stopped = `WebAssembly has stopped (${error.message}): it ran out of memory, or has a bug`;
+      throw new PalpateError(this.stopped);
+    }
   }
 
   /** JSON that a call of the module sends. */
@@ -110,13 +135,13 @@ export class Instance {
   /** Result of a call with bytes, or with a text in UTF-8, in the module's memory. */
   withBytes<T>(content: Uint8Array | string, use: (address: number, length: number) => T): T {
     const bytes = typeof content === "string" ? encoder.encode(content) : content;
-    const address = this.exports.allocate(bytes.byteLength);
+    const address = unsigned(this.exports.allocate(bytes.byteLength));
+    if (address === 0) throw new PalpateError(`there is no memory for ${bytes.byteLength} bytes`);
     try {
-      if (address === 0) throw new PalpateError(`there is no memory for ${bytes.byteLength} bytes`);
       new Uint8Array(this.exports.memory.buffer, address, bytes.byteLength).set(bytes);
       return use(address, bytes.byteLength);
     } finally {
-      if (address !== 0) this.exports.deallocate(address, bytes.byteLength);
+      if (this.stopped === null) this.exports.deallocate(address, bytes.byteLength);
     }
   }
 

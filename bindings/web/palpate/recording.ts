@@ -1,7 +1,7 @@
 // Recordings: the impulse responses of one body, made by `palpate record`.
 
-import { Freer, library, load } from "./library.js";
-import { PalpateError } from "./memory.js";
+import { alive, Freer, library, load } from "./library.js";
+import { PalpateError, unsigned } from "./memory.js";
 
 interface Description {
   source: string;
@@ -20,13 +20,18 @@ const freer = new Freer((handle) => library().exports.recording_free(handle));
 export class Recording {
   private readonly description: Description;
 
+  private address: number;
+
   /** @internal */
-  constructor(
-    /** @internal */
-    readonly handle: number,
-  ) {
+  constructor(handle: number) {
+    this.address = handle;
     this.description = library().described((exports) => exports.recording_describe(handle));
     freer.watch(this, handle);
+  }
+
+  /** @internal */
+  get handle(): number {
+    return alive(this.address, "recording");
   }
 
   /** Loads a recording file (`.palp`) from an address. */
@@ -75,13 +80,13 @@ export class Recording {
   /** Positions of the surface's nodes at rest [m, body frame], rows of 3. */
   get positions(): Float64Array {
     const { exports } = library();
-    return new Float64Array(exports.memory.buffer, exports.recording_positions(this.handle), 3 * this.description.nodes).slice();
+    return new Float64Array(exports.memory.buffer, unsigned(exports.recording_positions(this.handle)), 3 * this.description.nodes).slice();
   }
 
   /** Nodes of the surface's triangles, rows of 3, counter-clockwise from outside. */
   get triangles(): Uint32Array {
     const { exports } = library();
-    return new Uint32Array(exports.memory.buffer, exports.recording_triangles(this.handle), 3 * this.description.triangles).slice();
+    return new Uint32Array(exports.memory.buffer, unsigned(exports.recording_triangles(this.handle)), 3 * this.description.triangles).slice();
   }
 
   /**
@@ -97,6 +102,7 @@ export class Recording {
 
   /** Frees its memory now; otherwise it is freed when nobody has it any more. */
   dispose(): void {
-    freer.dispose(this, this.handle);
+    freer.dispose(this, this.address);
+    this.address = 0;
   }
 }

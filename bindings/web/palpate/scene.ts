@@ -1,6 +1,6 @@
 // Scenes: read from TOML, or built of objects whose fields are the keys of a scene file.
 
-import { Freer, library, load } from "./library.js";
+import { alive, Freer, library, load } from "./library.js";
 import { PalpateError } from "./memory.js";
 import { Recording } from "./recording.js";
 import { toToml, type TomlValue } from "./toml.js";
@@ -101,8 +101,7 @@ const freer = new Freer((handle) => library().exports.scene_free(handle));
 
 /** Scene: recordings among planes, obstacles and devices. */
 export class Scene {
-  /** @internal */
-  readonly handle: number;
+  private address: number;
   /** Scene as TOML. */
   readonly toml: string;
   /** Recordings of the objects, in the order of {@link objectNames}. */
@@ -114,19 +113,18 @@ export class Scene {
     const files = new Files();
     this.toml = textOf(parts, files);
     this.recordings = parts.objects.map((object) => object.recording);
-    [this.handle, this.description] = read(this.toml, files);
-    freer.watch(this, this.handle);
+    [this.address, this.description] = read(this.toml, files);
+    freer.watch(this, this.address);
   }
 
   /** Loads a scene file (`.toml`) from an address, with the recordings and paths that it names beside it. */
   static async load(url: string | URL): Promise<Scene> {
     const address = new URL(url, globalThis.location?.href ?? "file:///");
     const [toml] = await Promise.all([fetchFile(address).then((response) => response.text()), load()]);
-    const instance = library();
-    const names = instance.withBytes(toml, (at, length) => instance.described<string[]>((exports) => exports.scene_files(at, length)));
+    const names = new Set(namedFiles(toml));
     const files = new Files();
     await Promise.all(
-      names.map(async (name) => {
+      [...names].map(async (name) => {
         const response = await fetchFile(new URL(name, address));
         if (name.endsWith(".csv")) files.paths.set(name, await response.text());
         else files.recordings.set(name, Recording.fromBytes(new Uint8Array(await response.arrayBuffer())));
@@ -146,11 +144,16 @@ export class Scene {
   private static fromFiles(toml: string, files: Files): Scene {
     const [handle, description] = read(toml, files);
     const scene: Scene = Object.create(Scene.prototype) as Scene;
-    const named = recordingNames(toml);
-    const recordings = named.map((name) => files.recordings.get(name)).filter((recording) => recording !== undefined);
-    Object.assign(scene, { handle, toml, recordings, description });
+    // The recordings of the objects come first, in their order.
+    const recordings = namedFiles(toml).slice(0, description.objectNames.length);
+    Object.assign(scene, { address: handle, toml, recordings: recordings.map((name) => files.recordings.get(name)), description });
     freer.watch(scene, handle);
     return scene;
+  }
+
+  /** @internal */
+  get handle(): number {
+    return alive(this.address, "scene");
   }
 
   /** Time step [s]. */
@@ -186,7 +189,8 @@ export class Scene {
 
   /** Frees its memory now; otherwise it is freed when nobody has it any more. */
   dispose(): void {
-    freer.dispose(this, this.handle);
+    freer.dispose(this, this.address);
+    this.address = 0;
   }
 }
 
@@ -202,9 +206,10 @@ async function fetchFile(url: URL): Promise<Response> {
   return response;
 }
 
-/** Recordings of the objects in their order, as a text names them. */
-function recordingNames(toml: string): string[] {
-  return Array.from(toml.matchAll(/^\s*recording\s*=\s*["'](.*)["']/gm), (match) => match[1] ?? "");
+/** Files that a scene names, as it names them. */
+function namedFiles(toml: string): string[] {
+  const instance = library();
+  return instance.withBytes(toml, (at, length) => instance.described<string[]>((exports) => exports.scene_files(at, length)));
 }
 
 /** Text of parts, whose recordings and paths become files. */

@@ -1,7 +1,7 @@
 // Simulations: scenes that the program steps.
 
-import { Freer, library } from "./library.js";
-import { PalpateError } from "./memory.js";
+import { alive, Freer, library } from "./library.js";
+import { PalpateError, unsigned } from "./memory.js";
 import type { Scene, Vector } from "./scene.js";
 
 /** Places of the arrays in the module. */
@@ -51,15 +51,20 @@ let energyNames: readonly string[] | null = null;
  * Simulation of a scene: its state, and arrays in the module's memory.
  *
  * Arrays are views: they are read and written without a copy, and show the last step. Take them from here each time rather than keep them: memory
- * that grows leaves old views empty.
+ * that grows leaves old views empty, and views end with {@link dispose}.
  */
 export class Simulation {
-  private readonly handle: number;
+  private address: number;
   private readonly views: (Float64Array | undefined)[] = [];
 
   constructor(readonly scene: Scene) {
-    this.handle = library().exports.simulation_new(scene.handle);
-    freer.watch(this, this.handle);
+    const instance = library();
+    this.address = instance.call((exports) => exports.simulation_new(scene.handle));
+    freer.watch(this, this.address);
+  }
+
+  private get handle(): number {
+    return alive(this.address, "simulation");
   }
 
   /**
@@ -144,7 +149,7 @@ export class Simulation {
   get contactRows(): Float64Array {
     const { exports } = library();
     const length = exports.simulation_array_length(this.handle, Place.Contacts);
-    return new Float64Array(exports.memory.buffer, exports.simulation_array(this.handle, Place.Contacts), length);
+    return new Float64Array(exports.memory.buffer, unsigned(exports.simulation_array(this.handle, Place.Contacts)), length);
   }
 
   /** Contacts that carry force, as objects: for looking, not for each step. */
@@ -167,11 +172,11 @@ export class Simulation {
   surface(object: string | number): Float32Array {
     const { exports } = library();
     const number = this.objectNumber(object);
-    const address = exports.simulation_surface(this.handle, number);
-    return new Float32Array(exports.memory.buffer, address, this.scene.recordings[number]?.positions.length ?? 0);
+    const address = unsigned(exports.simulation_surface(this.handle, number));
+    return new Float32Array(exports.memory.buffer, address, exports.simulation_surface_length(this.handle));
   }
 
-  /** Lets a device hold the point of an object's surface that is nearest to a position [m]. */
+  /** Lets a device hold the point of an object's surface that is nearest to a position [m]. From now on its row of {@link positions} moves it, also where it has a path. */
   grasp(device: string | number, object: string | number, point: Vector): void {
     const [own, other] = [this.deviceNumber(device), this.objectNumber(object)];
     library().call((exports) => exports.simulation_grasp(this.handle, own, other, ...point));
@@ -185,21 +190,22 @@ export class Simulation {
 
   /** Back to the start of the scene. */
   reset(): void {
-    library().exports.simulation_reset(this.handle);
-    this.views.length = 0;
+    library().call((exports) => exports.simulation_reset(this.handle));
   }
 
   /** Frees its memory now; otherwise it is freed when nobody has it any more. */
   dispose(): void {
-    freer.dispose(this, this.handle);
+    freer.dispose(this, this.address);
+    this.address = 0;
   }
 
   private view(place: Place): Float64Array {
     const { exports } = library();
+    const { handle } = this;
     const known = this.views[place];
     if (known !== undefined && known.buffer === exports.memory.buffer) return known;
-    const length = exports.simulation_array_length(this.handle, place);
-    const view = new Float64Array(exports.memory.buffer, exports.simulation_array(this.handle, place), length);
+    const length = exports.simulation_array_length(handle, place);
+    const view = new Float64Array(exports.memory.buffer, unsigned(exports.simulation_array(handle, place)), length);
     this.views[place] = view;
     return view;
   }

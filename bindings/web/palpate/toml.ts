@@ -44,5 +44,6 @@ function inline(value: TomlValue): string {
 function number(value: number): string {
   if (Number.isNaN(value)) return "nan";
   if (!Number.isFinite(value)) return value > 0 ? "inf" : "-inf";
-  return String(value);
+  // Whole numbers beyond those of TOML are written as fractions.
+  return Number.isInteger(value) && !Number.isSafeInteger(value) ? value.toExponential() : String(value);
 }

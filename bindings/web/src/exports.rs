@@ -278,6 +278,12 @@ pub unsafe extern "C" fn simulation_surface(simulation: &mut Simulation, object:
     simulation.surface(object).as_ptr()
 }
 
+/// Numbers of the positions that [`simulation_surface`] has written last.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_surface_length(simulation: &Simulation) -> usize {
+    simulation.surface_length()
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn simulation_grasp(
     simulation: &mut Simulation,

@@ -1,5 +1,6 @@
 //! Live scene of the viewer's page, run in a worker of the page.
 
+use palpate::Recording;
 use palpate_scene::{PartsInMemory, SettingsChange, TouchableScene, read_touchable_scene};
 use palpate_viewer::{
     LocalRequest, LocalScene, MaterialDescription, PageMessage, PhysicsSettings, SceneSummary, ViewerDevice,
@@ -124,7 +125,8 @@ impl LiveScene {
         }
         let rescaled = recording.rescaled(young, density).map_err(|error| error.to_string())?;
         let mut changed = self.current.clone();
-        let name = format!("object-{object}-{young}-{density}.palp");
+        // One name, so that the recording of the former material goes.
+        let name = format!("object-{object}.palp");
         changed.text = edited(&changed.text, |table| {
             let entry = table.get_mut("object").and_then(|objects| objects.get_mut(object));
             let entry = entry.and_then(Value::as_table_mut).ok_or("the scene has no such object")?;
@@ -149,8 +151,7 @@ fn read(of: SceneText) -> Result<(ViewerScene, SceneText), String> {
     let read = read_touchable_scene(Path::new("scene.toml"), text, &parts);
     let TouchableScene { scene, text } = read.map_err(|error| error.to_string())?;
     let Titles { id, title, about } = titles.clone();
-    // Every recording of one isotropic material can be rescaled.
-    let recordable = vec![true; scene.object_names.len()];
+    let recordable: Vec<bool> = scene.model.recordings().map(Recording::is_rescalable).collect();
     let description = describe_scene(&scene, (id, title, about), &recordable);
     let needs_machine =
         scene.devices.iter().find(|device| device.real.is_some() || device.simulated.is_some());

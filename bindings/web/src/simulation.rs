@@ -100,9 +100,14 @@ impl Simulation {
         made
     }
 
-    /// Back to the start of the scene, with its modes.
+    /// Back to the start of the scene, with its modes. Arrays stay where they are in memory.
     pub fn reset(&mut self) {
-        *self = Self::new(Arc::clone(&self.scene));
+        let mut fresh = Self::new(Arc::clone(&self.scene));
+        for (own, new) in self.arrays.iter_mut().zip(&fresh.arrays) {
+            own.clone_from(new);
+        }
+        fresh.arrays = std::mem::take(&mut self.arrays);
+        *self = fresh;
     }
 
     /// Array as it is now.
@@ -187,6 +192,11 @@ impl Simulation {
         &self.surface
     }
 
+    /// Numbers of the surface that was computed last.
+    pub fn surface_length(&self) -> usize {
+        self.surface.len()
+    }
+
     /// Input of the next step.
     fn read_input(&mut self) {
         self.scene.follow_next_step(&self.state, &mut self.input);
@@ -195,9 +205,12 @@ impl Simulation {
         for (((own, row), of), mode) in devices.zip(&self.scene.devices).zip(&self.modes) {
             let given = DVec3::from_array(*row);
             if of.path.is_some() && !given.is_finite() {
-                // A force of the scene's course.
-                if !matches!((own.mode, mode), (DeviceMode::Force(_), DeviceMode::Force(_))) {
-                    own.mode = *mode;
+                match (own.mode, mode) {
+                    // A force of the scene's course.
+                    (DeviceMode::Force(_), DeviceMode::Force(_)) => {}
+                    // It has let go of what it pushed, and is nowhere.
+                    (DeviceMode::Force(_), _) => *own = DeviceInput::inactive(),
+                    _ => own.mode = *mode,
                 }
                 continue;
             }

@@ -109,6 +109,49 @@ describe("a simulation", () => {
   });
 });
 
+describe("memory", () => {
+  it("is freed once, and what was disposed of says so", () => {
+    const recording = block();
+    const scene = new Scene({ ...pressed(), objects: [{ name: "block", recording, position: [0, halfHeight(), 0] }] });
+    recording.dispose();
+    recording.dispose();
+    expect(() => recording.positions).toThrow(/the recording was disposed of/);
+    const simulation = new Simulation(scene);
+    simulation.step();
+    expect(simulation.surface("block").length).toBe(block().positions.length);
+    scene.dispose();
+    expect(() => new Simulation(scene)).toThrow(/the scene was disposed of/);
+    simulation.step();
+    simulation.dispose();
+    simulation.dispose();
+    expect(() => simulation.step()).toThrow(/the simulation was disposed of/);
+    expect(() => simulation.forces).toThrow(PalpateError);
+  });
+
+  it("keeps its arrays in place over a reset", () => {
+    const simulation = new Simulation(new Scene(pressed()));
+    // The first may make the memory grow.
+    simulation.reset();
+    const { positions, forces } = simulation;
+    const top = 2 * halfHeight();
+    for (let step = 0; step < 100; step++) simulation.step([0, top - 1e-4 * step, 0]);
+    simulation.reset();
+    expect([...positions].every(Number.isNaN)).toBe(true);
+    expect([...forces]).toEqual([0, 0, 0]);
+    positions.set([0, top, 0]);
+    simulation.step();
+    expect(simulation.positions).toEqual(positions);
+  });
+
+  it("has the surfaces of objects whose scene is written in another way", () => {
+    const toml = `object = [{ name = "a", 'recording' = 'x.palp' }, { name = "b", recording = "x.palp", position = [1.0, 0.0, 0.0] }] # "soft"`;
+    const simulation = new Simulation(Scene.fromToml(toml, { "x.palp": block() }));
+    expect(simulation.surface("a").length).toBe(block().positions.length);
+    expect(Math.min(...simulation.surface("b").filter((_, at) => at % 3 === 0))).toBeGreaterThan(0.5);
+    expect(simulation.scene.recordings.length).toBe(2);
+  });
+});
+
 describe("a recording", () => {
   it("is rescaled exactly to another Young's modulus and density", () => {
     const [soft, stiff] = [block(), block().rescaled(4 * 1e5, 100)];

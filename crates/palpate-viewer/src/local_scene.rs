@@ -197,7 +197,13 @@ impl LocalScene {
         match controls.apply(VIEWER, message) {
             Effect::None | Effect::Scene(SceneRequest::CancelJob) => {}
             Effect::Reply(text) => send(PageMessage::Text(text)),
-            Effect::Stream(format, stride) => (self.format, self.stride) = (format, stride),
+            Effect::Stream(format, stride) => {
+                (self.format, self.stride) = (format, stride);
+                // A page that has loaded a paused scene needs a frame.
+                if stride > 0 {
+                    send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+                }
+            }
             Effect::Sound(on) => self.switch_sound(on),
             Effect::Scene(SceneRequest::SendStatus) => self.send_status(send),
             Effect::Scene(SceneRequest::Reset) => {
@@ -222,9 +228,12 @@ impl LocalScene {
         let step_s = self.step_s();
         let begun_s = now_s();
         let newest = (begun_s / step_s) as u64;
+        if self.tick == 0 {
+            self.tick = newest.max(1);
+        }
         let backlog = (MAX_BACKLOG_S / step_s) as u64;
         let skipped = newest.saturating_sub(backlog).saturating_sub(self.tick);
-        if self.tick > 0 && skipped > 0 {
+        if skipped > 0 {
             self.timing.overruns += 1;
             self.timing.skipped += skipped;
         }

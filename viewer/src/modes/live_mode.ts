@@ -226,6 +226,8 @@ export class LiveMode implements PageMode {
           this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
         }
         this.sceneView.setScene(0, loaded);
+        // The newest frame, also of a scene that is paused.
+        this.stream();
         this.sceneView.fitCamera();
         this.plots.reset(scene);
         this.frame = null;

@@ -41,10 +41,10 @@ export class WorkerConnection {
     if (this.worker === null) this.start();
   }
 
+  /** Ends the worker; requests that wait are dropped, as the page is told why. */
   close(): void {
     this.worker?.terminate();
     this.worker = null;
-    this.requests.forEach((answer) => answer(null));
     this.requests.clear();
   }
 
@@ -65,10 +65,10 @@ export class WorkerConnection {
       }
       case "frame":
         this.post({ kind: "shown" });
-        this.listener.frame(decodeFrame(message.frame));
+        this.decoded(() => this.listener.frame(decodeFrame(message.frame)));
         break;
       case "sound":
-        this.listener.sound(decodeSound(message.block));
+        this.decoded(() => this.listener.sound(decodeSound(message.block)));
         break;
       case "data":
         this.requests.get(message.request)?.(message.bytes);
@@ -79,12 +79,21 @@ export class WorkerConnection {
     }
   }
 
+  private decoded(receive: () => void): void {
+    try {
+      receive();
+    } catch (error) {
+      this.listener.decodeFailed(error instanceof Error ? error.message : String(error));
+    }
+  }
+
   private handleLoss(reason: string): void {
     this.close();
     this.listener.state({ name: "lost", retryAt: Number.POSITIVE_INFINITY, reason });
   }
 
   private fetch(path: string): Promise<ArrayBuffer> {
+    if (this.worker === null) return Promise.reject(new Error("the simulation has ended"));
     const request = ++this.lastRequest;
     return new Promise((done, failed) => {
       this.requests.set(request, (bytes) => (bytes === null ? failed(new Error(`${path}: not found`)) : done(bytes)));

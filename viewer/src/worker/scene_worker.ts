@@ -1,7 +1,7 @@
 // Web Worker that runs a live scene: the force process in WebAssembly, speaking the protocol of the server.
 
 import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
-import type { SceneSummary, ServerMessage } from "../protocol/messages";
+import type { ClientMessage, SceneSummary, ServerMessage } from "../protocol/messages";
 import type { FromWorker, ToWorker } from "./messages";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
 import { Ticker } from "./ticker";
@@ -49,7 +49,7 @@ class SceneRunner {
   private live = 0;
   private opening = 0;
   private readonly frames = new FrameStream();
-  private readonly ticker = new Ticker(() => this.guarded(() => this.instance.exports.live_advance(this.live), Number.POSITIVE_INFINITY));
+  private readonly ticker = new Ticker(() => this.advance());
 
   constructor(
     private readonly instance: Instance,
@@ -75,18 +75,31 @@ class SceneRunner {
     try {
       const files = await fetchScene(this.instance, this.base, summary, progress);
       if (number === this.opening) this.start(files);
+    } catch (error) {
+      // Nobody waits any more for one that another has replaced.
+      if (number === this.opening) throw error;
     } finally {
-      progress(1, true);
+      if (number === this.opening) progress(1, true);
     }
   }
 
   receive(text: string): void {
     if (this.live === 0) return;
     const { instance, live } = this;
+    const message = JSON.parse(text) as ClientMessage;
+    if (message.type === "cancel_job") {
+      this.opening += 1;
+      tell({ type: "progress", job: "scene", phase: "", fraction: 1, done: true });
+      return;
+    }
+    // A page that nobody sees needs no steps: time is left out until it is shown again.
+    if (message.type === "stream" && message.stride === 0) this.ticker.stop();
+    else if (message.type === "stream") this.ticker.start();
     try {
       instance.withBytes(text, (address, length) => instance.call((exports) => exports.live_receive(live, address, length)));
     } catch (error) {
-      tell({ type: "error", text: reasonOf(error) });
+      if (instance.stopped === null) tell({ type: "error", text: reasonOf(error) });
+      else this.fail(instance.stopped);
       return;
     }
     const id = instance.takeJson();
@@ -101,9 +114,12 @@ class SceneRunner {
     const { instance, live } = this;
     let bytes: ArrayBuffer | null = null;
     const before = instance.receiver;
-    instance.receiver = (_, data) => (bytes = data.slice().buffer);
-    instance.withBytes(path, (address, length) => instance.exports.live_data(live, address, length));
-    instance.receiver = before;
+    try {
+      instance.receiver = (_, data) => (bytes = data.slice().buffer);
+      if (live !== 0) instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length)));
+    } finally {
+      instance.receiver = before;
+    }
     post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
   }
 
@@ -142,15 +158,19 @@ class SceneRunner {
 
   private greeted = false;
 
-  /** Result of a call; a trap of the module ends the scene. */
-  private guarded<T>(run: () => T, otherwise: T): T {
+  /** Steps that are due; a trap of the module ends the scene. */
+  private advance(): number {
     try {
-      return run();
+      return this.instance.guard(() => this.instance.exports.live_advance(this.live));
     } catch (error) {
-      this.ticker.stop();
-      post({ kind: "failed", reason: `the simulation stopped: ${reasonOf(error)}` });
-      return otherwise;
+      this.fail(reasonOf(error));
+      return Number.POSITIVE_INFINITY;
     }
+  }
+
+  private fail(reason: string): void {
+    this.ticker.stop();
+    post({ kind: "failed", reason });
   }
 }
 

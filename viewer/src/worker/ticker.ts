@@ -13,30 +13,33 @@ export class Ticker {
   private readonly cell = sharedCell();
   private readonly channel = new MessageChannel();
   private running = false;
+  private round = 0;
 
   constructor(private readonly tick: () => number) {
-    this.channel.port1.onmessage = () => this.run();
+    this.channel.port1.onmessage = (event: MessageEvent<number>) => this.run(event.data);
   }
 
   start(): void {
     if (this.running) return;
     this.running = true;
-    this.channel.port2.postMessage(null);
+    // One that was stopped a moment ago may have a call under way.
+    this.round += 1;
+    this.channel.port2.postMessage(this.round);
   }
 
   stop(): void {
     this.running = false;
   }
 
-  private run(): void {
-    if (!this.running) return;
+  private run(round: number): void {
+    if (!this.running || round !== this.round) return;
     const wait = 1000 * this.tick() - performance.now();
     if (wait > MAX_SLEEP_MS || (this.cell === null && wait > 0)) {
-      setTimeout(() => this.channel.port2.postMessage(null), wait - 1);
+      setTimeout(() => this.channel.port2.postMessage(round), wait - 1);
       return;
     }
     if (wait > 0 && this.cell !== null) Atomics.wait(this.cell, 0, 0, wait);
-    this.channel.port2.postMessage(null);
+    this.channel.port2.postMessage(round);
   }
 }
 

@@ -260,6 +260,14 @@ impl<'s> PageSession<'s> {
             Effect::Stream(format, stride) => {
                 self.count_vertex_stream(live, format == FrameFormat::Vertices && stride > 0);
                 (self.format, self.stride) = (format, stride);
+                // A page that has loaded a paused scene needs a frame.
+                let newest = match format {
+                    FrameFormat::Modal => live.modal.borrow().clone(),
+                    FrameFormat::Vertices => live.vertices.borrow().clone(),
+                };
+                if stride > 0 && !newest.is_empty() {
+                    return self.send(Message::Binary(newest)).await;
+                }
             }
             Effect::Sound(on) => self.switch_sound(live, on),
             Effect::Scene(request) => self.request(live, request),

@@ -10,30 +10,39 @@
 //! exactly, and the damping law gives ζ′ = ζ(ω′).
 
 use super::residual::ResidualCompliance;
-use super::{Certificate, Damping, MassProperties, Recording, Support};
+use super::{Certificate, Damping, FORMAT_VERSION, MassProperties, Material, Recording, Support};
 use crate::error::{Error, RecordingError};
 use alloc::string::String;
 use libm::sqrt;
 
 impl Recording {
+    /// Whether [`rescaled`](Self::rescaled) applies: a free body of one isotropic material.
+    pub fn is_rescalable(&self) -> bool {
+        self.rescalable_material().is_ok()
+    }
+
+    /// The one material of a free body.
+    fn rescalable_material(&self) -> Result<&Material, RecordingError> {
+        let refused = |reason: &str| Err(RecordingError::NotRescalable { reason: String::from(reason) });
+        if self.metadata.support != Support::Free {
+            return refused("it has fixed nodes, which may stand on springs");
+        }
+        match self.metadata.materials.as_slice() {
+            [material] if material.stiffness_pa.is_none() => Ok(material),
+            [_] => refused("its material is anisotropic"),
+            _ => refused("it has several materials"),
+        }
+    }
+
     /// Recording of the same free body with another Young's modulus [Pa] and density [kg/m³]. Poisson's ratio and the damping law stay. The
-    /// certificate stays where the damping is a ratio: there all times scale alike, those of its press too.
+    /// certificate stays where the damping is a ratio: there all times scale alike, those of its press too. Mode shapes that are scaled are no
+    /// whole steps any more: a compact recording gets full mode shapes.
     ///
     /// # Errors
     /// [`RecordingError::NotRescalable`] for a body with fixed nodes, with springs, of several materials or of an anisotropic one;
     /// [`RecordingError::Inconsistent`] for a number out of its range.
     pub fn rescaled(&self, young_pa: f64, density_kg_m3: f64) -> Result<Self, Error> {
-        let refused =
-            |reason: &str| Err(RecordingError::NotRescalable { reason: String::from(reason) }.into());
-        if self.metadata.support != Support::Free {
-            return refused("it has fixed nodes, which may stand on springs");
-        }
-        let [material] = self.metadata.materials.as_slice() else {
-            return refused("it has several materials");
-        };
-        if material.stiffness_pa.is_some() {
-            return refused("its material is anisotropic");
-        }
+        let material = self.rescalable_material()?;
         let (a, b) = (young_pa / material.young_pa, density_kg_m3 / material.density_kg_m3);
         let mut rescaled = self.clone();
         let metadata = &mut rescaled.metadata;
@@ -54,6 +63,10 @@ impl Recording {
             *omega *= speed;
             *zeta = damping.ratio(*omega);
         }
+        if b != 1.0 {
+            rescaled.metadata.format_version = FORMAT_VERSION;
+        }
+        let modes = &mut rescaled.modes;
         let shape = 1.0 / sqrt(b);
         modes.mode_shapes.iter_mut().for_each(|phi| *phi *= shape);
         rescaled.residual.scale(1.0 / a);

@@ -118,12 +118,15 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
         }
         is_awake
     });
-    // No two are equal, so that the order, in which forces are added up, is the same whatever the sorting algorithm.
+    // The order, in which forces are added up, is the same whatever the sorting algorithm: those that are equal have the same force.
     let sides =
         |contact: &ContactOutput| (sleepers.is_awake(contact.object), contact.against, contact.object);
     output.contacts.sort_unstable_by(|a, b| {
-        let axes = || [0, 1, 2].map(|axis| a.point[axis].total_cmp(&b.point[axis]));
-        sides(a).cmp(&sides(b)).then_with(|| axes().into_iter().fold(Ordering::Equal, Ordering::then))
+        let axes = || {
+            let of = |a: DVec3, b: DVec3| [0, 1, 2].map(|axis| a[axis].total_cmp(&b[axis]));
+            of(a.point, b.point).into_iter().chain(of(a.force, b.force))
+        };
+        sides(a).cmp(&sides(b)).then_with(|| axes().fold(Ordering::Equal, Ordering::then))
     });
     resting.outputs = output.contacts.partition_point(|contact| !sleepers.is_awake(contact.object));
     output.contacts[..resting.outputs].iter_mut().for_each(|contact| contact.slip_speed = 0.0);
