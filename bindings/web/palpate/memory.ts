@@ -32,7 +32,7 @@ export interface Exports {
   parts_free(parts: number): void;
   parts_add_recording(parts: number, name: number, nameLength: number, recording: number): void;
   parts_add_path(parts: number, name: number, nameLength: number, path: number, pathLength: number): void;
-  scene_read(address: number, length: number, parts: number, isReference: number): number;
+  scene_read(address: number, length: number, parts: number): number;
   scene_free(scene: number): void;
   simulation_new(scene: number): number;
   simulation_free(simulation: number): void;

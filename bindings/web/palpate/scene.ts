@@ -2,6 +2,7 @@
 
 import { alive, Freer, library, load } from "./library.js";
 import { PalpateError } from "./memory.js";
+import { namedFiles, withParts } from "./parts.js";
 import { Recording } from "./recording.js";
 import { toToml, type TomlValue } from "./toml.js";
 
@@ -121,7 +122,7 @@ export class Scene {
   static async load(url: string | URL): Promise<Scene> {
     const address = new URL(url, globalThis.location?.href ?? "file:///");
     const [toml] = await Promise.all([fetchFile(address).then((response) => response.text()), load()]);
-    const names = new Set(namedFiles(toml));
+    const names = new Set(namedFiles(library(), toml));
     const files = new Files();
     await Promise.all(
       [...names].map(async (name) => {
@@ -145,7 +146,7 @@ export class Scene {
     const [handle, description] = read(toml, files);
     const scene: Scene = Object.create(Scene.prototype) as Scene;
     // The recordings of the objects come first, in their order.
-    const recordings = namedFiles(toml).slice(0, description.objectNames.length);
+    const recordings = namedFiles(library(), toml).slice(0, description.objectNames.length);
     Object.assign(scene, { address: handle, toml, recordings: recordings.map((name) => files.recordings.get(name)), description });
     freer.watch(scene, handle);
     return scene;
@@ -206,12 +207,6 @@ async function fetchFile(url: URL): Promise<Response> {
   return response;
 }
 
-/** Files that a scene names, as it names them. */
-function namedFiles(toml: string): string[] {
-  const instance = library();
-  return instance.withBytes(toml, (at, length) => instance.described<string[]>((exports) => exports.scene_files(at, length)));
-}
-
 /** Text of parts, whose recordings and paths become files. */
 function textOf(parts: SceneParts, files: Files): string {
   const { objects, devices, planes, obstacles, gravity, step } = parts;
@@ -241,19 +236,10 @@ function textOf(parts: SceneParts, files: Files): string {
 /** Handle and description of a scene. */
 function read(toml: string, files: Files): [number, Description] {
   const instance = library();
-  const { exports } = instance;
-  const parts = exports.parts_new();
-  try {
-    for (const [name, recording] of files.recordings) {
-      instance.withBytes(name, (at, length) => exports.parts_add_recording(parts, at, length, recording.handle));
-    }
-    for (const [name, path] of files.paths) {
-      instance.withBytes(name, (at, length) => instance.withBytes(path, (text, textLength) => exports.parts_add_path(parts, at, length, text, textLength)));
-    }
-    let handle = 0;
-    const description = instance.withBytes(toml, (at, length) => instance.described<Description>(() => (handle = exports.scene_read(at, length, parts, 0))));
-    return [handle, description];
-  } finally {
-    exports.parts_free(parts);
-  }
+  const recordings = new Map(Array.from(files.recordings, ([name, recording]) => [name, recording.handle]));
+  let handle = 0;
+  const description = withParts(instance, recordings, files.paths, (parts) =>
+    instance.withBytes(toml, (at, length) => instance.described<Description>((exports) => (handle = exports.scene_read(at, length, parts)))),
+  );
+  return [handle, description];
 }

@@ -14,6 +14,7 @@ use palpate_scene::{PartsInMemory, RunMode, Scene, named_files, read_scene_text}
 use palpate_viewer::{PageMessage, SceneSummary};
 use serde_json::{Value, json};
 use std::alloc::Layout;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -84,6 +85,11 @@ fn handle<T>(value: T) -> *mut T {
     Box::into_raw(Box::new(value))
 }
 
+/// Handle of a value, or none after an error was sent.
+fn handle_or_error<T>(value: Result<T, impl Display>) -> *mut T {
+    or_error(value.map(Some).map_err(|error| error.to_string())).map_or(std::ptr::null_mut(), handle)
+}
+
 /// Layout of an allocation that JavaScript asks for.
 fn layout(length: usize) -> Layout {
     Layout::from_size_align(length.max(1), 8).unwrap_or(Layout::new::<u64>())
@@ -110,13 +116,7 @@ pub extern "C" fn describe_library() {
 pub unsafe extern "C" fn recording_read(address: *const u8, length: usize) -> *mut Arc<Recording> {
     // SAFETY: as promised by the caller.
     let read = Recording::from_bytes(unsafe { bytes(address, length) });
-    match read {
-        Ok(recording) => handle(Arc::new(recording)),
-        Err(error) => {
-            send(ERROR, error.to_string().as_bytes());
-            std::ptr::null_mut()
-        }
-    }
+    handle_or_error(read.map(Arc::new))
 }
 
 #[unsafe(no_mangle)]
@@ -149,13 +149,7 @@ pub unsafe extern "C" fn recording_rescaled(
     young: f64,
     density: f64,
 ) -> *mut Arc<Recording> {
-    match recording.rescaled(young, density) {
-        Ok(rescaled) => handle(Arc::new(rescaled)),
-        Err(error) => {
-            send(ERROR, error.to_string().as_bytes());
-            std::ptr::null_mut()
-        }
-    }
+    handle_or_error(recording.rescaled(young, density).map(Arc::new))
 }
 
 /// Sends the files that a scene names.
@@ -204,27 +198,17 @@ pub unsafe extern "C" fn parts_add_path(
     parts.paths.insert(PathBuf::from(name), path);
 }
 
-/// Reads a scene, whose description is sent. `is_reference`: every surface node is a contact.
+/// Reads a scene, whose description is sent.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn scene_read(
     address: *const u8,
     length: usize,
     parts: &PartsInMemory,
-    is_reference: bool,
 ) -> *mut Arc<Scene> {
-    let mode = if is_reference { RunMode::Reference } else { RunMode::Offline };
     // SAFETY: as promised by the caller.
     let scene_text = unsafe { text(address, length) };
-    match read_scene_text(Path::new("scene"), &scene_text, parts, mode) {
-        Ok(scene) => {
-            send_json(&describe_scene(&scene));
-            handle(Arc::new(scene))
-        }
-        Err(error) => {
-            send(ERROR, error.to_string().as_bytes());
-            std::ptr::null_mut()
-        }
-    }
+    let scene = read_scene_text(Path::new("scene"), &scene_text, parts, RunMode::Offline);
+    handle_or_error(scene.map(Arc::new).inspect(|scene| send_json(&describe_scene(scene))))
 }
 
 #[unsafe(no_mangle)]
@@ -319,13 +303,7 @@ pub unsafe extern "C" fn live_open(
     // SAFETY: as promised by the caller.
     let (scene, about) = unsafe { (text(address, length), text(about, about_length)) };
     let about = serde_json::from_str(&about).unwrap_or_default();
-    match LiveScene::open(titles(&about), scene, parts.clone()) {
-        Ok(live) => handle(live),
-        Err(error) => {
-            send(ERROR, error.as_bytes());
-            std::ptr::null_mut()
-        }
-    }
+    handle_or_error(LiveScene::open(titles(&about), scene, parts.clone()))
 }
 
 /// Starts another scene in place of the one that runs; false after an error was sent.

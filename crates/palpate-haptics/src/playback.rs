@@ -50,6 +50,11 @@ impl Playback {
         self.slowdown.load(Ordering::Relaxed)
     }
 
+    /// Whether simulated time goes as fast as the clock: neither paused nor in slow motion.
+    pub fn is_at_full_speed(&self) -> bool {
+        self.slowdown() == 1 && !self.is_paused()
+    }
+
     /// Whether a step is due at a tick. Consumes a requested step.
     ///
     /// # Real time

@@ -12,9 +12,9 @@ use crate::protocol::{
     SceneSummary, ServerMessage, Status, encode_sound,
 };
 use crate::scene_provider::{ViewerDevice, ViewerScene};
-use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, initial_snapshot, is_resumable};
+use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, is_resumable};
 use crate::static_data::StaticData;
-use palpate::{DeviceMode, Model, ObjectSnapshot, State};
+use palpate::{DeviceMode, Model, State};
 use palpate_haptics::{
     Cycle, DevicePort, ForcePort, ForceProcess, ObstacleTrajectory, Overrun, Playback, Snapshot, Timing, port,
 };
@@ -112,16 +112,19 @@ impl LocalScene {
     /// If it has a device that only a machine has.
     pub fn new(scene: ViewerScene) -> Result<Self, SceneError> {
         let state = State::new(&scene.model);
+        Self::at(1, scene, state)
+    }
+
+    /// Scene of a generation at a state, with the settings of a new page.
+    fn at(generation: u32, scene: ViewerScene, state: State) -> Result<Self, SceneError> {
         let (process, ports) = force_process(&scene, state)?;
-        let current = CurrentScene::new(1, scene);
-        let snapshot = initial_snapshot(&current.scene, process.state());
         Ok(Self {
-            encoder: FrameEncoder::new(current.scene.model.clone(), current.generation),
-            current,
+            encoder: FrameEncoder::new(scene.model.clone(), generation),
+            snapshot: Snapshot::new(&scene.model, process.state(), process.input()),
+            current: CurrentScene::new(generation, scene),
             process,
             pointers: Mutex::new(Pointers::new(ports)),
             playback: Playback::default(),
-            snapshot,
             timing: Timing::default(),
             tick: 0,
             frame_at: 0,
@@ -144,20 +147,22 @@ impl LocalScene {
         resumes: bool,
         send: &mut dyn FnMut(PageMessage),
     ) -> Result<(), SceneError> {
-        let objects: Option<Vec<ObjectSnapshot>> =
-            (resumes && is_resumable(&scene)).then(|| self.process.state().snapshots());
-        let state = match &objects {
-            Some(objects) => State::resume(&scene.model, objects),
-            None => State::new(&scene.model),
+        let state = if resumes && is_resumable(&scene) {
+            State::resume(&scene.model, &self.process.state().snapshots())
+        } else {
+            State::new(&scene.model)
         };
-        let (process, ports) = force_process(&scene, state)?;
-        let current = CurrentScene::new(self.current.generation + 1, scene);
-        *lock(&self.pointers) = Pointers::new(ports);
-        self.encoder = FrameEncoder::new(current.scene.model.clone(), current.generation);
-        self.snapshot = initial_snapshot(&current.scene, process.state());
-        (self.current, self.process, self.timing) = (current, process, Timing::default());
-        (self.tick, self.frame_at, self.frame_step) = (0, 0, 0);
-        self.switch_sound(self.sound.is_some());
+        let next = Self::at(self.current.generation + 1, scene, state)?;
+        let is_heard = self.sound.is_some();
+        *self = Self {
+            playback: std::mem::take(&mut self.playback),
+            status_at_s: self.status_at_s,
+            format: self.format,
+            stride: self.stride,
+            frames: self.frames,
+            ..next
+        };
+        self.switch_sound(is_heard);
         self.send_scene(send);
         Ok(())
     }
@@ -201,7 +206,7 @@ impl LocalScene {
                 (self.format, self.stride) = (format, stride);
                 // A page that has loaded a paused scene needs a frame.
                 if stride > 0 {
-                    send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+                    self.send_state(send);
                 }
             }
             Effect::Sound(on) => self.switch_sound(on),
@@ -255,11 +260,6 @@ impl LocalScene {
         self.tick as f64 * self.step_s()
     }
 
-    /// Whether the playback is paused: then nothing is late.
-    pub fn is_paused(&self) -> bool {
-        self.playback.is_paused()
-    }
-
     /// Encoded data of a path that the server would answer, as `scene/1/object/0/surface`.
     pub fn static_data(&self, path: &str) -> Option<Vec<u8>> {
         let (generation, data) = StaticData::parse(path)?;
@@ -284,8 +284,7 @@ impl LocalScene {
         if is_due {
             self.process.cycle(time_s);
             // In slow motion and in a pause its frequencies would be wrong.
-            let is_heard = self.playback.slowdown() == 1 && !self.playback.is_paused();
-            if let Some(sound) = self.sound.as_mut().filter(|_| is_heard) {
+            if let Some(sound) = self.sound.as_mut().filter(|_| self.playback.is_at_full_speed()) {
                 sound.add(self.process.state());
             }
         }
@@ -311,6 +310,11 @@ impl LocalScene {
         if self.stride == 0 || !self.frames.is_multiple_of(self.stride) {
             return;
         }
+        self.send_state(send);
+    }
+
+    /// Sends the present state as a frame.
+    fn send_state(&mut self, send: &mut dyn FnMut(PageMessage)) {
         self.snapshot.capture(self.process.steps(), self.process.input(), self.process.state());
         send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
     }
@@ -331,32 +335,25 @@ impl LocalScene {
 
     fn send_scene(&mut self, send: &mut dyn FnMut(PageMessage)) {
         send(PageMessage::Text(self.current.message.to_string()));
-        send(PageMessage::Frame(self.encoder.encode(&self.snapshot, self.format)));
+        self.send_state(send);
         self.send_status(send);
     }
 
     fn send_status(&self, send: &mut dyn FnMut(PageMessage)) {
-        let timing = &self.timing;
         let status = Status {
             generation: self.current.generation,
             paused: self.playback.is_paused(),
             slowdown: self.playback.slowdown(),
             steps: self.process.steps(),
             viewers: 1,
-            force_process: ProcessTiming {
-                compute_us: timing.compute_us().into(),
-                lateness_us: timing.lateness_us().into(),
-                overruns: timing.overruns,
-                compute_overruns: timing.own_overruns,
-                realtime_priority: false,
-            },
+            force_process: ProcessTiming::new(&self.timing, false),
         };
         send(PageMessage::Text(ServerMessage::Status(status).to_json()));
     }
 }
 
 /// Sends an error to the page.
-pub(crate) fn send_error(error: &SceneError, send: &mut dyn FnMut(PageMessage)) {
+fn send_error(error: &SceneError, send: &mut dyn FnMut(PageMessage)) {
     send(PageMessage::Text(ServerMessage::Error { text: &error.to_string() }.to_json()));
 }
 

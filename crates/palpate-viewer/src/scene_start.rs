@@ -1,8 +1,6 @@
-//! Start of a scene: its first input and snapshot, its force process, and whether it may go on from another state.
+//! Start of a scene, whoever runs it: rates, and whether it may go on from another state.
 
 use crate::scene_provider::{SharedTrajectory, ViewerDevice, ViewerScene};
-use palpate::{DeviceInput, Input, State};
-use palpate_haptics::Snapshot;
 
 /// Time without an input after which a device becomes inactive [s].
 pub(crate) const DEVICE_TIMEOUT_S: f64 = 0.1;
@@ -18,16 +16,4 @@ pub(crate) fn is_resumable(scene: &ViewerScene) -> bool {
     let moves = scene.devices.iter().any(follows_path) || scene.obstacle_trajectories.iter().any(moves);
     let moves = moves || scene.base_paths.iter().any(Option::is_some);
     !moves && scene.gravity.is_none() && scene.model.parameters().clamps.is_empty()
-}
-
-/// Snapshot before the first step.
-pub(crate) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
-    let input = Input {
-        devices: vec![DeviceInput::inactive(); scene.devices.len()],
-        obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
-        bases: vec![None; scene.model.recordings().count()],
-        clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
-        ..Input::default()
-    };
-    Snapshot::new(&scene.model, state, &input)
 }

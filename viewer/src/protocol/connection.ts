@@ -1,9 +1,8 @@
 // WebSocket connection to the server: reconnects automatically and drops what cannot be decoded.
 
 import { sessionUrl } from "./urls";
-import { parseMessage, type ServerMessage, type ClientMessage } from "./messages";
-import { decodeFrame, type Frame } from "./frame";
-import { decodeSound, isSound, type SoundBlock } from "../sound/sound_block";
+import { deliver, type MessageListener } from "./deliver";
+import type { ClientMessage } from "./messages";
 
 export type ConnectionState =
   | { name: "connecting" }
@@ -12,12 +11,8 @@ export type ConnectionState =
   | { name: "lost"; retryAt: number; reason: string };
 
 /** Callbacks of a connection. */
-export interface ConnectionListener {
-  message(message: ServerMessage): void;
-  frame(frame: Frame): void;
-  sound(block: SoundBlock): void;
+export interface ConnectionListener extends MessageListener {
   state(state: ConnectionState): void;
-  decodeFailed(what: string): void;
 }
 
 const FIRST_RETRY_MS = 400;
@@ -90,29 +85,10 @@ export class Connection {
 
   private receive(data: unknown): void {
     this.receivedAt = performance.now();
-    if (data instanceof ArrayBuffer) {
-      let frame: Frame;
-      try {
-        if (isSound(data)) {
-          this.listener.sound(decodeSound(data));
-          return;
-        }
-        frame = decodeFrame(data);
-      } catch (error) {
-        this.listener.decodeFailed(error instanceof Error ? error.message : String(error));
-        return;
-      }
-      this.listener.frame(frame);
-    } else if (typeof data === "string") {
-      const message = parseMessage(data);
-      if (message === null) {
-        this.listener.decodeFailed("a message of unknown type");
-        return;
-      }
+    deliver(data, this.listener, (message) => {
       if (message.type === "hello") this.attempt = 0;
       if (message.type === "status") this.expectsStatus = true;
-      this.listener.message(message);
-    }
+    });
   }
 
   private handleLoss(reason: string): void {

@@ -1,5 +1,6 @@
 // Server URLs with the token that the page was opened with.
 
+import { readBody } from "./response_body";
 import { token } from "./token";
 
 function here(): URL {
@@ -48,22 +49,5 @@ export async function fetchBytes(path: string, signal: AbortSignal, onProgress: 
   }
   const response = await fetch(serverUrl(path), { signal, cache: "no-store" });
   if (!response.ok) throw new Error(`${path}: ${response.status} ${response.statusText}`);
-  if (response.body === null) return response.arrayBuffer();
-  const parts: Uint8Array[] = [];
-  let bytes = 0;
-  const reader = response.body.getReader();
-  for (;;) {
-    const { done, value } = await reader.read();
-    if (done) break;
-    parts.push(value);
-    bytes += value.byteLength;
-    onProgress(value.byteLength);
-  }
-  const whole = new Uint8Array(bytes);
-  let at = 0;
-  for (const part of parts) {
-    whole.set(part, at);
-    at += part.byteLength;
-  }
-  return whole.buffer;
+  return readBody(response, onProgress);
 }

@@ -1,10 +1,9 @@
 // Connection to a scene that the page runs by itself, in a Web Worker: the same messages as from a server.
 
 import type { FromWorker, ToWorker } from "../worker/messages";
-import { decodeSound } from "../sound/sound_block";
-import { decodeFrame } from "./frame";
-import { parseMessage, type ClientMessage } from "./messages";
 import type { ConnectionListener } from "./connection";
+import { deliver } from "./deliver";
+import type { ClientMessage } from "./messages";
 import { setDataSource } from "./urls";
 
 /** Whether this page runs its scene by itself: a static site says so. */
@@ -54,21 +53,15 @@ export class WorkerConnection {
 
   private receive(message: FromWorker): void {
     switch (message.kind) {
-      case "message": {
-        const parsed = parseMessage(message.text);
-        if (parsed === null) this.listener.decodeFailed("a message of unknown type");
-        else {
-          if (parsed.type === "hello") this.listener.state({ name: "open" });
-          this.listener.message(parsed);
-        }
+      case "message":
+        this.deliver(message.text);
         break;
-      }
       case "frame":
         this.post({ kind: "shown" });
-        this.decoded(() => this.listener.frame(decodeFrame(message.frame)));
+        this.deliver(message.frame);
         break;
       case "sound":
-        this.decoded(() => this.listener.sound(decodeSound(message.block)));
+        this.deliver(message.block);
         break;
       case "data":
         this.requests.get(message.request)?.(message.bytes);
@@ -79,12 +72,10 @@ export class WorkerConnection {
     }
   }
 
-  private decoded(receive: () => void): void {
-    try {
-      receive();
-    } catch (error) {
-      this.listener.decodeFailed(error instanceof Error ? error.message : String(error));
-    }
+  private deliver(data: string | ArrayBuffer): void {
+    deliver(data, this.listener, (message) => {
+      if (message.type === "hello") this.listener.state({ name: "open" });
+    });
   }
 
   private handleLoss(reason: string): void {

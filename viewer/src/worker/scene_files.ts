@@ -1,7 +1,9 @@
 // Scenes of a static site: a list, and a folder for each with its scene file, recordings and paths.
 
 import type { Instance } from "../../../bindings/web/palpate/memory";
+import { namedFiles } from "../../../bindings/web/palpate/parts";
 import type { SceneSummary } from "../protocol/messages";
+import { readBody } from "../protocol/response_body";
 
 /** Files of a scene. */
 export interface SceneFiles {
@@ -29,9 +31,8 @@ export async function fetchScenes(base: string): Promise<SceneSummary[]> {
 export async function fetchScene(instance: Instance, base: string, summary: SceneSummary, onProgress: DownloadProgress): Promise<SceneFiles> {
   const folder = new URL(`scenes/${encodeURIComponent(summary.id)}/`, base);
   const text = await respond(new URL("scene.toml", folder)).then((response) => response.text());
-  const names = instance.withBytes(text, (address, length) => instance.described<string[]>((exports) => exports.scene_files(address, length)));
   const files: SceneFiles = { summary, text, recordings: new Map(), paths: new Map() };
-  for (const name of new Set(names)) {
+  for (const name of new Set(namedFiles(instance, text))) {
     const response = await respond(new URL(name, folder));
     if (name.endsWith(".csv")) files.paths.set(name, await response.text());
     else files.recordings.set(name, await download(response, onProgress));
@@ -41,23 +42,11 @@ export async function fetchScene(instance: Instance, base: string, summary: Scen
 
 async function download(response: Response, onProgress: DownloadProgress): Promise<Uint8Array> {
   const length = Number(response.headers.get("content-length") ?? Number.NaN);
-  if (response.body === null) return new Uint8Array(await response.arrayBuffer());
-  const parts: Uint8Array[] = [];
   let bytes = 0;
-  const reader = response.body.getReader();
-  for (;;) {
-    const { done, value } = await reader.read();
-    if (done) break;
-    parts.push(value);
-    bytes += value.byteLength;
+  const body = await readBody(response, (part) => {
+    bytes += part;
     // A compressed response states the length of what is sent.
     onProgress(bytes <= length ? bytes / length : null);
-  }
-  const whole = new Uint8Array(bytes);
-  let at = 0;
-  for (const part of parts) {
-    whole.set(part, at);
-    at += part.byteLength;
-  }
-  return whole;
+  });
+  return new Uint8Array(body);
 }

@@ -1,6 +1,7 @@
 // Web Worker that runs a live scene: the force process in WebAssembly, speaking the protocol of the server.
 
 import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
+import { withParts } from "../../../bindings/web/palpate/parts";
 import type { ClientMessage, SceneSummary, ServerMessage } from "../protocol/messages";
 import type { FromWorker, ToWorker } from "./messages";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
@@ -48,6 +49,7 @@ class FrameStream {
 class SceneRunner {
   private live = 0;
   private opening = 0;
+  private greeted = false;
   private readonly frames = new FrameStream();
   private readonly ticker = new Ticker(() => this.advance());
 
@@ -126,37 +128,30 @@ class SceneRunner {
   private start(files: SceneFiles): void {
     const { instance } = this;
     const { exports } = instance;
-    const parts = exports.parts_new();
-    const recordings: number[] = [];
+    const recordings = new Map<string, number>();
     try {
       for (const [name, bytes] of files.recordings) {
-        const recording = instance.withBytes(bytes, (address, length) => instance.call(() => exports.recording_read(address, length)));
-        recordings.push(recording);
-        instance.withBytes(name, (address, length) => exports.parts_add_recording(parts, address, length, recording));
+        recordings.set(name, instance.withBytes(bytes, (address, length) => instance.call(() => exports.recording_read(address, length))));
       }
-      for (const [name, path] of files.paths) {
-        instance.withBytes(name, (address, length) => instance.withBytes(path, (text, textLength) => exports.parts_add_path(parts, address, length, text, textLength)));
-      }
-      instance.withBytes(files.text, (address, length) =>
-        instance.withBytes(JSON.stringify(files.summary), (about, aboutLength) => {
-          if (this.live !== 0) {
-            instance.call(() => exports.live_replace(this.live, address, length, parts, about, aboutLength));
-            return;
-          }
-          this.live = instance.call(() => exports.live_open(address, length, parts, about, aboutLength));
-        }),
+      withParts(instance, recordings, files.paths, (parts) =>
+        instance.withBytes(files.text, (address, length) =>
+          instance.withBytes(JSON.stringify(files.summary), (about, aboutLength) => {
+            if (this.live !== 0) {
+              instance.call(() => exports.live_replace(this.live, address, length, parts, about, aboutLength));
+              return;
+            }
+            this.live = instance.call(() => exports.live_open(address, length, parts, about, aboutLength));
+          }),
+        ),
       );
     } finally {
       recordings.forEach((recording) => exports.recording_free(recording));
-      exports.parts_free(parts);
     }
     if (this.greeted) return;
     this.greeted = true;
     instance.withBytes(JSON.stringify(this.scenes), (address, length) => exports.live_greet(this.live, address, length));
     this.ticker.start();
   }
-
-  private greeted = false;
 
   /** Steps that are due; a trap of the module ends the scene. */
   private advance(): number {

@@ -1,6 +1,6 @@
 // First view: the ghost finger, the hint, and what both leave behind.
 
-import { assert, assertNoConsoleErrors, latestFrame, pixelOf, recordSent, screenshot, waitForScene } from "./browser.mjs";
+import { assert, assertNoConsoleErrors, latestFrame, pixelOf, recordSent, screenshot, waitForRest, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 const anyPressed = () => window.palpate.sceneView.graphs[0]?.frame?.devices.some((d) => d.mode === "touch" && Math.hypot(...d.force) > 0.01);
@@ -116,6 +116,8 @@ export const firstViewCases = [
       await page.keyboard.press("r");
       await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation);
       assert(!(await page.isVisible(".hint")), "the hint comes back with a reset");
+      // A finger that presses while the object falls would miss it.
+      await waitForRest(page);
       const { x, y } = await pixelOf(page, 0, 0.2);
       await page.mouse.move(x, y);
       await page.mouse.down();

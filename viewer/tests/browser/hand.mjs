@@ -116,7 +116,8 @@ export const handCases = [
       const asked = page.waitForRequest("**/object/0/surface");
       await page.keyboard.press("r");
       await asked;
-      const at = await pixelOf(page, 0, 0);
+      // A place that the object covers at rest as well as where its fall begins.
+      const at = await pixelOf(page, 0, 0.3);
       await page.mouse.move(at.x, at.y);
       await page.mouse.down();
       go();

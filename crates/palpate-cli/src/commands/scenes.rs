@@ -29,7 +29,7 @@ pub struct Arguments {
     cache: Option<PathBuf>,
 }
 
-/// Most modes of a recording: 3 MB for the paper's cube.
+/// Most modes of a recording: those of all built-in scenes are then below 3 MB.
 const MODES: usize = 100;
 
 /// Runs the command.

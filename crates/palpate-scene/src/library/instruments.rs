@@ -5,7 +5,7 @@
 use super::built_in::BuiltInScene;
 use crate::recipe::RecordingRecipe;
 use palpate::{Damping, Material};
-use palpate_fem::ElementOrder;
+use palpate_fem::{ElementOrder, Precision};
 
 /// Time from blow to blow, and of the first [s].
 const PERIOD_S: f64 = 3.0;
@@ -213,6 +213,6 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
         order: ElementOrder::Quadratic,
         modes,
         damping: Damping::Ratio(ratio),
-        precision: palpate_fem::Precision::Compact,
+        precision: Precision::Compact,
     })
 }

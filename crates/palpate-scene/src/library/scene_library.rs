@@ -154,11 +154,7 @@ impl SceneLibrary {
         let scene = built_in_scene(id)?;
         let folder = self.folder.path().join(scene.id);
         make_folder(&folder)?;
-        for (name, at) in scene.paths {
-            let path = folder.join(name);
-            let text = built_in::path_text(*at, scene.period_s);
-            std::fs::write(&path, text).map_err(|error| SceneError::io("write the path", &path, &error))?;
-        }
+        write_paths(&scene, &folder)?;
         let mut text: Table = scene.text.parse().map_err(|error| {
             SceneError::new(SceneErrorKind::Syntax, format!("the built-in scene {id}: {error}"))
         })?;
@@ -195,10 +191,7 @@ impl SceneLibrary {
     ) -> Result<(), SceneError> {
         let scene = built_in_scene(id)?;
         make_folder(folder)?;
-        for (name, at) in scene.paths {
-            let text = built_in::path_text(*at, scene.period_s);
-            write_atomically(&folder.join(name), text.as_bytes())?;
-        }
+        write_paths(&scene, folder)?;
         let mut text = scene.text.trim_start().to_string();
         for name in built_in::recipe_names(scene.text) {
             let Some(small) = built_in::small_recipe(name, modes) else { continue };
@@ -332,6 +325,15 @@ fn built_in_scene(id: &str) -> Result<BuiltInScene, SceneError> {
         let message = format!("there is no scene {id:?}; there are {known}");
         SceneError::new(SceneErrorKind::UnknownValue, message)
     })
+}
+
+/// Writes the paths of a built-in scene as files.
+fn write_paths(scene: &BuiltInScene, folder: &Path) -> Result<(), SceneError> {
+    for (name, at) in scene.paths {
+        let text = built_in::path_text(*at, scene.period_s);
+        write_atomically(&folder.join(name), text.as_bytes())?;
+    }
+    Ok(())
 }
 
 fn make_folder(folder: &Path) -> Result<(), SceneError> {

@@ -3,13 +3,13 @@
 use super::channels::SceneChannels;
 use super::command::Command;
 use super::job::JobPermit;
-use super::running::{DeviceInputs, RunningScene};
+use super::running::{DeviceInputs, RunningScene, initial_snapshot};
 use crate::current::CurrentScene;
 use crate::error::SceneError;
 use crate::pointers::{Pointers, lock};
 use crate::protocol::{FrameEncoder, ServerMessage};
 use crate::scene_provider::{JobControl, PageNotifier, SceneProvider, ViewerScene};
-use crate::scene_start::{initial_snapshot, is_resumable};
+use crate::scene_start::is_resumable;
 use palpate::{ObjectSnapshot, State};
 use palpate_haptics::Scheduling;
 use std::sync::Arc;

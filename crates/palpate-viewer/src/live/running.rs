@@ -7,7 +7,7 @@ use crate::pointers::{Pointers, SharedPointers, lock};
 use crate::protocol::{FrameEncoder, ProcessTiming, ServerMessage, Status};
 use crate::scene_provider::{OpenLog, ViewerDevice, ViewerScene};
 use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ};
-use palpate::{DeviceMode, ObjectSnapshot, State};
+use palpate::{DeviceInput, DeviceMode, Input, ObjectSnapshot, State};
 use palpate_haptics::{
     Clock, CycleReceiver, DevicePort, ObstacleTrajectory, Playback, Report, Scheduling, Session,
     SessionDevice, Snapshot, Timing, cycle_channel, port,
@@ -22,6 +22,18 @@ const POINTER_RATE_HZ: f64 = 1000.0;
 
 /// Capacity of the channel of cycle records: some seconds at 4 kHz.
 const CYCLES: usize = 16_384;
+
+/// Snapshot before the first step.
+pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
+    let input = Input {
+        devices: vec![DeviceInput::inactive(); scene.devices.len()],
+        obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
+        bases: vec![None; scene.model.recordings().count()],
+        clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
+        ..Input::default()
+    };
+    Snapshot::new(&scene.model, state, &input)
+}
 
 /// Opened devices of a scene.
 pub(super) struct DeviceInputs {
@@ -156,13 +168,10 @@ impl RunningScene {
             slowdown: playback.slowdown(),
             steps: steps.load(Ordering::Relaxed),
             viewers,
-            force_process: ProcessTiming {
-                compute_us: timing.compute_us().into(),
-                lateness_us: timing.lateness_us().into(),
-                overruns: timing.overruns,
-                compute_overruns: timing.own_overruns,
-                realtime_priority: granted.is_some_and(|granted| matches!(granted.priority, Ok(Some(_)))),
-            },
+            force_process: ProcessTiming::new(
+                timing,
+                granted.is_some_and(|granted| matches!(granted.priority, Ok(Some(_)))),
+            ),
         }
     }
 }

@@ -140,7 +140,7 @@ impl SoundMaker {
     fn make_block(&mut self) {
         let Self { synthesiser, records, samples, .. } = self;
         samples.clear();
-        let is_heard = self.playback.slowdown() == 1 && !self.playback.is_paused();
+        let is_heard = self.playback.is_at_full_speed();
         let taken: Result<(), ()> = records.consume(|record| {
             if is_heard {
                 synthesiser.synthesise(record, samples);

@@ -2,7 +2,7 @@
 
 use super::description::{CouplingDescription, SceneDescription};
 use super::frame::FrameFormat;
-use palpate_haptics::Percentiles;
+use palpate_haptics::{Percentiles, Timing};
 use serde::{Deserialize, Serialize};
 
 /// Version of the protocol.
@@ -80,6 +80,19 @@ pub(crate) struct ProcessTiming {
     pub compute_overruns: u64,
     /// Whether the operating system granted real-time priority.
     pub realtime_priority: bool,
+}
+
+impl ProcessTiming {
+    /// Timing so far, and whether the operating system granted real-time priority.
+    pub fn new(timing: &Timing, realtime_priority: bool) -> Self {
+        Self {
+            compute_us: timing.compute_us().into(),
+            lateness_us: timing.lateness_us().into(),
+            overruns: timing.overruns,
+            compute_overruns: timing.own_overruns,
+            realtime_priority,
+        }
+    }
 }
 
 /// Percentiles of a time [µs].
