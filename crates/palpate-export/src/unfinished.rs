@@ -89,11 +89,13 @@ mod tests {
             let [has_begun, has_ended] = [const { AtomicBool::new(false) }; 2];
             let removed = std::thread::scope(|scope| {
                 scope.spawn(|| {
-                    let mut numbers = 0..;
-                    while !has_ended.load(Ordering::Relaxed) {
-                        let file = folder.join(numbers.next().unwrap_or(0).to_string());
+                    // A writer without an end could be faster than the removal for as long as the disk has space.
+                    for number in 0..2000 {
+                        if has_ended.load(Ordering::Relaxed) {
+                            break;
+                        }
                         // It fails when the folder is gone.
-                        let _ = std::fs::write(file, "of a log");
+                        let _ = std::fs::write(folder.join(number.to_string()), "of a log");
                         has_begun.store(true, Ordering::Relaxed);
                     }
                 });
