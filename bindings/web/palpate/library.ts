@@ -1,6 +1,7 @@
 // The one instance of the module that recordings, scenes and simulations share.
 
-import { Instance, PalpateError, type ModuleSource } from "./memory.js";
+import { PalpateError } from "./error.js";
+import { Instance, type ModuleSource } from "./memory.js";
 
 let loading: Promise<Instance> | null = null;
 let loaded: Instance | null = null;

@@ -1,9 +1,7 @@
 // Instance of the WebAssembly module: its memory, what it sends, and calls with texts and bytes.
 
-/** Error of palpate: a file, scene or motion that it refuses. */
-export class PalpateError extends Error {
-  override name = "PalpateError";
-}
+import { PalpateError } from "./error.js";
+import { readFile } from "./files.js";
 
 /** Kinds of what the module sends. */
 export const enum Sent {
@@ -155,15 +153,6 @@ export class Instance {
 async function compile(source: ModuleSource): Promise<WebAssembly.Module> {
   if (source instanceof WebAssembly.Module) return source;
   if (typeof source !== "string" && !(source instanceof URL)) return WebAssembly.compile(source);
-  const url = new URL(source, import.meta.url);
-  if (url.protocol === "file:") {
-    // Node.js does not fetch files.
-    const files = "node:fs/promises";
-    const { readFile } = (await import(/* @vite-ignore */ files)) as typeof import("node:fs/promises");
-    return WebAssembly.compile(await readFile(url));
-  }
-  const response = await fetch(url);
-  if (!response.ok) throw new PalpateError(`${url.href}: ${response.status} ${response.statusText}`);
   // A file server may not know the type that streaming asks for.
-  return WebAssembly.compile(await response.arrayBuffer());
+  return WebAssembly.compile(await readFile(new URL(source, import.meta.url)));
 }

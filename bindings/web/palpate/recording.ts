@@ -1,7 +1,8 @@
 // Recordings: the impulse responses of one body, made by `palpate record`.
 
+import { addressOf, readFile } from "./files.js";
 import { alive, Freer, library, load } from "./library.js";
-import { PalpateError, unsigned } from "./memory.js";
+import { unsigned } from "./memory.js";
 
 interface Description {
   source: string;
@@ -34,11 +35,10 @@ export class Recording {
     return alive(this.address, "recording");
   }
 
-  /** Loads a recording file (`.palp`) from an address. */
+  /** Loads a recording file (`.palp`) from an address, or, in Node.js, from a path. */
   static async load(url: string | URL): Promise<Recording> {
-    const [response] = await Promise.all([fetch(url), load()]);
-    if (!response.ok) throw new PalpateError(`${String(url)}: ${response.status} ${response.statusText}`);
-    return Recording.fromBytes(new Uint8Array(await response.arrayBuffer()));
+    const [bytes] = await Promise.all([readFile(addressOf(url)), load()]);
+    return Recording.fromBytes(bytes);
   }
 
   /** Reads the bytes of a recording file, after {@link load}. */

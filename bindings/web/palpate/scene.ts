@@ -1,7 +1,7 @@
 // Scenes: read from TOML, or built of objects whose fields are the keys of a scene file.
 
+import { addressBeside, addressOf, readFile } from "./files.js";
 import { alive, Freer, library, load } from "./library.js";
-import { PalpateError } from "./memory.js";
 import { namedFiles, withParts } from "./parts.js";
 import { Recording } from "./recording.js";
 import { toToml, type TomlValue } from "./toml.js";
@@ -118,17 +118,17 @@ export class Scene {
     freer.watch(this, this.address);
   }
 
-  /** Loads a scene file (`.toml`) from an address, with the recordings and paths that it names beside it. */
+  /** Loads a scene file (`.toml`) from an address, or, in Node.js, from a path, with the recordings and paths that it names beside it. */
   static async load(url: string | URL): Promise<Scene> {
-    const address = new URL(url, globalThis.location?.href ?? "file:///");
-    const [toml] = await Promise.all([fetchFile(address).then((response) => response.text()), load()]);
-    const names = new Set(namedFiles(library(), toml));
+    const address = addressOf(url);
+    const text = async (file: URL) => new TextDecoder().decode(await readFile(file));
+    const [toml] = await Promise.all([text(address), load()]);
     const files = new Files();
     await Promise.all(
-      [...names].map(async (name) => {
-        const response = await fetchFile(new URL(name, address));
-        if (name.endsWith(".csv")) files.paths.set(name, await response.text());
-        else files.recordings.set(name, Recording.fromBytes(new Uint8Array(await response.arrayBuffer())));
+      [...new Set(namedFiles(library(), toml))].map(async (name) => {
+        const file = addressBeside(address, name);
+        if (name.endsWith(".csv")) files.paths.set(name, await text(file));
+        else files.recordings.set(name, Recording.fromBytes(await readFile(file)));
       }),
     );
     return Scene.fromFiles(toml, files);
@@ -199,12 +199,6 @@ export class Scene {
 class Files {
   readonly recordings = new Map<string, Recording>();
   readonly paths = new Map<string, string>();
-}
-
-async function fetchFile(url: URL): Promise<Response> {
-  const response = await fetch(url);
-  if (!response.ok) throw new PalpateError(`${url.href}: ${response.status} ${response.statusText}`);
-  return response;
 }
 
 /** Text of parts, whose recordings and paths become files. */

@@ -1,7 +1,8 @@
 // Simulations: scenes that the program steps.
 
+import { PalpateError } from "./error.js";
 import { alive, Freer, library } from "./library.js";
-import { PalpateError, unsigned } from "./memory.js";
+import { unsigned } from "./memory.js";
 import type { Scene, Vector } from "./scene.js";
 
 /** Places of the arrays in the module. */

@@ -1,3 +1,9 @@
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
+import type { AddressInfo } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
 import { beforeAll, describe, expect, it } from "vitest";
 import { PalpateError, Recording, Scene, Simulation, type SceneParts } from "../palpate/index.js";
 import { block, blockBytes, loadPackage, runNatively } from "./package.js";
@@ -166,5 +172,52 @@ describe("a recording", () => {
     bytes[bytes.length - 1] = (bytes[bytes.length - 1] ?? 0) ^ 1;
     expect(() => Recording.fromBytes(bytes)).toThrow(/hash/);
     expect(() => Recording.fromBytes(new Uint8Array())).toThrow(PalpateError);
+  });
+});
+
+describe("a scene file", () => {
+  it("is read with the files beside it, from the disk and by HTTP, whatever their names hold", async () => {
+    const folder = mkdtempSync(join(tmpdir(), "palpate #1 "));
+    const names = { recording: "soft block, 100 %.palp", path: "hands/what? #2.csv" };
+    const toml = `gravity = [0, -9.81, 0]
+[[object]]
+name = "block"
+recording = "${names.recording}"
+[[device]]
+name = "hand"
+mode = "held"
+attach = { object = "block", point = [0, ${halfHeight()}, 0] }
+path = { file = "${names.path}" }
+`;
+    mkdirSync(join(folder, "hands"));
+    writeFileSync(join(folder, names.recording), blockBytes());
+    writeFileSync(join(folder, names.path), "t,x,y,z\n0,0,0,0\n0.1,0,0.01,0\n");
+    writeFileSync(join(folder, "scene.toml"), toml);
+    const server = createServer((request, response) => {
+      const file = join(folder, decodeURIComponent(new URL(request.url ?? "", "http://localhost").pathname));
+      response.writeHead(existsSync(file) ? 200 : 404).end(existsSync(file) ? readFileSync(file) : undefined);
+    });
+    await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
+    const { port } = server.address() as AddressInfo;
+    const from = process.cwd();
+    try {
+      process.chdir(folder);
+      const force = async (address: string | URL) => {
+        const simulation = new Simulation(await Scene.load(address));
+        for (let step = 0; step < 20; step++) simulation.step();
+        return [...simulation.forces];
+      };
+      const forces = await force("scene.toml");
+      expect(Math.hypot(...forces)).toBeGreaterThan(0.01);
+      expect(await force(pathToFileURL(join(folder, "scene.toml")))).toEqual(forces);
+      expect(await force(`http://127.0.0.1:${port}/scene.toml`)).toEqual(forces);
+      expect((await Recording.load(encodeURIComponent(names.recording))).mass).toBe(block().mass);
+      await expect(Recording.load("missing.palp")).rejects.toThrow(/no such file.*missing.palp/);
+      await expect(Recording.load(`http://127.0.0.1:${port}/missing.palp`)).rejects.toThrow(/missing.palp: 404/);
+    } finally {
+      process.chdir(from);
+      server.close();
+      rmSync(folder, { recursive: true });
+    }
   });
 });

@@ -1,6 +1,7 @@
 // Browser tests of the page: against the stand-in, against the real server if PALPATE is the path of the binary, or without a server if PAGE is the
 // folder of the page that runs its scene by itself.
 //   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
+//   node tests/browser/run.mjs --standin-only               leaves out what runs against the real server, too
 
 import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
@@ -18,12 +19,14 @@ import { reconstructionCases } from "./reconstruction.mjs";
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
-const filter = process.argv[2] ?? "";
+const standinOnlyRun = process.argv[2] === "--standin-only";
+const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
 const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
 for (const { name, run, standinOnly, realOnly, serverOnly } of cases) {
+  if (standinOnlyRun && !standinOnly) continue;
   if (serverless && serverOnly) {
     console.log(`skipped  ${name} (needs a server)`);
     continue;
