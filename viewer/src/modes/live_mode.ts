@@ -164,6 +164,7 @@ export class LiveMode implements PageMode {
     this.scenes.setScenes(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
     this.meshUpload.section.hidden = !hello.records;
+    this.material.records = hello.records;
     this.sound.connected();
     this.stream();
   }

@@ -1,4 +1,4 @@
-// Material of an object; a change is recorded again in the background.
+// Material of an object; a change is recorded again in the background, or, in a page without a server, rescaled at once.
 
 import type { Material, SceneMessage, ClientMessage } from "../protocol/messages";
 import { element, section } from "./elements";
@@ -20,6 +20,8 @@ export class MaterialFields {
   private readonly poisson;
   private readonly density;
 
+  private allRatios = true;
+
   constructor() {
     const clearPreset = () => {
       this.preset.value = "";
@@ -39,8 +41,14 @@ export class MaterialFields {
     this.rows = [presets, this.young.row, this.poisson.row, this.density.row];
   }
 
+  /** Whether Poisson's ratio can be changed. */
+  set changesRatio(changes: boolean) {
+    this.allRatios = changes;
+    this.poisson.input.disabled = !changes;
+  }
+
   set value(material: Material) {
-    this.fill(material);
+    this.fill(material, true);
     const close = (a: number, b: number) => Math.abs(a - b) <= 1e-6 * Math.abs(b);
     const same = PRESETS.find(
       (p) => close(p.young, material.young) && close(p.poisson, material.poisson) && close(p.density, material.density),
@@ -48,9 +56,10 @@ export class MaterialFields {
     this.preset.value = same?.name ?? "";
   }
 
-  private fill({ young, poisson, density }: Material): void {
+  /** Fills in a material, whose Poisson's ratio is left out where it stays as it is. */
+  private fill({ young, poisson, density }: Material, ofObject = false): void {
     this.young.value = young / 1000;
-    this.poisson.value = poisson;
+    if (this.allRatios || ofObject) this.poisson.value = poisson;
     this.density.value = density;
   }
 
@@ -65,15 +74,14 @@ export class MaterialPanel {
   readonly section: HTMLElement;
   private readonly objectSelect = element("select");
   private readonly fields = new MaterialFields();
-  private readonly record: HTMLButtonElement;
+  private readonly apply: HTMLButtonElement;
+  private readonly explanation = element("p", { class: "secondary" });
   private scene: SceneMessage | null = null;
 
   constructor(send: (message: ClientMessage) => void) {
-    this.record = element("button", {
+    this.apply = element("button", {
       class: "button wide",
       type: "button",
-      text: "Record again",
-      title: "Computes how the object responds with this material; takes seconds to minutes while the scene keeps running",
       on: {
         click: () => {
           const material = this.fields.value;
@@ -87,9 +95,22 @@ export class MaterialPanel {
       false,
       element("label", { class: "field" }, element("span", { class: "name", text: "Object" }), this.objectSelect),
       ...this.fields.rows,
-      element("p", { class: "secondary", text: "A new material needs a new recording, which is made in the background." }),
-      this.record,
+      this.explanation,
+      this.apply,
     );
+    this.records = true;
+  }
+
+  /** Whether there is a server that records; otherwise recordings are rescaled. */
+  set records(records: boolean) {
+    this.fields.changesRatio = records;
+    this.apply.textContent = records ? "Record again" : "Apply";
+    this.apply.title = records
+      ? "Computes how the object responds with this material; takes seconds to minutes while the scene keeps running"
+      : "Begins the scene again with this material";
+    this.explanation.textContent = records
+      ? "A new material needs a new recording, which is made in the background."
+      : "The response to another Young's modulus and density follows from this one, exactly. Another Poisson's ratio needs a recording: palpate record.";
   }
 
   update(scene: SceneMessage): void {

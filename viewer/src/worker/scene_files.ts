@@ -1,5 +1,6 @@
 // Scenes of a static site: a list, and a folder for each with its scene file, recordings and paths.
 
+import { addressBeside } from "../../../bindings/web/palpate/files";
 import type { Instance } from "../../../bindings/web/palpate/memory";
 import { namedFiles } from "../../../bindings/web/palpate/parts";
 import type { SceneSummary } from "../protocol/messages";
@@ -33,7 +34,7 @@ export async function fetchScene(instance: Instance, base: string, summary: Scen
   const text = await respond(new URL("scene.toml", folder)).then((response) => response.text());
   const files: SceneFiles = { summary, text, recordings: new Map(), paths: new Map() };
   for (const name of new Set(namedFiles(instance, text))) {
-    const response = await respond(new URL(name, folder));
+    const response = await respond(addressBeside(folder, name));
     if (name.endsWith(".csv")) files.paths.set(name, await response.text());
     else files.recordings.set(name, await download(response, onProgress));
   }

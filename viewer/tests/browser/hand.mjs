@@ -237,6 +237,33 @@ export const handCases = [
     },
   },
   {
+    name: "another material is recorded again by a server, and follows from the recording without one",
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      await page.click("#controls summary >> text=Material");
+      const panel = page.locator("#controls details", { hasText: "Young's modulus" });
+      const field = (name) => panel.getByLabel(name);
+      const serverless = Boolean(process.env.PAGE);
+      assert((await panel.locator(".button.wide").textContent()) === (serverless ? "Apply" : "Record again"), "the button");
+      assert((await field("Poisson's ratio").isDisabled()) === serverless, "Poisson's ratio");
+      await screenshot(page, "material");
+      if (serverless) {
+        const { generation } = await latestFrame(page);
+        const ratio = await field("Poisson's ratio").inputValue();
+        const young = 2 * Number(await field("Young's modulus").inputValue());
+        await field("Young's modulus").fill(String(young));
+        await panel.locator(".button.wide").click();
+        await page.waitForFunction((g) => window.palpate.sceneView.graphs[0].frame?.generation > g, generation);
+        const { material } = await page.evaluate(() => window.palpate.sceneView.graphs[0].info.objects[0]);
+        assert(Math.abs(material.young / 1000 - young) < 1e-9 * young, `${material.young} Pa`);
+        assert((await field("Poisson's ratio").inputValue()) === ratio, "Poisson's ratio has changed");
+      }
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
     name: "a setting that the server refuses is taken back, with its reason at the field",
     standinOnly: true,
     async run(browser) {
