@@ -10,6 +10,7 @@ import { handCases } from "./hand.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
 import { NeedsServer } from "./servers.mjs";
+import { shareCases } from "./share.mjs";
 import { soundCases } from "./sound.mjs";
 import { touchCases } from "./touching.mjs";
 import { robustCases } from "./robust.mjs";
@@ -19,7 +20,7 @@ if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const filter = process.argv[2] ?? "";
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases, ...shareCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
