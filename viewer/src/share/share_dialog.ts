@@ -70,7 +70,7 @@ export class ShareDialog {
     if (frame === null) {
       return [section(title, element("p", { text: "This server lets no other page show it in a frame. The page without a server can be shown in one: cargo xtask web builds it." }))];
     }
-    const field = element("textarea", { class: "copied-text", text: frame, attributes: { readonly: true, rows: "3", spellcheck: "false", "aria-label": "HTML of a frame with this scene" } });
+    const field = element("textarea", { class: "copied-text", text: frame, attributes: { readonly: true, rows: "4", spellcheck: "false", "aria-label": "HTML of a frame with this scene" } });
     return [section(title, element("div", { class: "copy-row" }, field, this.copyButton("Copy HTML", field)))];
   }
 
@@ -83,8 +83,9 @@ export class ShareDialog {
       text: film === "running" ? "Stop and save" : "Record",
       on: {
         click: () => {
+          // After the closing, which moves the focus.
+          this.dialog.addEventListener("close", () => this.film(), { once: true });
           this.dialog.close();
-          this.film();
         },
       },
     });
