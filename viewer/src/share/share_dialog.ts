@@ -89,7 +89,7 @@ export class ShareDialog {
         },
       },
     });
-    const limit = `${LONGEST_S / 60} minutes or ${LARGEST_BYTES / 1e6} MB`;
+    const limit = `${LONGEST_S / 60}\u00a0minutes or ${LARGEST_BYTES / 1e6}\u00a0MB`;
     return [section(title, element("div", { class: "copy-row" }, element("p", { text: `The scene as you see it, with its forces and without the panels, up to ${limit}.` }), button))];
   }
 
