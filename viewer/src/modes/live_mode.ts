@@ -126,7 +126,7 @@ export class LiveMode implements PageMode {
       () => this.restart(),
     );
     this.sound = new SoundControl(send, notifications);
-    this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text), forgetLink);
+    this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
     this.share = new Share(sceneView, notifications, () => {
       const scene = this.requestedScene;
       return scene === null ? null : { scene, own: this.ownSettings.values };
@@ -230,7 +230,6 @@ export class LiveMode implements PageMode {
     this.layout.about.title = scene.about;
     document.title = `${scene.title} · palpate`;
     this.ownSettings.note(scene);
-    this.linked.scene(scene);
     const again = scene.id === null ? this.meshUpload.again(scene.title) : undefined;
     if (again !== undefined) this.scenes.addUpload(scene.title, again);
     this.scenes.setCurrent(scene.id, scene.title);
@@ -254,6 +253,8 @@ export class LiveMode implements PageMode {
         // The newest frame, also of a scene that is paused.
         this.stream();
         this.sceneView.fitCamera();
+        // Not before: what it changes replaces the data that was being loaded.
+        this.linked.scene(scene);
         const viewpoint = this.linked.takeViewpoint();
         if (viewpoint !== null) this.sceneView.orbit.look(viewpoint);
         this.plots.reset(scene);

@@ -29,7 +29,7 @@ export class LinkedStart {
     this.scenes = scenes;
   }
 
-  /** Gives the link's scene its settings, or asks for that scene. */
+  /** Gives a scene that has just been loaded the link's settings, or asks for the link's scene. */
   scene(scene: SceneMessage): void {
     if (this.phase === "over") return;
     const { link, leftOut } = this;
@@ -55,7 +55,7 @@ export class LinkedStart {
     if (leftOut.length > 0) this.notify(`Left out of the link: ${leftOut.join(" ")}`);
   }
 
-  /** Viewpoint of the link for the scene that has just been loaded; null from the second call on. */
+  /** Viewpoint of the link for that scene; null from the second call on. */
   takeViewpoint(): Viewpoint | null {
     const { viewpoint } = this;
     this.viewpoint = null;

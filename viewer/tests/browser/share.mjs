@@ -26,6 +26,10 @@ function withQuery(server, query) {
   return url.href;
 }
 
+/** Text of the first message that the page shows; messages go by themselves. */
+const notification = (page) =>
+  page.waitForFunction(() => document.querySelector(".notification span")?.textContent, null, { timeout: 60_000 }).then((text) => text.jsonValue());
+
 /** Value of a Physics field. */
 const field = (page, label) => page.locator(`#controls input[aria-label^="${label}"]`).inputValue().then(Number);
 
@@ -185,15 +189,13 @@ export const shareCases = [
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(withQuery(server, "?gravity=500&friction=0.25&step_ms=x&camera=1,2"));
-      await page.waitForSelector(".notification");
-      const text = (await page.textContent(".notification span")).replaceAll("\u00a0", " ");
+      const text = (await notification(page)).replaceAll("\u00a0", " ");
       assert(text === "Left out of the link: Gravity: from 0 to 100 m/s², not 500. Time step: from 0.2 to 10 ms. Camera: position and target as six numbers of metres.", text);
       await waitForScene(page);
       await waitForField(page, "Friction", 0.25);
       assert((await field(page, "Gravity")) < 10, "gravity is changed");
       const lost = await browser.page(withQuery(server, "?scene=moon&gravity=3"));
-      await lost.waitForSelector(".notification");
-      assert((await lost.textContent(".notification span")).startsWith('The scene "moon" of the link is not here'), "it does not say that there is no moon");
+      assert((await notification(lost)).startsWith('The scene "moon" of the link is not here'), "it does not say that there is no moon");
       await waitForScene(lost);
       assertNoConsoleErrors(page);
       assertNoConsoleErrors(lost);
