@@ -65,7 +65,7 @@ export class Film {
     this.context = context;
     this.recorder = new MediaRecorder(this.picture.captureStream(FRAME_RATE), { mimeType: type, videoBitsPerSecond: BITS_PER_SECOND });
     this.recorder.ondataavailable = ({ data }) => this.keep(data);
-    this.recorder.onerror = () => this.end("the browser's encoder failed");
+    // Also after an error of the encoder, with what there is.
     this.recorder.onstop = () => void this.finish();
     this.recorder.start(SLICE_MS);
     sceneView.drawn = () => this.addFrame();

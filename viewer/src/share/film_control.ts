@@ -23,7 +23,7 @@ export function filmName(scene: string, ending: string, date: Date): string {
 
 export class FilmControl {
   private readonly time = element("span", { class: "time", role: "timer", attributes: { "aria-label": "Length of the film" } });
-  private readonly button = element("button", { class: "button", type: "button", text: "Stop", on: { click: () => this.film?.stop() } });
+  private readonly button = element("button", { class: "button", type: "button", text: "Stop", title: "End the film and save it", on: { click: () => this.film?.stop() } });
   readonly box = element("div", { class: "film", role: "group", attributes: { "aria-label": "Film" } }, element("i", { attributes: { "aria-hidden": "true" } }), element("span", { text: "Recording" }), this.time, this.button);
   /** Type of the films; null if this browser records none. */
   readonly type = filmType();

@@ -214,7 +214,18 @@ export const shareCases = [
       assert(!dialog.includes(token), "the token is in the dialog");
       assert(dialog.includes("asks for a token"), "the dialog says nothing of the token");
       const { data, width, height } = await pixelsOf(page);
-      assert(jsQR(data, width, height)?.data === (await page.inputValue(LINK)), "the QR code says something else");
+      const link = await page.inputValue(LINK);
+      assert(jsQR(data, width, height)?.data === link, "the QR code says something else");
+
+      // An address that is not secure has no clipboard of its own.
+      await page.evaluate(() => {
+        Object.defineProperty(navigator, "clipboard", { value: undefined });
+        const selected = () => document.activeElement.value.slice(document.activeElement.selectionStart, document.activeElement.selectionEnd);
+        document.addEventListener("copy", () => (window.copied = selected()));
+      });
+      await page.click(".share-dialog .primary");
+      await page.waitForFunction(() => document.querySelector(".share-dialog [role=status]").textContent === "Copied");
+      assert((await page.evaluate(() => window.copied)) === link, "the link is not copied without a clipboard");
       assertNoConsoleErrors(page);
     },
   },
@@ -323,6 +334,18 @@ export const shareCases = [
       assert(!(await page.isVisible(".film")), "the box stays");
       await page.waitForSelector(`text=${download.suggestedFilename()}`);
       assert(await page.evaluate(() => window.palpate.sceneView.drawn === null), "frames are still taken");
+
+      // One that gets too long ends by itself.
+      await page.keyboard.press("s");
+      await page.click(RECORD);
+      await page.waitForFunction(() => document.querySelector(".film:not([hidden]) .time")?.textContent >= "0:01");
+      const ending = page.waitForEvent("download");
+      await page.evaluate(() => {
+        const now = performance.now.bind(performance);
+        performance.now = () => now() + 180_000;
+      });
+      await ending;
+      await page.waitForSelector("text=The film has its largest length");
       assertNoConsoleErrors(page);
 
       // Played by a page without the server's policy, which has no films.
@@ -346,6 +369,7 @@ export const shareCases = [
         const ratio = video.videoWidth / 800;
         return { duration: length, colours: seen.size, patch: [...context.getImageData(Math.round(video.videoWidth / 2), Math.round(28 * ratio), 1, 1).data] };
       }, film.toString("base64"));
+      await screenshot(player, "share-film-played");
       assert(duration > 1 && duration < 600, `the film has a length of ${duration} s`);
       assert(colours > 20, `a picture of the film has ${colours} colours`);
       assert(patch[0] > 200 && patch[1] < 80 && patch[2] > 200, `the overlay is not in the film: ${patch}`);
