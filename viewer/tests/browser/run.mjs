@@ -24,9 +24,13 @@ const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...
 
 const browser = await Browser.open();
 let failed = 0;
-for (const { name, run, standinOnly, realOnly, serverOnly } of cases) {
+for (const { name, run, standinOnly, realOnly, serverOnly, serverlessOnly } of cases) {
   if (serverless && serverOnly) {
     console.log(`skipped  ${name} (needs a server)`);
+    continue;
+  }
+  if (!serverless && serverlessOnly) {
+    console.log(`skipped  ${name} (needs the page without a server)`);
     continue;
   }
   if (real ? standinOnly : realOnly) {

@@ -257,9 +257,8 @@ export const shareCases = [
   },
   {
     name: "share: the page without a server works in a frame of another origin, also with a timer alone",
-    realOnly: true,
+    serverlessOnly: true,
     async run(browser) {
-      if (!serverless) return;
       const server = browser.keep(await start({ scene: "bounce" }));
       const page = await browser.page(server.url);
       await waitForScene(page);
