@@ -23,10 +23,14 @@ import { Pace, paceText } from "../ui/pace";
 import { ScaleLock } from "../ui/scale_lock";
 import type { SoundBlock } from "../sound/sound_block";
 import { SoundControl } from "../sound/sound_control";
+import { withoutLink } from "../share/link";
+import { LinkedStart } from "../share/linked_start";
+import { Share } from "../share/share";
 import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
 import type { SceneView } from "../rendering/scene_view";
+import { runsInWorker } from "../protocol/worker_connection";
 import { GamepadPointers } from "../interaction/gamepad_pointers";
 import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
@@ -37,6 +41,14 @@ import type { PageMode } from "./page_mode";
 const LOST_INTERVAL_MS = 700;
 /** Message at a press while the scene is paused. */
 const PAUSED = "Paused: the press acts when time goes on (Space), or step by step (.)";
+
+/** Takes the link out of the address of a server's page: reloaded, it shows what the server shows then. A worker begins anew with the link. */
+function forgetLink(): void {
+  if (runsInWorker()) return;
+  const url = new URL(window.location.href);
+  url.search = withoutLink(url.search);
+  if (url.href !== window.location.href) history.replaceState(history.state, "", url);
+}
 
 /** Page mode of a running scene. */
 export class LiveMode implements PageMode {
@@ -63,6 +75,8 @@ export class LiveMode implements PageMode {
   private readonly lostObjects: LostObjects;
   private lostCheckedAt = 0;
   private readonly ownSettings = new OwnSettings();
+  private readonly linked: LinkedStart;
+  private readonly share: Share;
   private readonly loading = element("div", { class: "loading", role: "status" });
   private loadAbort: AbortController | null = null;
   private requestedScene: SceneMessage | null = null;
@@ -112,7 +126,15 @@ export class LiveMode implements PageMode {
       () => this.restart(),
     );
     this.sound = new SoundControl(send, notifications);
-    this.scenes = new ScenesPanel((id) => send({ type: "open_scene", scene: id }));
+    this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
+    this.share = new Share(sceneView, notifications, () => {
+      const scene = this.requestedScene;
+      return scene === null ? null : { scene, own: this.ownSettings.values };
+    });
+    this.scenes = new ScenesPanel((id) => {
+      this.linked.end();
+      send({ type: "open_scene", scene: id });
+    });
     this.physics = new PhysicsPanel(send);
     notifications.onError = (text) => this.physics.refused(text);
     this.material = new MaterialPanel(send);
@@ -123,13 +145,13 @@ export class LiveMode implements PageMode {
     this.paceChip.hidden = true;
     this.loading.hidden = true;
     layout.chips.append(this.paceChip, this.viewers);
-    layout.toolbar.append(...this.toolbar.parts, ...this.sound.parts);
-    layout.overlayTop.append(this.forceReadout.box, this.hint.box, this.jobs.box);
+    layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts);
+    layout.overlayTop.append(this.share.film.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
     layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section);
     layout.measurements.append(...this.plots.sections, this.timing.section, this.accuracy.section);
-    layout.page.append(meshUpload.dialog);
+    layout.page.append(meshUpload.dialog, this.share.element);
     sceneView.drawOverlay = (context, view) => {
       this.keyboard.draw(context, view);
       this.gamepads.draw(context, view, performance.now());
@@ -162,6 +184,7 @@ export class LiveMode implements PageMode {
   hello(hello: Hello): void {
     this.suspend();
     this.scenes.setScenes(hello.scenes);
+    this.linked.hello(hello.scenes);
     this.meshUpload.viewer = hello.viewer;
     this.meshUpload.section.hidden = !hello.records;
     this.material.records = hello.records;
@@ -185,6 +208,7 @@ export class LiveMode implements PageMode {
       this.ghost.interrupt();
       this.ghost.resume();
     }
+    this.share.film.visibilityChanged();
     this.stream();
   }
 
@@ -230,6 +254,10 @@ export class LiveMode implements PageMode {
         // The newest frame, also of a scene that is paused.
         this.stream();
         this.sceneView.fitCamera();
+        // Not before: what it changes replaces the data that was being loaded.
+        this.linked.scene(scene);
+        const viewpoint = this.linked.takeViewpoint();
+        if (viewpoint !== null) this.sceneView.orbit.look(viewpoint);
         this.plots.reset(scene);
         this.frame = null;
         this.showLoading(null);
@@ -305,6 +333,7 @@ export class LiveMode implements PageMode {
     this.keyboard.animate(now);
     this.gamepads.animate(now);
     this.touches.animate(now);
+    this.share.film.animate();
     this.ghost.animate(now, { free: this.isBuiltIn() && !this.toolbar.isPaused && !this.isTouched() });
     const graph = this.sceneView.graphs[0];
     if (this.frameIsNew && this.frame !== null && graph !== undefined) {
@@ -355,6 +384,9 @@ export class LiveMode implements PageMode {
         return true;
       case "r":
         this.toolbar.reset();
+        return true;
+      case "s":
+        this.share.open();
         return true;
       case "[":
         this.toolbar.changeSpeed(-1);

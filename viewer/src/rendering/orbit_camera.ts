@@ -11,6 +11,12 @@ const FIT_MARGIN = 1.65;
 const MAX_ELEVATION = 1.5;
 const MIN_ELEVATION_ABOVE_FLOOR = 0.03;
 
+/** Camera position and target [m, world]. */
+export interface Viewpoint {
+  from: Vector;
+  to: Vector;
+}
+
 export class OrbitCamera {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
   readonly up = new Vector3(0, 1, 0);
@@ -74,10 +80,30 @@ export class OrbitCamera {
     this.update();
   }
 
-  private fitDistance(): number {
+  private fitDistance(aspect = this.camera.aspect): number {
     const half = (FIELD_OF_VIEW * Math.PI) / 360;
-    const across = Math.atan(Math.tan(half) * Math.min(1, this.camera.aspect));
+    const across = Math.atan(Math.tan(half) * Math.min(1, aspect));
     return (this.framed / Math.sin(across)) * FIT_MARGIN;
+  }
+
+  /** Whether the view is that of `reset`. */
+  get isHome(): boolean {
+    const fit = this.fitDistance();
+    return this.target.equals(this.center) && this.azimuth === DEFAULT_AZIMUTH && this.elevation === DEFAULT_ELEVATION && Math.abs(this.distance - fit) < 1e-6 * fit;
+  }
+
+  /** Viewpoint from which a window at least as wide as high shows what this one shows. */
+  get viewpoint(): Viewpoint {
+    const share = this.fitDistance(1) / this.fitDistance();
+    const from = this.camera.position.clone().sub(this.target).multiplyScalar(share).add(this.target);
+    return { from: from.toArray(), to: this.target.toArray() };
+  }
+
+  /** Shows what a window at least as wide as high shows from a viewpoint, within the limits of zoom and elevation. */
+  look({ from, to }: Viewpoint): void {
+    this.lookFrom(from, to);
+    this.zoom(this.fitDistance() / this.fitDistance(1));
+    this.rotate(0, 0);
   }
 
   resize(aspect: number): void {

@@ -47,6 +47,8 @@ export class SceneView {
   showsTime = false;
   /** Hook that draws pointer cursors into the overlay. */
   drawOverlay: ((context: CanvasRenderingContext2D, viewport: Rectangle) => void) | null = null;
+  /** Hook that is called when both canvases hold a new picture; the canvas keeps its own only until the hook returns. */
+  drawn: (() => void) | null = null;
   private readonly context: CanvasRenderingContext2D;
   private size: ViewSize = { width: 1, height: 1, ratio: 1 };
   private readonly colourScales = new ColourScales();
@@ -215,6 +217,7 @@ export class SceneView {
       this.scales.displacement.update(Math.max(0, ...estimates));
     }
     this.graphs.forEach((graph, i) => this.drawScene(graph, i));
+    this.drawn?.();
     this.updateRange(now);
   }
 

@@ -2,9 +2,9 @@
 
 import type { SceneMessage, ClientMessage } from "../protocol/messages";
 import type { Vector } from "../protocol/frame";
-import { physicsOf } from "./physics_settings";
+import { directionOf, physicsOf, SETTING_FIELDS, type SettingField } from "./physics_settings";
 import { section } from "./elements";
-import { numberField, type Bounds, type NumberField } from "./number_field";
+import { numberField, type NumberField } from "./number_field";
 
 export class PhysicsPanel {
   readonly section: HTMLElement;
@@ -19,19 +19,18 @@ export class PhysicsPanel {
   private unanswered: NumberField | null = null;
 
   constructor(private readonly send: (message: ClientMessage) => void) {
-    this.gravity = this.field("Gravity", "m/s²", "Gravitational acceleration; 9.81 on Earth", { min: 0, max: 100, step: "any" }, (magnitude) => ({
+    this.gravity = this.field(SETTING_FIELDS.gravity, "Gravitational acceleration; 9.81 on Earth", (magnitude) => ({
       gravity: this.direction.map((x) => x * magnitude) as unknown as Vector,
     }));
-    this.friction = this.field("Friction", "", "Coulomb friction coefficient of all contacts: 0 is frictionless, 1 is like rubber", { min: 0, max: 5, step: "any" }, (friction) => ({ friction }));
+    this.friction = this.field(SETTING_FIELDS.friction, "Coulomb friction coefficient of all contacts: 0 is frictionless, 1 is like rubber", (friction) => ({ friction }));
     const coupling = () => ({ coupling: { stiffness: this.stiffness.value, damping: this.damping.value } });
-    this.stiffness = this.field("Coupling stiffness", "N/m", "Spring between your hand (interface point) and the proxy: a stiffer coupling pushes harder", { min: 0.1, max: 1e5, step: "any" }, coupling);
-    this.damping = this.field("Coupling damping", "N·s/m", "Damper parallel to the coupling spring", { min: 0, max: 1e4, step: "any" }, coupling);
-    // The server's range.
-    this.step = this.field("Time step", "ms", "Step of the simulation; 1 ms is 1000 steps per second", { min: 0.2, max: 10, step: "any" }, (step) => ({ step: step / 1000 }));
+    this.stiffness = this.field(SETTING_FIELDS.stiffness, "Spring between your hand (interface point) and the proxy: a stiffer coupling pushes harder", coupling);
+    this.damping = this.field(SETTING_FIELDS.damping, "Damper parallel to the coupling spring", coupling);
+    this.step = this.field(SETTING_FIELDS.step, "Step of the simulation; 1 ms is 1000 steps per second", (step) => ({ step: step / 1000 }));
     this.section = section("Physics", true, this.gravity.row, this.friction.row, this.stiffness.row, this.damping.row, this.step.row);
   }
 
-  private field(label: string, unit: string, tooltip: string, bounds: Bounds, change: (value: number) => Omit<Extract<ClientMessage, { type: "set_physics" }>, "type">): NumberField {
+  private field({ label, unit, bounds }: SettingField, tooltip: string, change: (value: number) => Omit<Extract<ClientMessage, { type: "set_physics" }>, "type">): NumberField {
     const field = numberField(label, unit, tooltip, bounds, (value) => {
       this.unanswered = field;
       this.send({ type: "set_physics", ...change(value) });
@@ -56,9 +55,8 @@ export class PhysicsPanel {
   }
 
   private show(scene: SceneMessage): void {
-    const magnitude = Math.hypot(...scene.gravity);
-    this.direction = magnitude > 0 ? (scene.gravity.map((x) => x / magnitude) as unknown as Vector) : [0, -1, 0];
-    this.gravity.value = magnitude;
+    this.direction = directionOf(scene.gravity);
+    this.gravity.value = Math.hypot(...scene.gravity);
     this.step.value = 1000 * scene.step_s;
     const { friction, coupling } = physicsOf(scene);
     if (friction !== null) this.friction.value = friction;

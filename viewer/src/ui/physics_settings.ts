@@ -1,7 +1,32 @@
-// Physics settings of a scene, and those that it came with, to which Reset goes back.
+// Physics settings of a scene, their fields, and those that it came with, to which Reset goes back.
 
 import type { ClientMessage, Coupling, SceneMessage } from "../protocol/messages";
 import type { Vector } from "../protocol/frame";
+import type { Bounds } from "./number_field";
+
+type SetPhysics = Extract<ClientMessage, { type: "set_physics" }>;
+
+/** Name, unit and range of a setting, as a field shows it. */
+export interface SettingField {
+  label: string;
+  unit: string;
+  bounds: Bounds;
+}
+
+/** Fields of the settings: magnitude of gravity, friction coefficient, virtual coupling, time step. */
+export const SETTING_FIELDS = {
+  gravity: { label: "Gravity", unit: "m/s²", bounds: { min: 0, max: 100, step: "any" } },
+  friction: { label: "Friction", unit: "", bounds: { min: 0, max: 5, step: "any" } },
+  stiffness: { label: "Coupling stiffness", unit: "N/m", bounds: { min: 0.1, max: 1e5, step: "any" } },
+  damping: { label: "Coupling damping", unit: "N·s/m", bounds: { min: 0, max: 1e4, step: "any" } },
+  // The server's range.
+  step: { label: "Time step", unit: "ms", bounds: { min: 0.2, max: 10, step: "any" } },
+} as const satisfies Record<string, SettingField>;
+
+export type SettingName = keyof typeof SETTING_FIELDS;
+
+/** Values of the fields, in their units. */
+export type SettingValues = Partial<Record<SettingName, number>>;
 
 /** Settings that the page shows and changes. */
 export interface PhysicsSettings {
@@ -18,6 +43,41 @@ export function physicsOf(scene: SceneMessage): PhysicsSettings {
   return { gravity: scene.gravity, step: scene.step_s, friction, coupling: pointer?.coupling ?? null };
 }
 
+/** Direction of gravity; downwards in a scene without. */
+export function directionOf(gravity: Vector): Vector {
+  const magnitude = Math.hypot(...gravity);
+  return magnitude > 0 ? [gravity[0] / magnitude, gravity[1] / magnitude, gravity[2] / magnitude] : [0, -1, 0];
+}
+
+/** Values of the fields that a scene has. */
+export function valuesOf({ gravity, step, friction, coupling }: PhysicsSettings): SettingValues {
+  return { gravity: Math.hypot(...gravity), step: 1000 * step, ...(friction === null ? {} : { friction }), ...coupling };
+}
+
+/** Names of the values that differ. */
+export function differences(from: SettingValues, to: SettingValues): SettingName[] {
+  return (Object.keys(SETTING_FIELDS) as SettingName[]).filter((name) => {
+    const [a, b] = [from[name], to[name]];
+    return a !== undefined && b !== undefined && !close([a], [b]);
+  });
+}
+
+/** Message that gives a scene the values that differ from its present ones; null if none does. */
+export function changeTo(values: SettingValues, now: PhysicsSettings): SetPhysics | null {
+  const changed = new Set(differences(valuesOf(now), values));
+  if (changed.size === 0) return null;
+  const { gravity, friction, step } = values;
+  const [x, y, z] = directionOf(now.gravity);
+  const message: SetPhysics = { type: "set_physics" };
+  if (gravity !== undefined && changed.has("gravity")) message.gravity = [gravity * x, gravity * y, gravity * z];
+  if (friction !== undefined && changed.has("friction")) message.friction = friction;
+  if (step !== undefined && changed.has("step")) message.step = step / 1000;
+  if (now.coupling !== null && (changed.has("stiffness") || changed.has("damping"))) {
+    message.coupling = { stiffness: values.stiffness ?? now.coupling.stiffness, damping: values.damping ?? now.coupling.damping };
+  }
+  return message;
+}
+
 /** Settings that scenes had when they were opened. */
 export class OwnSettings {
   private readonly known = new Map<string, PhysicsSettings>();
@@ -30,8 +90,14 @@ export class OwnSettings {
     this.current = key;
   }
 
+  /** Values of the noted scene's own settings. */
+  get values(): SettingValues {
+    const own = this.current === null ? undefined : this.known.get(this.current);
+    return own === undefined ? {} : valuesOf(own);
+  }
+
   /** Message that brings the noted scene back to its own settings; null if it has them. */
-  restoration(scene: SceneMessage): Extract<ClientMessage, { type: "set_physics" }> | null {
+  restoration(scene: SceneMessage): SetPhysics | null {
     const own = this.current === null ? undefined : this.known.get(this.current);
     if (own === undefined) return null;
     const now = physicsOf(scene);

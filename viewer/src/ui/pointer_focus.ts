@@ -12,9 +12,9 @@ export function releaseFocusAfterPointer(page: HTMLElement): void {
   };
   page.addEventListener("pointerdown", () => (byPointer = true), { capture: true });
   page.addEventListener("keydown", () => (byPointer = false), { capture: true });
-  // After the click, which gives a label's control the focus.
+  // After the click, which gives a label's control the focus. A dialog that it opened keeps the focus: keys act in it.
   document.addEventListener("click", () => {
-    if (byPointer) setTimeout(() => release((focused) => !focused.matches(KEEPS_FOCUS)), 0);
+    if (byPointer) setTimeout(() => release((focused) => !focused.matches(KEEPS_FOCUS) && focused.closest("dialog[open]") === null), 0);
   });
   page.addEventListener("change", (event) => {
     if (event.target instanceof HTMLSelectElement && byPointer) release((focused) => focused === event.target);

@@ -11,6 +11,7 @@ import { handCases } from "./hand.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
 import { NeedsServer } from "./servers.mjs";
+import { shareCases } from "./share.mjs";
 import { soundCases } from "./sound.mjs";
 import { touchCases } from "./touching.mjs";
 import { robustCases } from "./robust.mjs";
@@ -21,14 +22,18 @@ const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases, ...shareCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
-for (const { name, run, standinOnly, realOnly, serverOnly } of cases) {
+for (const { name, run, standinOnly, realOnly, serverOnly, serverlessOnly } of cases) {
   if (standinOnlyRun && !standinOnly) continue;
   if (serverless && serverOnly) {
     console.log(`skipped  ${name} (needs a server)`);
+    continue;
+  }
+  if (!serverless && serverlessOnly) {
+    console.log(`skipped  ${name} (needs the page without a server)`);
     continue;
   }
   if (real ? standinOnly : realOnly) {
