@@ -74,8 +74,7 @@ fn module() -> Result<Option<PathBuf>, String> {
     let mut cargo = cargo_command();
     cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
     if build_std(&mut cargo, "std,panic_abort")? {
-        // Not std's smaller sorting algorithms: other orders of equals give other bits than natively.
-        cargo.env("RUSTFLAGS", SMALL_FLAGS.join(" "));
+        cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS.join(" "));
     } else if is_installed(TARGET)? {
         cargo.env("RUSTFLAGS", FLAGS);
     } else {

@@ -67,6 +67,8 @@ struct Place {
     /// The other side.
     against: Collider,
     location: ContactLocation,
+    /// Number among those of the step.
+    order: usize,
 }
 
 /// Contact points that a step releases and needs, for changes of the level of detail; the buffers are made once.
@@ -137,7 +139,8 @@ pub(crate) fn match_contacts(
         if !persists {
             let mut release = |object: usize, against: Collider, slot: usize| {
                 let location = bodies.states[object].points.of(slot).location;
-                level_changes.released.push(Place { object, against, location });
+                let order = level_changes.released.len();
+                level_changes.released.push(Place { object, against, location, order });
                 bodies.release(object, slot);
             };
             release(contact.object(), contact.id.collider, contact.slot);
@@ -154,13 +157,15 @@ pub(crate) fn match_contacts(
                 continue;
             }
             let (object, against) = (candidate.id.object, candidate.id.collider);
-            level_changes.needed.push(Place { object, against, location: candidate.location });
+            let order = level_changes.needed.len();
+            level_changes.needed.push(Place { object, against, location: candidate.location, order });
             if let CandidateSide::Object { number, location } = candidate.other {
                 let against = Collider::Object(object);
-                level_changes.needed.push(Place { object: number, against, location });
+                let order = level_changes.needed.len();
+                level_changes.needed.push(Place { object: number, against, location, order });
             }
         }
-        level_changes.released.sort_unstable_by_key(|place| (place.object, place.against));
+        level_changes.released.sort_unstable_by_key(|place| (place.object, place.against, place.order));
         level_changes.apply(&mut bodies);
     }
     spare.clear();

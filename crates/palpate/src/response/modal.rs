@@ -454,7 +454,8 @@ impl SampledModes {
             for SpringForce { location, force, .. } in &deformed.patches {
                 body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
             }
-            loads.sort_unstable_by_key(|(node, _)| *node);
+            // Stable: the order of a node's forces is that of their sum.
+            loads.sort_by_key(|(node, _)| *node);
             loads.dedup_by(|next, kept| {
                 let same = next.0 == kept.0;
                 if same {

@@ -9,11 +9,12 @@
 
 use super::{accepts_gravity, collision_context, net_forces, predict_object, usable, usable_base};
 use crate::collision::OtherSide;
-use crate::io::{DeviceMode, Input};
+use crate::io::{ContactOutput, DeviceMode, Input};
 use crate::object::{Object, ObjectState};
 use crate::scene::Model;
 use crate::spatial::Twist;
 use crate::state::State;
+use core::cmp::Ordering;
 use glam::DVec3;
 
 /// Speed of still objects, as a share of their radius per second: above what contact samples at rest move by, below what one sees or feels.
@@ -117,9 +118,16 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
         }
         is_awake
     });
-    output
-        .contacts
-        .sort_unstable_by_key(|contact| (sleepers.is_awake(contact.object), contact.against, contact.object));
+    // The order, in which forces are added up, is the same whatever the sorting algorithm: those that are equal have the same force.
+    let sides =
+        |contact: &ContactOutput| (sleepers.is_awake(contact.object), contact.against, contact.object);
+    output.contacts.sort_unstable_by(|a, b| {
+        let axes = || {
+            let of = |a: DVec3, b: DVec3| [0, 1, 2].map(|axis| a[axis].total_cmp(&b[axis]));
+            of(a.point, b.point).into_iter().chain(of(a.force, b.force))
+        };
+        sides(a).cmp(&sides(b)).then_with(|| axes().fold(Ordering::Equal, Ordering::then))
+    });
     resting.outputs = output.contacts.partition_point(|contact| !sleepers.is_awake(contact.object));
     output.contacts[..resting.outputs].iter_mut().for_each(|contact| contact.slip_speed = 0.0);
     net_forces::update_resting(resting, &output.contacts, obstacles);

@@ -206,7 +206,8 @@ impl SphereTree {
             let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or_default();
             let half = count / 2;
             let key = |t: &u32| centres[*t as usize][axis];
-            below.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+            // Sorted, so that the order, in which centres are summed, is the same whatever the algorithm.
+            below.sort_unstable_by(|a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
             self.build(surface, centres, first, half);
             self.nodes[index].second = self.nodes.len() as u32;
             self.build(surface, centres, first + half, count - half);
