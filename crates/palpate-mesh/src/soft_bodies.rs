@@ -43,7 +43,7 @@ impl Default for Liver {
             above: 0.034,
             below: 0.012,
             half_width: 0.052,
-            lump: DVec3::new(0.025, 0.014, 0.018),
+            lump: DVec3::new(0.03, 0.012, 0.032),
             lump_radius: 0.012,
             cell_size: 0.01,
         }
@@ -256,7 +256,11 @@ mod tests {
             assert!((1.2..1.6).contains(&all), "{cell_size}: {all}");
             let flat = mesh.groups[0].nodes.len() as f64 * cell_size * cell_size;
             let ellipse = 0.5 * TAU * liver.half_length * liver.half_width;
-            println!("{cell_size}: {} nodes, volume {all:.3}, lump {lump:.3}, flat {:.3}", mesh.nodes.len(), flat / ellipse);
+            println!(
+                "{cell_size}: {} nodes, volume {all:.3}, lump {lump:.3}, flat {:.3}",
+                mesh.nodes.len(),
+                flat / ellipse
+            );
             assert!((0.5..1.5).contains(&(flat / ellipse)), "{cell_size}: {}", flat / ellipse);
         }
     }
@@ -271,7 +275,11 @@ mod tests {
             assert!(mesh.warnings.is_empty(), "{:?}", mesh.warnings);
             assert_eq!(mesh.tets.len() as u32, 18 * rings.pow(3));
             let corners = 1 + 3 * rings * (rings + 1);
-            assert_eq!(mesh.groups[0].nodes.len() as u32, corners + 6 * rings, "with mid-edge nodes of the rim");
+            assert_eq!(
+                mesh.groups[0].nodes.len() as u32,
+                corners + 6 * rings,
+                "with mid-edge nodes of the rim"
+            );
             // On the wall: the radius is that of the height.
             for middle in &mesh.mid_edge_nodes {
                 let at = mesh.nodes[middle.node as usize];
