@@ -64,9 +64,9 @@ fn run(
 /// Force [N] of a finger that comes from above at x and z [m], 4 mm below the place where it has met the body.
 fn force_at_depth(opened: &OpenedScene, x: f64, z: f64) -> f64 {
     const DEPTH: f64 = 0.004;
-    let hand = |time: f64| Some(DVec3::new(x, 0.07 - 0.01 * time, z));
+    let hand = |time: f64| Some(DVec3::new(x, 0.058 - 0.012 * time, z));
     let (mut met, mut force) = (None, None);
-    run(opened, 6.0, hand, |_, state| {
+    run(opened, 4.0, hand, |_, state| {
         let finger = &state.output().devices[0];
         if finger.force_on_hand.y > 1e-4 && met.is_none() {
             met = Some(finger.proxy.y);
@@ -74,7 +74,7 @@ fn force_at_depth(opened: &OpenedScene, x: f64, z: f64) -> f64 {
         force = met.filter(|met| met - finger.proxy.y >= DEPTH).map(|_| finger.force_on_hand.y);
         force.is_some()
     });
-    force.expect("a finger that goes 4 mm deep")
+    force.unwrap_or_else(|| panic!("a finger that goes 4 mm deep, met at {met:?}"))
 }
 
 /// Scene of the liver with cells of a size [m], and a lump of a stiffness [Pa].

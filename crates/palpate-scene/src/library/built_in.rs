@@ -220,7 +220,7 @@ position = [0.22, 0.02, 0.0]
 orientation = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
 [[plane]]
 name = "left-bank"
-point = [-0.24, 0.0, 0.0]
+point = [-0.005, 0.0, 0.0]
 normal = [0.5, 0.866, 0.0]
 friction = 0.5
 [[plane]]
@@ -230,12 +230,12 @@ normal = [-0.5, 0.866, 0.0]
 friction = 0.5
 [[plane]]
 name = "front-bank"
-point = [0.0, 0.0, 0.16]
+point = [0.0, 0.0, 0.1]
 normal = [0.0, 0.866, -0.5]
 friction = 0.5
 [[plane]]
 name = "back-bank"
-point = [0.0, 0.0, -0.16]
+point = [0.0, 0.0, -0.1]
 normal = [0.0, 0.866, 0.5]
 friction = 0.5
 "#,

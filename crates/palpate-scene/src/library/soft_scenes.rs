@@ -14,7 +14,7 @@ gravity = [0.0, -9.81, 0.0]
 [[object]]
 name = "liver"
 recording = "@liver"
-position = [0.00827, 0.01896, 0.00435]
+position = [0.00827, 0.0191, 0.00435]
 start = "equilibrium"
 [[plane]]
 name = "table"
