@@ -125,12 +125,9 @@ fn run(built_in: &BuiltIn, with_pointers: bool, opened: &OpenedScene) -> Vec<Che
     let mut input = scene.input_at(0.0);
     for number in 1..=steps {
         let time = number as f64 * h;
-        for (slot, device) in scene.devices.iter().enumerate() {
-            input.devices[slot] = if device.pointer {
-                DeviceInput::inactive()
-            } else {
-                DeviceInput { position: device.position_at(time), mode: device.mode }
-            };
+        scene.follow_paths(time, &mut input);
+        for (slot, _) in scene.devices.iter().enumerate().filter(|(_, device)| device.pointer) {
+            input.devices[slot] = DeviceInput::inactive();
         }
         if time < active_s {
             for (slot, pointer) in &mut pointers {
