@@ -85,26 +85,26 @@ friction = 0.9
 name = "floor"
 point = [0.0, 0.0, 0.0]
 normal = [0.0, 1.0, 0.0]
-friction = 1.0
+friction = 0.1
 [[plane]]
 name = "left-bank"
 point = [-0.036, 0.0, 0.0]
-normal = [0.2588, 0.9659, 0.0]
+normal = [0.342, 0.9397, 0.0]
 friction = 0.1
 [[plane]]
 name = "right-bank"
 point = [0.036, 0.0, 0.0]
-normal = [-0.2588, 0.9659, 0.0]
+normal = [-0.342, 0.9397, 0.0]
 friction = 0.1
 [[plane]]
 name = "front-bank"
 point = [0.0, 0.0, 0.036]
-normal = [0.0, 0.9659, -0.2588]
+normal = [0.0, 0.9397, -0.342]
 friction = 0.1
 [[plane]]
 name = "back-bank"
 point = [0.0, 0.0, -0.036]
-normal = [0.0, 0.9659, 0.2588]
+normal = [0.0, 0.9397, 0.342]
 friction = 0.1
 "#,
     paths: &[("left.csv", |t| gripping(-1.0, t)), ("right.csv", |t| gripping(1.0, t))],
@@ -118,9 +118,10 @@ const FINGER_HEIGHT: f64 = 0.056;
 
 /// Middle of the finger on one side (−1 left, 1 right): down, closed, up with the cube, down again, open, up.
 fn gripping(side: f64, t: f64) -> [f64; 3] {
-    let away = 0.012 - 0.019 * between(t, 1.0, 1.7) * between(t, 7.0, 6.3);
-    let above = 0.06 * (1.0 - between(t, 0.0, 0.9) * between(t, 8.0, 7.1));
-    let lift = 0.06 * between(t, 2.0, 3.2) * between(t, 6.1, 4.9);
+    let away = 0.012 - 0.019 * between(t, 1.5, 2.1) * between(t, 6.6, 6.0);
+    // Up for long enough that a cube beside them slides back.
+    let above = 0.06 * (1.0 - between(t, 0.7, 1.4) * between(t, 7.3, 6.7));
+    let lift = 0.06 * between(t, 2.3, 3.3) * between(t, 5.9, 4.9);
     [side * (HALF_CUBE + HALF_FINGER + away), FINGER_HEIGHT + above + lift, 0.0]
 }
 
