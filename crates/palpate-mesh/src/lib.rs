@@ -4,7 +4,7 @@
 //! - [`Mesh`]: tetrahedra with regions and groups; [`Mesh::checked`] holds it to be one sound body.
 //! - [`SurfaceMesh`]: triangles; [`tetrahedralise`] fills them with tetrahedra.
 //! - [`Mesh::to_vtk`], [`Mesh::to_gmsh`]: files for other programs.
-//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`], [`ArchedBar`], [`TuningFork`], [`Bell`]: generated meshes.
+//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`], [`ArchedBar`], [`TuningFork`], [`Bell`], [`Liver`], [`Jelly`]: generated meshes.
 #![doc = "\n"]
 #![doc = include_str!("../README.md")]
 #![deny(missing_docs)]
@@ -36,6 +36,7 @@ mod report;
 mod rows;
 mod scan;
 mod sets;
+mod soft_bodies;
 mod stl;
 mod surface_mesh;
 mod tetgen;
@@ -56,5 +57,6 @@ pub use read::{MeshFile, read_body, read_surface};
 pub use regular_file::{open_regular_file, read_regular_file, read_regular_text};
 pub use repair::{MergeNodes, PieceChoice, Repair};
 pub use report::{ANGLE_BIN_DEG, MeshReport, PieceReport, RegionReport, SurfaceReport, VolumeReport};
+pub use soft_bodies::{Jelly, Liver};
 pub use surface_mesh::{SurfaceFile, SurfaceMesh};
 pub use volume_mesh::{Mesh, MidEdgeNode, NodeGroup, Region, RegionMaterial, VolumeFile};

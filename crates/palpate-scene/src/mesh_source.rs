@@ -1,10 +1,10 @@
-//! Mesh sources: primitives as text (`box:…`, `sphere:…`, `instrument:…`) and mesh files.
+//! Mesh sources: primitives as text (`box:…`, `sphere:…`, `instrument:…`, `body:…`) and mesh files.
 
 use crate::error::{SceneError, SceneErrorKind};
 use palpate_fem::Progress;
 use palpate_mesh::{
-    ArchedBar, Bell, CellSplit, Files, Mesh, MeshError, MeshFile, MeshingParameters, SurfaceMesh, TuningFork,
-    ball_mesh, split_box_mesh,
+    ArchedBar, Bell, CellSplit, Files, Jelly, Liver, Mesh, MeshError, MeshFile, MeshingParameters,
+    SurfaceMesh, TuningFork, ball_mesh, split_box_mesh,
 };
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -157,6 +157,24 @@ fn primitive(source: &str) -> Result<Option<Mesh>, SceneError> {
         };
         return mesh.map(Some).map_err(refused);
     }
+    if let Some(text) = source.strip_prefix("body:") {
+        let (name, fineness) = text.split_once('/').map_or((text, None), |(name, rest)| (name, Some(rest)));
+        let mesh = match (name, fineness.map(str::parse::<f64>)) {
+            ("liver", None) => Liver::default().mesh(),
+            ("liver", Some(Ok(cell_size))) => Liver { cell_size, ..Liver::default() }.mesh(),
+            ("jelly", None) => Jelly::default().mesh(),
+            ("jelly", Some(Ok(rings))) if (1.0..=100.0).contains(&rings) && rings.fract() == 0.0 => {
+                Jelly { rings: rings as u32, ..Jelly::default() }.mesh()
+            }
+            _ => {
+                return Err(mesh_error(format!(
+                    "{source:?} is no body; write body:liver or body:liver/CELL, as in body:liver/0.01, in metres; body:jelly or \
+                     body:jelly/RINGS, as in body:jelly/4, 1 to 100"
+                )));
+            }
+        };
+        return mesh.map(Some).map_err(refused);
+    }
     Ok(None)
 }
 
@@ -190,7 +208,7 @@ fn mesh_error(message: impl std::fmt::Display) -> SceneError {
 
 /// Whether a text names a primitive, not a file.
 pub(crate) fn is_primitive(source: &str) -> bool {
-    ["box:", "sphere:", "instrument:"].iter().any(|kind| source.starts_with(kind))
+    ["box:", "sphere:", "instrument:", "body:"].iter().any(|kind| source.starts_with(kind))
 }
 
 /// Name of a source in a recording: without folders.
@@ -233,6 +251,15 @@ mod tests {
             assert!(mesh.is_ok_and(|mesh| mesh.tets.len() > 500), "{name}");
         }
         assert!(text(read_mesh("instrument:drum")).contains("write instrument:bar, instrument:fork"));
+        let fine = |source| read_mesh(source).map(|mesh| mesh.tets.len()).ok();
+        assert_eq!([fine("body:jelly/3"), fine("body:jelly")], [Some(486), Some(1152)]);
+        assert!(fine("body:liver/0.02") < fine("body:liver"));
+        for wrong in ["body:heart", "body:liver/x", "body:jelly/0", "body:jelly/2.5"] {
+            assert!(
+                text(read_mesh(wrong)).contains("is no body; write body:liver or body:liver/CELL"),
+                "{wrong}"
+            );
+        }
         assert!(text(read_mesh("no-such-file.msh")).starts_with("cannot read mesh no-such-file.msh"));
     }
 }

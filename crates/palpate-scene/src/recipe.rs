@@ -4,13 +4,14 @@ use crate::error::{SceneError, SceneErrorKind};
 use crate::mesh_source::{is_primitive, read_body, source_name};
 use crate::progress::WithoutRemarks;
 use crate::recording_file::read_recording;
+use crate::supports::read_supports;
 use palpate::{Damping, Material, Recording, Support};
 use palpate_export::write_atomically;
 use palpate_fem::{ElementOrder, Precision, Progress, RecordParameters, ResidualChoice, record};
-use palpate_mesh::{Mesh, MeshingParameters, Repair};
+use palpate_mesh::{Mesh, MeshingParameters, Region, Repair};
 use std::path::{Path, PathBuf};
 
-/// Mesh, material and parameters from which an object of one material is recorded.
+/// Mesh, material and parameters from which an object is recorded: of one material, or with inclusions that are stiffer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingRecipe {
     /// Primitive or mesh file.
@@ -19,8 +20,12 @@ pub struct RecordingRecipe {
     pub scale: f64,
     /// Side of the cells that a surface is filled with [m]; none for the default.
     pub cell_size: Option<f64>,
-    /// Material of all regions, isotropic; its own region is ignored.
+    /// Material, isotropic; its own region is ignored.
     pub material: Material,
+    /// Young's modulus of the regions after the first, over that of the material.
+    pub inclusion_stiffness: f64,
+    /// Fixed nodes, as `--fix`.
+    pub fix: Vec<String>,
     /// Order of the elements.
     pub order: ElementOrder,
     /// Number of modes.
@@ -53,6 +58,8 @@ impl RecordingRecipe {
             scale: 1.0,
             cell_size: None,
             material: Material { region: String::new(), ..material.clone() },
+            inclusion_stiffness: 1.0,
+            fix: Vec::new(),
             order: if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
             modes: recording.modes.len(),
             damping: metadata.damping,
@@ -70,27 +77,45 @@ impl RecordingRecipe {
         };
         let source = source_name(&self.source).replace(['/', ':'], "_");
         let cells = self.cell_size.map_or(String::new(), |size| format!("-c{size}"));
+        let inclusion = match self.inclusion_stiffness {
+            1.0 => String::new(),
+            stiffness => format!("-i{stiffness}"),
+        };
+        let plain = |text: &String| {
+            format!("-f{}", text.replace(|c: char| !c.is_ascii_alphanumeric() && c != '.' && c != '-', "_"))
+        };
+        let fixed: String = self.fix.iter().map(plain).collect();
         let precision = if self.precision == Precision::Compact { "-compact" } else { "" };
         let (scale, modes, version) = (self.scale, self.modes, env!("CARGO_PKG_VERSION"));
         format!(
-            "{source}-{scale}{cells}-E{young}-n{poisson}-r{density}-o{order}-m{modes}-{damping}{precision}-{version}.palp"
+            "{source}-{scale}{cells}-E{young}-n{poisson}-r{density}{inclusion}{fixed}-o{order}-m{modes}-{damping}{precision}-{version}.palp"
         )
     }
 
-    /// Parameters of [`record`], for a mesh with `regions` regions.
-    pub fn parameters(&self, regions: usize) -> RecordParameters {
-        let material = Material { region: String::new(), ..self.material.clone() };
+    /// Parameters of [`record`] for a mesh.
+    ///
+    /// # Errors
+    /// When the text of a support is not understood, or selects no node.
+    fn parameters(&self, mesh: &Mesh) -> Result<RecordParameters, SceneError> {
+        let material = |(number, region): (usize, &Region)| {
+            let stiffness = if number == 0 { 1.0 } else { self.inclusion_stiffness };
+            let name = region.name.clone().unwrap_or_default();
+            Material { region: name, young_pa: self.material.young_pa * stiffness, ..self.material.clone() }
+        };
+        let materials = mesh.regions.iter().enumerate().map(material).collect();
+        let (fixed_nodes, _) = read_supports(mesh, &self.fix, &[])?;
         // Bodies that ring are thin, and have many nodes: of their residual compliance what is near, in a small file.
         let (residual, precision) = match near_field_radius_m(&self.source) {
             Some(radius) => (ResidualChoice::NearField(radius), Precision::Compact),
             None => (ResidualChoice::Automatic, self.precision),
         };
-        RecordParameters {
+        Ok(RecordParameters {
             source: source_name(&self.source),
             residual,
             precision,
-            ..RecordParameters::new(vec![material; regions], self.order, self.modes, self.damping)
-        }
+            fixed_nodes,
+            ..RecordParameters::new(materials, self.order, self.modes, self.damping)
+        })
     }
 
     /// Mesh of the object in metres, repaired.
@@ -101,6 +126,9 @@ impl RecordingRecipe {
         let meshing = MeshingParameters { cell_size: self.cell_size };
         let mut mesh = read_body(&self.source, self.scale, &meshing, progress)?;
         mesh.repair(&Repair::default()).map_err(|error| self.refused(error))?;
+        if self.order == ElementOrder::Quadratic && !self.fix.is_empty() {
+            mesh.add_mid_edge_nodes();
+        }
         Ok(mesh)
     }
 
@@ -123,7 +151,7 @@ impl RecordingRecipe {
     /// # Errors
     /// When it cannot be recorded.
     pub fn record_mesh(&self, mesh: Mesh, progress: &mut dyn Progress) -> Result<Recording, SceneError> {
-        let parameters = self.parameters(mesh.regions.len());
+        let parameters = self.parameters(&mesh)?;
         let recorded = record(mesh, &parameters, &mut WithoutRemarks(progress));
         recorded.map_err(|error| self.refused(error))
     }

@@ -50,6 +50,8 @@ export interface SceneObject {
   mass: number;
   fixed: boolean;
   material: Material | null;
+  /** Materials of all regions. */
+  materials?: Material[];
   recordable: boolean;
   certificate: string[];
 }

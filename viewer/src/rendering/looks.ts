@@ -36,5 +36,7 @@ export function lookOf(material: Material | null): Look {
   if (young >= 4e4) return SILICONE;
   // Pores make a soft solid light and compressible.
   if (density < 300 && poisson < 0.35) return FOAM;
-  return young >= 3e3 && density > 900 ? SOFT_TISSUE : JELLY;
+  // Gelatine is water, almost; fat is lighter, other tissue heavier.
+  const isGelatine = density > 990 && density < 1030;
+  return young >= 3e3 && density > 900 && !isGelatine ? SOFT_TISSUE : JELLY;
 }

@@ -20,6 +20,11 @@ test("jelly and silicone let light through, rubber, wood and aluminium do not", 
   expect(new Set(looks).size).toBe(looks.length);
 });
 
+test("gelatine as stiff as a liver looks like jelly, liver and fat do not", () => {
+  expect(look(4000, 0.45, 1010)).toEqual(lookOf(PRESETS[0]));
+  for (const density of [950, 1060]) expect(look(4000, 0.45, density)).toEqual(lookOf(PRESETS[1]));
+});
+
 test("an unknown material looks like jelly", () => {
   expect(lookOf(null)).toEqual(lookOf(PRESETS[0]));
 });

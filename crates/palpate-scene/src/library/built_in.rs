@@ -1,6 +1,6 @@
 //! Built-in scenes, as scene files with recipes for their recordings and functions for their paths.
 
-use super::instruments;
+use super::{instruments, soft_scenes};
 use crate::recipe::RecordingRecipe;
 use palpate::{Damping, Material};
 use palpate_fem::paper_cube::CELLS;
@@ -30,7 +30,7 @@ type Path = fn(f64) -> [f64; 3];
 const ROW_INTERVAL_S: f64 = 0.002;
 
 /// All built-in scenes; the first is the default.
-pub const BUILT_IN_SCENES: [BuiltInScene; 9] = [
+pub const BUILT_IN_SCENES: [BuiltInScene; 12] = [
     BuiltInScene {
         id: "bounce",
         title: "A soft cube falls and bounces",
@@ -220,7 +220,7 @@ position = [0.22, 0.02, 0.0]
 orientation = [0.7071067811865476, 0.7071067811865476, 0.0, 0.0]
 [[plane]]
 name = "left-bank"
-point = [-0.24, 0.0, 0.0]
+point = [-0.005, 0.0, 0.0]
 normal = [0.5, 0.866, 0.0]
 friction = 0.5
 [[plane]]
@@ -230,12 +230,12 @@ normal = [-0.5, 0.866, 0.0]
 friction = 0.5
 [[plane]]
 name = "front-bank"
-point = [0.0, 0.0, 0.16]
+point = [0.0, 0.0, 0.1]
 normal = [0.0, 0.866, -0.5]
 friction = 0.5
 [[plane]]
 name = "back-bank"
-point = [0.0, 0.0, -0.16]
+point = [0.0, 0.0, -0.1]
 normal = [0.0, 0.866, 0.5]
 friction = 0.5
 "#,
@@ -284,6 +284,9 @@ path = { file = "back.csv", repeat = true }
         ],
         period_s: 1.0,
     },
+    soft_scenes::LIVER,
+    soft_scenes::JELLY,
+    soft_scenes::GRIPPER,
     instruments::BAR,
     instruments::FORK,
     instruments::BELL,
@@ -296,6 +299,8 @@ pub fn paper_cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
         scale: 1.0,
         cell_size: None,
         material: paper_cube::material(),
+        inclusion_stiffness: 1.0,
+        fix: Vec::new(),
         order: ElementOrder::Linear,
         modes,
         damping: paper_cube::DAMPING,
@@ -340,7 +345,7 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
         "small" => of("box:0.08x0.08x0.08/8x8x8", 2500.0, 0.45, 110.0, 120, 1e-3),
         "ball" => of("sphere:0.05/8", 4000.0, 0.45, 150.0, 150, 5e-4),
         "slab" => of("box:0.24x0.02x0.12/24x2x12", 8000.0, 0.4, 150.0, 150, 2e-4),
-        _ => return instruments::recipe(name),
+        _ => return soft_scenes::recipe(name).or_else(|| instruments::recipe(name)),
     })
 }
 
@@ -373,7 +378,7 @@ fn pinching(side: f64, t: f64) -> [f64; 3] {
 }
 
 /// Smooth ramp from 0 at `from` to 1 at `to`, in either order.
-fn between(t: f64, from: f64, to: f64) -> f64 {
+pub(super) fn between(t: f64, from: f64, to: f64) -> f64 {
     let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)
 }

@@ -210,6 +210,8 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
         scale: 1.0,
         cell_size: None,
         material,
+        inclusion_stiffness: 1.0,
+        fix: Vec::new(),
         order: ElementOrder::Quadratic,
         modes,
         damping: Damping::Ratio(ratio),

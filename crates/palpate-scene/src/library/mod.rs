@@ -8,6 +8,8 @@ mod pointers;
 #[cfg(feature = "native")]
 mod scene_library;
 mod settings;
+#[cfg(feature = "native")]
+mod soft_scenes;
 mod touchable;
 
 #[cfg(feature = "native")]

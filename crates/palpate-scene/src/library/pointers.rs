@@ -1,7 +1,7 @@
 //! Pointer devices for scenes that have none.
 
 use crate::file::EditedText;
-use palpate::{ModelObject, Recording};
+use palpate::{ModelObject, Recording, Support};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use toml::{Spanned, Table, Value};
@@ -122,11 +122,16 @@ fn fingers(names: Vec<String>, objects: &[ModelObject]) -> Option<Vec<Value>> {
     let recordings = objects.iter().map(|object| &*object.recording);
     let recording = recordings.min_by(|a, b| size(a).total_cmp(&size(b)))?;
     let radius = size(recording);
-    // Stiffness m·ω² of the lowest mode: about that of the whole object. Damping ratio 0.1.
+    // Stiffness m·ω² of the lowest mode: about that of the whole object. Damping ratio 0.1. An object that cannot come along is stretched
+    // by what drags it: a finger gives way there, and slips.
+    let (share, friction) = match recording.metadata.support {
+        Support::Free => (1.0, 0.8),
+        Support::Fixed => (0.25, 0.3),
+    };
     let omega = recording.modes.angular_frequencies.first().copied().unwrap_or(50.0);
     let coupling = Table::from_iter([
-        ("stiffness".to_string(), Value::Float(recording.mass() * omega * omega)),
-        ("damping".to_string(), Value::Float(0.2 * recording.mass() * omega)),
+        ("stiffness".to_string(), Value::Float(share * recording.mass() * omega * omega)),
+        ("damping".to_string(), Value::Float(0.2 * share * recording.mass() * omega)),
     ]);
     let finger = |name: String| {
         Value::Table(Table::from_iter([
@@ -135,7 +140,7 @@ fn fingers(names: Vec<String>, objects: &[ModelObject]) -> Option<Vec<Value>> {
             ("pointer".to_string(), Value::Boolean(true)),
             ("tip_radius".to_string(), Value::Float(0.08 * radius)),
             ("patch_radius".to_string(), Value::Float(0.15 * radius)),
-            ("friction".to_string(), Value::Float(0.8)),
+            ("friction".to_string(), Value::Float(friction)),
             ("coupling".to_string(), Value::Table(coupling.clone())),
         ]))
     };

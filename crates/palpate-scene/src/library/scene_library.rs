@@ -277,6 +277,8 @@ impl SceneLibrary {
             scale,
             cell_size,
             material,
+            inclusion_stiffness: 1.0,
+            fix: Vec::new(),
             order: ElementOrder::Quadratic,
             modes,
             damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },

@@ -2,7 +2,8 @@
 
 use glam::{DQuat, DVec3};
 use palpate::{
-    Coupling, DeviceParameters, Model, ModelParameters, Obstacle, Pose, Recording, Shape, State, Support,
+    Coupling, DeviceParameters, Material, Model, ModelParameters, Obstacle, Pose, Recording, Shape, State,
+    Support,
 };
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +65,8 @@ pub struct ObjectDescription {
     pub fixed: bool,
     /// Material, of an object of one material.
     pub material: Option<MaterialDescription>,
+    /// Materials of all regions; the look of the surface is that of the first.
+    pub materials: Vec<MaterialDescription>,
     /// Whether it can be recorded with another material.
     pub recordable: bool,
     /// Certificate of the recording: one text line per error bound.
@@ -168,14 +171,13 @@ impl ObjectDescription {
     /// Description of a recorded object.
     pub fn new(name: &str, recording: &Recording, certificate: Vec<String>, recordable: bool) -> Self {
         let metadata = &recording.metadata;
-        let material = match metadata.materials.as_slice() {
-            [one] => Some(MaterialDescription {
-                young: one.young_pa,
-                poisson: one.poisson,
-                density: one.density_kg_m3,
-            }),
-            _ => None,
+        let describe = |one: &Material| MaterialDescription {
+            young: one.young_pa,
+            poisson: one.poisson,
+            density: one.density_kg_m3,
         };
+        let materials: Vec<MaterialDescription> = metadata.materials.iter().map(describe).collect();
+        let material = if let [one] = materials[..] { Some(one) } else { None };
         let surface = &recording.surface;
         Self {
             name: name.into(),
@@ -187,6 +189,7 @@ impl ObjectDescription {
             fixed: metadata.support == Support::Fixed,
             recordable: recordable && material.is_some(),
             material,
+            materials,
             certificate,
         }
     }

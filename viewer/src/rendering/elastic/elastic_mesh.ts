@@ -76,7 +76,7 @@ export class ElasticMesh {
       throw new Error(`${info.name}: shapes of ${shapes.nodes} nodes for a surface of ${surface.nodes}`);
     }
     this.surface = surface;
-    this.look = lookOf(info.material ?? null);
+    this.look = lookOf(info.material ?? info.materials?.[0] ?? null);
     this.splitMesh = splitAtCreases(surface);
     this.nodeGrid = gridFor(surface.nodes, limits);
     this.vertexGrid = gridFor(this.splitMesh.vertices, limits);

@@ -42,7 +42,7 @@ struct BuiltIn {
     lies_flat: bool,
 }
 
-const SCENES: [BuiltIn; 6] = [
+const SCENES: [BuiltIn; 9] = [
     BuiltIn {
         id: "bounce",
         middle: [0.0, 0.05, 0.0],
@@ -73,6 +73,27 @@ const SCENES: [BuiltIn; 6] = [
         lies_flat: false,
     },
     BuiltIn { id: "slab", middle: [0.0; 3], reach: [0.1; 3], is_driven: true, lies_flat: false },
+    BuiltIn {
+        id: "liver",
+        middle: [0.008, 0.019, 0.004],
+        reach: [1e-3; 3],
+        is_driven: false,
+        lies_flat: false,
+    },
+    BuiltIn {
+        id: "jelly",
+        middle: [0.0, 0.0262, 0.0],
+        reach: [0.013, 1e-3, 1e-3],
+        is_driven: true,
+        lies_flat: false,
+    },
+    BuiltIn {
+        id: "gripper",
+        middle: [0.0, 0.07, 0.0],
+        reach: [0.06, 0.07, 0.03],
+        is_driven: true,
+        lies_flat: true,
+    },
 ];
 
 /// Checks of all scenes.
@@ -104,12 +125,9 @@ fn run(built_in: &BuiltIn, with_pointers: bool, opened: &OpenedScene) -> Vec<Che
     let mut input = scene.input_at(0.0);
     for number in 1..=steps {
         let time = number as f64 * h;
-        for (slot, device) in scene.devices.iter().enumerate() {
-            input.devices[slot] = if device.pointer {
-                DeviceInput::inactive()
-            } else {
-                DeviceInput { position: device.position_at(time), mode: device.mode }
-            };
+        scene.follow_paths(time, &mut input);
+        for (slot, _) in scene.devices.iter().enumerate().filter(|(_, device)| device.pointer) {
+            input.devices[slot] = DeviceInput::inactive();
         }
         if time < active_s {
             for (slot, pointer) in &mut pointers {
