@@ -9,7 +9,7 @@ import type { Viewpoint } from "../rendering/orbit_camera";
 import { complaint } from "../ui/number_field";
 import { differences, SETTING_FIELDS, type SettingName, type SettingValues } from "../ui/physics_settings";
 
-/** What a link asks for; null is what the page shows without it. */
+/** Content of a link; null is what the page shows without it. */
 export interface SceneLink {
   scene: string | null;
   values: SettingValues;

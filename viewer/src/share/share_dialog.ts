@@ -4,7 +4,7 @@ import { element, iconButton } from "../ui/elements";
 import { LARGEST_BYTES, LONGEST_S } from "./film";
 import { qrCode } from "./qr_code";
 
-/** What the dialog offers for a scene. */
+/** Offer of the dialog for a scene. */
 export interface Offer {
   /** Address, and sentences on its limits; null for a scene without link. */
   link: { address: string; limits: readonly string[] } | null;
