@@ -15,12 +15,49 @@ pub(crate) struct Constraint {
     pub(super) axes: DMat3,
     pub(super) compliance: DMat3,
     pub(super) stiffness: DMat3,
+    /// Directions in which a side can give way.
+    pub(super) yields: Yielding,
+}
+
+/// Directions in which a side of a contact can give way: fixed nodes on an obstacle move in none, and a force there is not determined.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Yielding {
+    /// Not along the normal: the contact carries no force.
+    #[default]
+    Nowhere,
+    /// Along the normal alone, as on rollers: the contact carries no friction.
+    AlongNormal,
+    /// Along and across the normal.
+    Everywhere,
+}
+
+/// Compliance in a direction, as a share of that in all, below which it is round-off.
+const RIGID: f64 = 1e-12;
+
+impl Yielding {
+    /// Directions of a compliance in a contact's axes.
+    fn of(compliance: &DMat3) -> Self {
+        let [along, across] = [compliance.x_axis.x, compliance.y_axis.y.min(compliance.z_axis.z)];
+        let round_off = RIGID * (compliance.x_axis.x + compliance.y_axis.y + compliance.z_axis.z);
+        match (along > round_off, across > round_off) {
+            (false, _) => Self::Nowhere,
+            (true, false) => Self::AlongNormal,
+            (true, true) => Self::Everywhere,
+        }
+    }
 }
 
 impl Constraint {
     /// Constraint of a contact whose sides are apart by `start` [m, world].
     pub(crate) fn new(start: DVec3) -> Self {
         Self { start, ..Self::default() }
+    }
+
+    /// Linearise about axes (−n, t₁, t₂) [world] with the contact's own compliance in them [m/N].
+    pub(super) fn linearise(&mut self, axes: DMat3, compliance: DMat3) {
+        (self.axes, self.compliance) = (axes, compliance);
+        self.yields = Yielding::of(&compliance);
+        self.stiffness = if self.yields == Yielding::Everywhere { compliance.inverse() } else { DMat3::ZERO };
     }
 
     /// Work [J] that a contact dissipates over the step; 0 for held points.
@@ -39,5 +76,26 @@ impl Constraint {
     pub(crate) fn slip(&self, contact: &Contact) -> DVec3 {
         let moved = self.end - self.start;
         moved - contact.normal * contact.normal.dot(moved)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_without_compliance_carry_no_force() {
+        let of = |diagonal: [f64; 3]| {
+            let mut constraint = Constraint::default();
+            constraint.linearise(DMat3::IDENTITY, DMat3::from_diagonal(DVec3::from(diagonal)));
+            (constraint.yields, constraint.stiffness)
+        };
+        assert_eq!(of([0.0; 3]), (Yielding::Nowhere, DMat3::ZERO));
+        assert_eq!(of([1e-20, 1e-3, 1e-3]), (Yielding::Nowhere, DMat3::ZERO));
+        assert_eq!(of([1e-3, 0.0, 0.0]), (Yielding::AlongNormal, DMat3::ZERO));
+        assert_eq!(of([1e-3, 1e-3, 0.0]), (Yielding::AlongNormal, DMat3::ZERO));
+        let (yields, stiffness) = of([1e-3, 2e-3, 4e-3]);
+        assert_eq!(yields, Yielding::Everywhere);
+        assert!((stiffness * DVec3::new(1e-3, 2e-3, 4e-3) - DVec3::ONE).length() < 1e-12);
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! Equations: docs/theory.md (C31), (C32), (C34), (C36), (C37), (C44), (C45), (C46).
 
-use super::constraint::Constraint;
+use super::constraint::{Constraint, Yielding};
 use super::coulomb::{solve_contact, tangents};
 use super::parameters::{ROUND_OFF, SOLVER, UNSOLVED};
 use crate::collision::{Contact, ContactLaw, OtherSide};
@@ -286,16 +286,24 @@ impl ContactProblem<'_> {
         }
         let (t1, t2) = tangents(contact.normal);
         let axes = DMat3::from_cols(-contact.normal, t1, t2);
-        let compliance = axes.transpose() * w * axes;
-        let constraint = &mut self.constraints[at];
-        (constraint.axes, constraint.compliance) = (axes, compliance);
-        constraint.stiffness = compliance.inverse();
+        self.constraints[at].linearise(axes, axes.transpose() * w * axes);
     }
 
     /// Solve one contact's law with the others as they are, unless that moves its sides by no more than `enough` [m].
     /// Gives that movement [m].
     pub(super) fn solve_unilateral(&mut self, at: usize, friction: f64, enough: f64) -> f64 {
         let (contact, constraint) = (&self.contacts[at], &self.constraints[at]);
+        let friction = match constraint.yields {
+            Yielding::Everywhere => friction,
+            Yielding::AlongNormal => 0.0,
+            Yielding::Nowhere => {
+                let force = contact.force;
+                if force != DVec3::ZERO {
+                    self.add_force(at, -force);
+                }
+                return 0.0;
+            }
+        };
         let apart = self.apart(contact);
         let Constraint { axes, compliance: w, .. } = constraint;
         let into = axes.transpose();
