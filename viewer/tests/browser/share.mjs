@@ -73,6 +73,9 @@ async function serveHtml(html) {
   return { url: `http://127.0.0.1:${server.address().port}/`, close: () => new Promise((done) => (server.close(done), server.closeAllConnections())) };
 }
 
+/** Time that a busy processor may take to encode a film [ms]. */
+const ENCODED_MS = 90_000;
+
 export const shareCases = [
   {
     name: "share: the dialog gives a link, says that it is copied, and its QR code is read in both themes",
@@ -323,7 +326,7 @@ export const shareCases = [
       await page.waitForSelector(".film:not([hidden])");
       await page.waitForFunction(() => document.querySelector(".film .time").textContent >= "0:02");
       await screenshot(page, "share-film");
-      const downloading = page.waitForEvent("download");
+      const downloading = page.waitForEvent("download", { timeout: ENCODED_MS });
       await page.click(".film >> text=Stop");
       const download = await downloading;
       const { id } = await page.evaluate(() => window.palpate.sceneView.graphs[0].info);
@@ -338,7 +341,7 @@ export const shareCases = [
       await page.keyboard.press("s");
       await page.click(RECORD);
       await page.waitForFunction(() => document.querySelector(".film:not([hidden]) .time")?.textContent >= "0:01");
-      const ending = page.waitForEvent("download");
+      const ending = page.waitForEvent("download", { timeout: ENCODED_MS });
       await page.evaluate(() => {
         const now = performance.now.bind(performance);
         performance.now = () => now() + 180_000;
