@@ -1,5 +1,6 @@
 //! Constraint of a contact within one step.
 
+use super::parameters::RIGID;
 use crate::collision::Contact;
 use glam::{DMat3, DVec3};
 
@@ -30,9 +31,6 @@ pub(super) enum Yielding {
     /// Along and across the normal.
     Everywhere,
 }
-
-/// Compliance in a direction, as a share of that in all, below which it is round-off.
-const RIGID: f64 = 1e-12;
 
 impl Yielding {
     /// Directions of a compliance in a contact's axes.

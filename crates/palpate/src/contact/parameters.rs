@@ -68,5 +68,8 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
 /// Round-off of a length, as a share of (distance from the origin + size): a few roundings of x + R·(r + u).
 pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
+/// Compliance of a contact in a direction, as a share of that in all, below which it is the round-off of rotated zeros: fixed nodes.
+pub(super) const RIGID: f64 = 1e-12;
+
 /// Residual that counts as unsolved, as a share of the reach: more than round-off.
 pub(crate) const UNSOLVED: f64 = 1e-9;
