@@ -9,10 +9,10 @@ const allFree = () => window.palpate.sceneView.graphs[0]?.frame?.devices.every((
 /** Number of presses that the page has sent since `recordSent`. */
 const presses = (page) => page.evaluate(() => window.sent.filter(({ type }) => type === "press").length);
 
-/** Steps of the scene from now on. */
+/** Steps of the scene from now on, of one that a busy machine may slow down. */
 async function waitForSteps(page, count) {
   const { step, generation } = await latestFrame(page);
-  await page.waitForFunction(([s, g]) => (window.palpate.sceneView.graphs[0].frame?.step ?? 0) > s || window.palpate.sceneView.graphs[0].frame?.generation > g, [step + count, generation]);
+  await page.waitForFunction(([s, g]) => (window.palpate.sceneView.graphs[0].frame?.step ?? 0) > s || window.palpate.sceneView.graphs[0].frame?.generation > g, [step + count, generation], { timeout: 120_000 });
 }
 
 export const firstViewCases = [
