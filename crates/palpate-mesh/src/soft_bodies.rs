@@ -19,13 +19,13 @@ const UNDERSIDE: &str = "underside";
 /// Sections across x are symmetric about [`Liver::ridge_z`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Liver {
-    /// Half of the length along x, height above and below the rim (y), and half of the width (z), in the middle [m].
+    /// Half of the length along x [m].
     pub half_length: f64,
-    /// Height above the rim [m].
+    /// Height above the rim, along y, in the middle [m].
     pub above: f64,
-    /// Height below the rim [m].
+    /// Height below the rim, along y [m].
     pub below: f64,
-    /// Half of the width along z [m].
+    /// Half of the width along z, in the middle [m].
     pub half_width: f64,
     /// Middle of the lump [m].
     pub lump: DVec3,
@@ -256,11 +256,6 @@ mod tests {
             assert!((1.2..1.6).contains(&all), "{cell_size}: {all}");
             let flat = mesh.groups[0].nodes.len() as f64 * cell_size * cell_size;
             let ellipse = 0.5 * TAU * liver.half_length * liver.half_width;
-            println!(
-                "{cell_size}: {} nodes, volume {all:.3}, lump {lump:.3}, flat {:.3}",
-                mesh.nodes.len(),
-                flat / ellipse
-            );
             assert!((0.5..1.5).contains(&(flat / ellipse)), "{cell_size}: {}", flat / ellipse);
         }
     }

@@ -47,23 +47,38 @@ fn near_field_radius_m(source: &str) -> Option<f64> {
 }
 
 impl RecordingRecipe {
+    /// Recipe of a free body of one material, with a mesh in metres and all digits.
+    pub fn new(
+        source: impl Into<String>,
+        material: Material,
+        order: ElementOrder,
+        modes: usize,
+        damping: Damping,
+    ) -> Self {
+        Self {
+            source: source.into(),
+            scale: 1.0,
+            cell_size: None,
+            material,
+            inclusion_stiffness: 1.0,
+            fix: Vec::new(),
+            order,
+            modes,
+            damping,
+            precision: Precision::Full,
+        }
+    }
+
     /// Recipe of a recording of a free primitive of one material; none for others.
     pub fn of(recording: &Recording) -> Option<Self> {
         let metadata = &recording.metadata;
         let source = &metadata.provenance.source;
         let primitive = is_primitive(source);
         let [material] = metadata.materials.as_slice() else { return None };
-        (primitive && metadata.support == Support::Free && material.stiffness_pa.is_none()).then(|| Self {
-            source: source.clone(),
-            scale: 1.0,
-            cell_size: None,
-            material: Material { region: String::new(), ..material.clone() },
-            inclusion_stiffness: 1.0,
-            fix: Vec::new(),
-            order: if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
-            modes: recording.modes.len(),
-            damping: metadata.damping,
-            precision: Precision::Full,
+        (primitive && metadata.support == Support::Free && material.stiffness_pa.is_none()).then(|| {
+            let material = Material { region: String::new(), ..material.clone() };
+            let order = if metadata.mesh.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic };
+            Self::new(source.as_str(), material, order, recording.modes.len(), metadata.damping)
         })
     }
 

@@ -27,7 +27,7 @@ const DIGITS = 6;
 const FARTHEST = 1e6;
 
 /** Longest text that a message quotes. */
-const LONGEST_QUOTE = 40;
+export const LONGEST_QUOTE = 40;
 
 /** Link to a scene that has these values in place of its own. */
 export function linkTo(scene: string, own: SettingValues, now: SettingValues, viewpoint: Viewpoint | null): SceneLink {

@@ -3,7 +3,7 @@
 import type { ClientMessage, SceneMessage, SceneSummary } from "../protocol/messages";
 import type { Viewpoint } from "../rendering/orbit_camera";
 import { changeTo, physicsOf, SETTING_FIELDS, valuesOf, type SettingName } from "../ui/physics_settings";
-import { readLink } from "./link";
+import { LONGEST_QUOTE, readLink } from "./link";
 
 export class LinkedStart {
   private phase: "waiting" | "asked" | "over" = "waiting";
@@ -40,7 +40,7 @@ export class LinkedStart {
         return;
       }
       this.end();
-      this.notify(`The scene ${JSON.stringify(link.scene.slice(0, 40))} of the link is not here; the link was left out.`);
+      this.notify(`The scene ${JSON.stringify(link.scene.slice(0, LONGEST_QUOTE))} of the link is not here; the link was left out.`);
       return;
     }
     const now = physicsOf(scene);

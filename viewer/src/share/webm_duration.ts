@@ -49,7 +49,7 @@ export function frontWithDuration(front: Uint8Array, seconds: number): Uint8Arra
   const header = readElement(front, 0);
   if (header.id !== EBML || header.length === null) return null;
   const segment = readElement(front, header.content + header.length);
-  // What knows its size may know offsets too, which would no longer be right.
+  // A segment of known size may hold offsets, too, which would no longer be right.
   if (segment.id !== SEGMENT || segment.length !== null) return null;
   for (let at = segment.content; at < front.length; ) {
     const element = readElement(front, at);

@@ -62,20 +62,27 @@ export function differences(from: SettingValues, to: SettingValues): SettingName
   });
 }
 
+/** Message that gives a scene the settings that differ from its present ones, but for those that it does not have; null if none does. */
+function change(wanted: PhysicsSettings, now: PhysicsSettings): SetPhysics | null {
+  const message: SetPhysics = { type: "set_physics" };
+  if (!close(wanted.gravity, now.gravity)) message.gravity = wanted.gravity;
+  if (!close([wanted.step], [now.step])) message.step = wanted.step;
+  if (wanted.friction !== null && now.friction !== null && !close([wanted.friction], [now.friction])) message.friction = wanted.friction;
+  if (wanted.coupling !== null && now.coupling !== null && !close(numbersOf(wanted.coupling), numbersOf(now.coupling))) message.coupling = wanted.coupling;
+  return Object.keys(message).length > 1 ? message : null;
+}
+
 /** Message that gives a scene the values that differ from its present ones; null if none does. */
 export function changeTo(values: SettingValues, now: PhysicsSettings): SetPhysics | null {
-  const changed = new Set(differences(valuesOf(now), values));
-  if (changed.size === 0) return null;
   const { gravity, friction, step } = values;
   const [x, y, z] = directionOf(now.gravity);
-  const message: SetPhysics = { type: "set_physics" };
-  if (gravity !== undefined && changed.has("gravity")) message.gravity = [gravity * x, gravity * y, gravity * z];
-  if (friction !== undefined && changed.has("friction")) message.friction = friction;
-  if (step !== undefined && changed.has("step")) message.step = step / 1000;
-  if (now.coupling !== null && (changed.has("stiffness") || changed.has("damping"))) {
-    message.coupling = { stiffness: values.stiffness ?? now.coupling.stiffness, damping: values.damping ?? now.coupling.damping };
-  }
-  return message;
+  const wanted: PhysicsSettings = {
+    gravity: gravity === undefined ? now.gravity : [gravity * x, gravity * y, gravity * z],
+    step: step === undefined ? now.step : step / 1000,
+    friction: friction ?? now.friction,
+    coupling: now.coupling && { stiffness: values.stiffness ?? now.coupling.stiffness, damping: values.damping ?? now.coupling.damping },
+  };
+  return change(wanted, now);
 }
 
 /** Settings that scenes had when they were opened. */
@@ -90,25 +97,25 @@ export class OwnSettings {
     this.current = key;
   }
 
+  private get own(): PhysicsSettings | undefined {
+    return this.current === null ? undefined : this.known.get(this.current);
+  }
+
   /** Values of the noted scene's own settings. */
   get values(): SettingValues {
-    const own = this.current === null ? undefined : this.known.get(this.current);
+    const { own } = this;
     return own === undefined ? {} : valuesOf(own);
   }
 
   /** Message that brings the noted scene back to its own settings; null if it has them. */
   restoration(scene: SceneMessage): SetPhysics | null {
-    const own = this.current === null ? undefined : this.known.get(this.current);
-    if (own === undefined) return null;
-    const now = physicsOf(scene);
-    const change: Partial<PhysicsSettings> = {};
-    if (!close(own.gravity, now.gravity)) change.gravity = own.gravity;
-    if (!close([own.step], [now.step])) change.step = own.step;
-    if (own.friction !== null && now.friction !== null && !close([own.friction], [now.friction])) change.friction = own.friction;
-    if (own.coupling !== null && now.coupling !== null && !close(Object.values(own.coupling), Object.values(now.coupling))) change.coupling = own.coupling;
-    if (Object.keys(change).length === 0) return null;
-    return { type: "set_physics", ...(change as { gravity?: Vector; step?: number; friction?: number; coupling?: Coupling }) };
+    const { own } = this;
+    return own === undefined ? null : change(own, physicsOf(scene));
   }
+}
+
+function numbersOf({ stiffness, damping }: Coupling): number[] {
+  return [stiffness, damping];
 }
 
 function close(a: readonly number[], b: readonly number[]): boolean {

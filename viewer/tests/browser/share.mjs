@@ -172,7 +172,7 @@ export const shareCases = [
       // Of a server's page the link leaves the address: reloaded, it shows what the server shows then.
       assert(new URL(other.url()).search === (serverless ? new URL(withQuery(second, `${link.search}&ghost=off`)).search : "?ghost=off"), other.url());
 
-      // The same link again, from the page that was opened by it.
+      // Links from a page that was opened by a link are that link.
       await openDialog(other);
       assert(new URL(await other.inputValue(LINK)).search.startsWith(`?scene=${OTHER}&gravity=3.25&friction=0.125&camera=`), "another link");
       await other.keyboard.press("Escape");

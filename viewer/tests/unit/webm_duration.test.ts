@@ -14,7 +14,7 @@ test("a stream gets its duration at the end of Info", () => {
   const duration = [0x44, 0x89, 0x88, 0x40, 0xa3, 0x88, 0, 0, 0, 0, 0];
   const size = [0x01, 0, 0, 0, 0, 0, 0, SCALE.length + duration.length];
   expect([...(changed ?? [])]).toEqual([...HEADER, ...SEGMENT, ...UNKNOWN, 0xec, 0x81, 0, 0x15, 0x49, 0xa9, 0x66, ...size, ...SCALE, ...duration, ...TRACKS]);
-  // It has one now.
+  // A duration that is there stays.
   expect(frontWithDuration(changed ?? front, 3)).toBeNull();
 });
 

@@ -294,18 +294,8 @@ path = { file = "back.csv", repeat = true }
 
 /// The paper's cube with a number of cells along each side, and of modes.
 pub fn paper_cube_recipe(cells: u32, modes: usize) -> RecordingRecipe {
-    RecordingRecipe {
-        source: paper_cube::source(cells),
-        scale: 1.0,
-        cell_size: None,
-        material: paper_cube::material(),
-        inclusion_stiffness: 1.0,
-        fix: Vec::new(),
-        order: ElementOrder::Linear,
-        modes,
-        damping: paper_cube::DAMPING,
-        precision: Precision::Full,
-    }
+    let (source, material) = (paper_cube::source(cells), paper_cube::material());
+    RecordingRecipe::new(source, material, ElementOrder::Linear, modes, paper_cube::DAMPING)
 }
 
 /// Recipe by its name for a small file: at most 3 MB for 100 modes, most of which is the compliance between all surface nodes. The paper's cube

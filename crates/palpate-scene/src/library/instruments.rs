@@ -205,16 +205,7 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
         "bell" => (bronze, 40, 2e-4),
         _ => return None,
     };
-    Some(RecordingRecipe {
-        source: format!("instrument:{name}"),
-        scale: 1.0,
-        cell_size: None,
-        material,
-        inclusion_stiffness: 1.0,
-        fix: Vec::new(),
-        order: ElementOrder::Quadratic,
-        modes,
-        damping: Damping::Ratio(ratio),
-        precision: Precision::Compact,
-    })
+    let (source, damping) = (format!("instrument:{name}"), Damping::Ratio(ratio));
+    let recipe = RecordingRecipe::new(source, material, ElementOrder::Quadratic, modes, damping);
+    Some(RecordingRecipe { precision: Precision::Compact, ..recipe })
 }

@@ -12,7 +12,7 @@ use crate::recording_file::read_recording;
 use crate::scene::Scene;
 use palpate::{Damping, Material};
 use palpate_export::{TemporaryFolder, write_atomically};
-use palpate_fem::{ElementOrder, Precision, Progress};
+use palpate_fem::{ElementOrder, Progress};
 use palpate_mesh::read_regular_file;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -272,17 +272,12 @@ impl SceneLibrary {
         make_folder(&folder)?;
         let source = folder.join(file);
         std::fs::write(&source, &bytes).map_err(|error| SceneError::io("keep the mesh", &source, &error))?;
+        let damping = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
+        let path = source.display().to_string();
         let recipe = RecordingRecipe {
-            source: source.display().to_string(),
             scale,
             cell_size,
-            material,
-            inclusion_stiffness: 1.0,
-            fix: Vec::new(),
-            order: ElementOrder::Quadratic,
-            modes,
-            damping: Damping::Rayleigh { alpha: 2.0, beta: 2e-4 },
-            precision: Precision::Full,
+            ..RecordingRecipe::new(path, material, ElementOrder::Quadratic, modes, damping)
         };
         // The sender knows the name of the file, not its folder.
         let without_folder = |error: SceneError| {

@@ -127,55 +127,33 @@ fn gripping(side: f64, t: f64) -> [f64; 3] {
 
 /// Recipe of a soft body by its name in a built-in scene.
 pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
-    let of = |source: &str, material: Material, modes: usize, damping: Damping, fix: &str| RecordingRecipe {
-        source: source.into(),
-        scale: 1.0,
-        cell_size: None,
-        material,
-        inclusion_stiffness: 1.0,
-        fix: Some(fix).filter(|fix| !fix.is_empty()).map(String::from).into_iter().collect(),
-        order: ElementOrder::Linear,
-        modes,
-        damping,
+    let of = |source: &str, (young, poisson, density), modes: usize, (alpha, beta)| RecordingRecipe {
         precision: Precision::Compact,
+        ..RecordingRecipe::new(
+            source,
+            Material::isotropic(young, poisson, density),
+            ElementOrder::Linear,
+            modes,
+            Damping::Rayleigh { alpha, beta },
+        )
     };
-    let rayleigh = |alpha, beta| Damping::Rayleigh { alpha, beta };
     Some(match name {
         "liver" => RecordingRecipe {
             inclusion_stiffness: 10.0,
-            ..of(
-                "body:liver",
-                Material::isotropic(4000.0, 0.45, 1060.0),
-                100,
-                rayleigh(4.0, 2e-3),
-                "underside",
-            )
+            fix: vec!["underside".into()],
+            ..of("body:liver", (4000.0, 0.45, 1060.0), 100, (4.0, 2e-3))
         },
         // A damping ratio of 4 %.
         "pudding" => RecordingRecipe {
             order: ElementOrder::Quadratic,
-            ..of(
-                "body:jelly",
-                Material::isotropic(4000.0, 0.45, 1010.0),
-                80,
-                rayleigh(1.0, 1e-3),
-                "underside",
-            )
+            fix: vec!["underside".into()],
+            ..of("body:jelly", (4000.0, 0.45, 1010.0), 80, (1.0, 1e-3))
         },
-        "morsel" => of(
-            "box:0.05x0.05x0.05/8x8x8",
-            Material::isotropic(5000.0, 0.4, 200.0),
-            60,
-            rayleigh(2.0, 1e-3),
-            "",
-        ),
-        "finger" => of(
-            "box:0.024x0.08x0.034/4x12x6",
-            Material::isotropic(1.5e5, 0.45, 1070.0),
-            60,
-            rayleigh(4.0, 3e-3),
-            "y>0.0399",
-        ),
+        "morsel" => of("box:0.05x0.05x0.05/8x8x8", (5000.0, 0.4, 200.0), 60, (2.0, 1e-3)),
+        "finger" => RecordingRecipe {
+            fix: vec!["y>0.0399".into()],
+            ..of("box:0.024x0.08x0.034/4x12x6", (1.5e5, 0.45, 1070.0), 60, (4.0, 3e-3))
+        },
         _ => return None,
     })
 }
