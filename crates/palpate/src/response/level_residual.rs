@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use glam::DMat3;
 
 /// Upper limit of contact samples of a level whose residual compliance with other levels is precomputed: 36 bytes for each pair.
-const MAX_SAMPLES: usize = 320;
+const MAX_SAMPLES: usize = 512;
 
 /// Residual compliance between the samples of a level and those of a coarser one [m/N].
 #[derive(Debug, Clone)]
