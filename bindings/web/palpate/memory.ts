@@ -25,6 +25,7 @@ export interface Exports {
   recording_positions(recording: number): number;
   recording_triangles(recording: number): number;
   recording_rescaled(recording: number, young: number, density: number): number;
+  recording_falling_scene(recording: number, name: number, nameLength: number): void;
   scene_files(address: number, length: number): void;
   parts_new(): number;
   parts_free(parts: number): void;
@@ -120,7 +121,7 @@ export class Instance {
   described<T>(run: (exports: Exports) => unknown): T {
     this.json = null;
     this.call(run);
-    return this.json as T;
+    return this.takeJson() as T;
   }
 
   /** Last JSON that was sent since it was taken, or null. */

@@ -6,6 +6,7 @@ import type { Frame } from "../protocol/frame";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import { FrameMismatch } from "../rendering/elastic/elastic_mesh";
 import { MeshUpload } from "../ui/mesh_upload";
+import { OpenFiles } from "../ui/open_files";
 import { element } from "../ui/elements";
 import { ForceReadout } from "../ui/force_readout";
 import type { PageLayout } from "../ui/page_layout";
@@ -63,6 +64,8 @@ export class LiveMode implements PageMode {
   private readonly forceReadout = new ForceReadout();
   private readonly jobs = new JobList(() => this.cancelJob());
   private readonly meshUpload: MeshUpload;
+  /** Files, on a page without a server. */
+  private readonly openFiles: OpenFiles | null = null;
   private readonly scenes: ScenesPanel;
   private readonly physics: PhysicsPanel;
   private readonly material: MaterialPanel;
@@ -89,6 +92,7 @@ export class LiveMode implements PageMode {
     private readonly notifications: Notifications,
     display: DisplayPanel,
     private readonly connection: Pick<Connection, "send">,
+    openRecording: ((file: File) => Promise<void>) | null,
   ) {
     const send = connection.send.bind(connection);
     const first: TouchMode = window.matchMedia("(pointer: coarse)").matches ? "hold" : "touch";
@@ -141,6 +145,15 @@ export class LiveMode implements PageMode {
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
+    if (openRecording === null) {
+      meshUpload.listenForDrops();
+    } else {
+      this.openFiles = new OpenFiles(notifications, (file) => {
+        this.linked.end();
+        return openRecording(file);
+      });
+    }
+
     this.viewers.hidden = true;
     this.paceChip.hidden = true;
     this.loading.hidden = true;
@@ -149,7 +162,7 @@ export class LiveMode implements PageMode {
     layout.overlayTop.append(this.share.film.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
-    layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section);
+    layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section, ...(this.openFiles === null ? [] : [this.openFiles.section]));
     layout.measurements.append(...this.plots.sections, this.timing.section, this.accuracy.section);
     layout.page.append(meshUpload.dialog, this.share.element);
     sceneView.drawOverlay = (context, view) => {
@@ -231,7 +244,7 @@ export class LiveMode implements PageMode {
     this.layout.about.title = scene.about;
     document.title = `${scene.title} · palpate`;
     this.ownSettings.note(scene);
-    const again = scene.id === null ? this.meshUpload.again(scene.title) : undefined;
+    const again = scene.id === null ? (this.meshUpload.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
     if (again !== undefined) this.scenes.addUpload(scene.title, again);
     this.scenes.setCurrent(scene.id, scene.title);
     this.physics.update(scene);

@@ -4,6 +4,10 @@
 export type ToWorker =
   /** Start: address of the folder of `palpate.wasm` and `scenes/`, and the scene to open, or the first. */
   | { kind: "start"; base: string; scene: string | null }
+  /** Start of a worker that plays logs, those that the browser keeps if none are given. */
+  | { kind: "start_logs"; base: string; files: readonly File[] | null }
+  /** Recording to open as a scene, with the name of its file. */
+  | { kind: "recording"; name: string; bytes: ArrayBuffer }
   /** Message of the viewer protocol, as JSON. */
   | { kind: "message"; text: string }
   /** A frame was shown. */
@@ -13,6 +17,8 @@ export type ToWorker =
 
 /** Message to the page. */
 export type FromWorker =
+  /** Progress of a first download: bytes that have come, of how many where it is known. */
+  | { kind: "loading"; what: string; bytes: number; of: number | null }
   | { kind: "message"; text: string }
   | { kind: "frame"; frame: ArrayBuffer }
   /** Block of sound. */

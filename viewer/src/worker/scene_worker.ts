@@ -2,26 +2,18 @@
 
 import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
-import type { ClientMessage, SceneSummary, ServerMessage } from "../protocol/messages";
-import type { FromWorker, ToWorker } from "./messages";
+import type { ClientMessage, SceneSummary } from "../protocol/messages";
+import type { ToWorker } from "./messages";
+import { post, reasonOf, tell } from "./posting";
+import { download } from "./download";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
 import { Ticker } from "./ticker";
 
 /** Frames that are under way to the page at once; newer ones take the place of older ones. */
 const MAX_FRAMES_UNDER_WAY = 3;
 
-function post(message: FromWorker, transfer: Transferable[] = []): void {
-  (self as unknown as { postMessage(message: FromWorker, transfer: Transferable[]): void }).postMessage(message, transfer);
-}
-
-function tell(message: ServerMessage): void {
-  post({ kind: "message", text: JSON.stringify(message) });
-}
-
-/** Text of anything that was thrown. */
-function reasonOf(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
-}
+/** Name that the scene of a dropped recording gives it. */
+const DROPPED = "dropped.palp";
 
 /** Frames to the page, no more than it can show. */
 class FrameStream {
@@ -74,14 +66,41 @@ class SceneRunner {
     const summary = id === null ? this.scenes[0] : this.scenes.find((scene) => scene.id === id);
     if (summary === undefined) throw new Error(`there is no scene ${JSON.stringify(id)}; there are ${this.scenes.map((scene) => scene.id).join(", ")}`);
     const progress = (fraction: number | null, done = false) => tell({ type: "progress", job: "scene", phase: "loading", fraction, done });
+    const onProgress = (bytes: number, of: number | null) => {
+      // Before the page is greeted it has no list of jobs.
+      if (this.greeted) progress(of === null ? null : bytes / of);
+      else post({ kind: "loading", what: "the first recording", bytes, of });
+    };
     try {
-      const files = await fetchScene(this.instance, this.base, summary, progress);
+      const files = await fetchScene(this.instance, this.base, summary, onProgress);
       if (number === this.opening) this.start(files);
     } catch (error) {
       // Nobody waits any more for one that another has replaced.
       if (number === this.opening) throw error;
     } finally {
       if (number === this.opening) progress(1, true);
+    }
+  }
+
+  /** Opens a scene in which the object of a recording falls on a floor. */
+  openRecording(name: string, bytes: Uint8Array): void {
+    const { instance } = this;
+    this.opening += 1;
+    try {
+      if (bytes.byteLength === 0) throw new Error("the file is empty");
+      const recording = instance.withBytes(bytes, (address, length) => instance.call((exports) => exports.recording_read(address, length)));
+      const text = (() => {
+        try {
+          return instance.withBytes(DROPPED, (at, length) => instance.described<string>((exports) => exports.recording_falling_scene(recording, at, length)));
+        } finally {
+          instance.exports.recording_free(recording);
+        }
+      })();
+      const summary = { id: "", title: name, about: "Your own recording. Press and drag it." };
+      this.start({ summary, text, recordings: new Map([[DROPPED, bytes]]), paths: new Map() });
+    } catch (error) {
+      if (instance.stopped === null) tell({ type: "error", text: `${name}: ${reasonOf(error)}` });
+      else this.fail(instance.stopped);
     }
   }
 
@@ -173,7 +192,9 @@ let runner: SceneRunner | null = null;
 
 async function start(base: string, scene: string | null): Promise<void> {
   try {
-    const [instance, scenes] = await Promise.all([Instance.load(new URL("palpate.wasm", base)), fetchScenes(base)]);
+    const progress = (bytes: number, of: number | null) => post({ kind: "loading", what: "the simulation", bytes, of });
+    const module = download(new URL("palpate.wasm", base), progress).then((bytes) => Instance.load(bytes));
+    const [instance, scenes] = await Promise.all([module, fetchScenes(base)]);
     runner = new SceneRunner(instance, base, scenes);
     const known = scenes.some(({ id }) => id === scene);
     await runner.open(known ? scene : null);
@@ -186,6 +207,7 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
   const message = event.data;
   if (message.kind === "start") void start(message.base, message.scene);
   else if (message.kind === "message") runner?.receive(message.text);
+  else if (message.kind === "recording") runner?.openRecording(message.name, new Uint8Array(message.bytes));
   else if (message.kind === "shown") runner?.shown();
-  else runner?.answer(message.request, message.path);
+  else if (message.kind === "data") runner?.answer(message.request, message.path);
 };
