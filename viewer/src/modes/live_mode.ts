@@ -21,6 +21,7 @@ import { TimingPanel } from "../ui/timing_panel";
 import { LostObjects } from "../ui/lost_objects";
 import { OwnSettings } from "../ui/physics_settings";
 import { Pace, paceText } from "../ui/pace";
+import { vibrationSwitch } from "../ui/vibration_switch";
 import { ScaleLock } from "../ui/scale_lock";
 import type { SoundBlock } from "../sound/sound_block";
 import { SoundControl } from "../sound/sound_control";
@@ -36,6 +37,7 @@ import { GamepadPointers } from "../interaction/gamepad_pointers";
 import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
 import { PointerEvents } from "../interaction/pointer_events";
+import type { Vibration } from "../interaction/vibration";
 import { Touches } from "../interaction/touches";
 import type { PageMode } from "./page_mode";
 
@@ -57,6 +59,7 @@ export class LiveMode implements PageMode {
   private readonly pointers: PointerEvents;
   private readonly keyboard: KeyboardPointer;
   private readonly gamepads: GamepadPointers;
+  private readonly vibration: Vibration;
   private readonly toolbar: LiveToolbar;
   private readonly ghost: GhostFinger;
   private readonly sound: SoundControl;
@@ -106,10 +109,9 @@ export class LiveMode implements PageMode {
     this.pointers.mode = first;
     const mode = () => this.pointers.mode;
     this.keyboard = new KeyboardPointer(sceneView, this.touches, mode);
-    this.gamepads = new GamepadPointers(sceneView, this.touches, mode, (device) => {
-      const force = this.frame?.devices[device]?.force ?? [0, 0, 0];
-      return Math.hypot(...force) / (sceneView.graphs[0]?.forceRange.value ?? 1);
-    });
+    this.gamepads = new GamepadPointers(sceneView, this.touches, mode, (device) => this.forceShare(device));
+    const { vibration, row } = vibrationSwitch();
+    this.vibration = vibration;
     this.touches.onBegin = () => {
       this.ghost.stop();
       this.hint.dismiss();
@@ -162,6 +164,7 @@ export class LiveMode implements PageMode {
     layout.overlayTop.append(this.share.film.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
+    display.section.append(...row);
     layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section, ...(this.openFiles === null ? [] : [this.openFiles.section]));
     layout.measurements.append(...this.plots.sections, this.timing.section, this.accuracy.section);
     layout.page.append(meshUpload.dialog, this.share.element);
@@ -171,6 +174,12 @@ export class LiveMode implements PageMode {
       this.touches.draw(context, view);
       this.ghost.draw(context, view);
     };
+  }
+
+  /** Force on a device, as a share of the displayed force range. */
+  private forceShare(device: number): number {
+    const force = this.frame?.devices[device]?.force ?? [0, 0, 0];
+    return Math.hypot(...force) / (this.sceneView.graphs[0]?.forceRange.value ?? 1);
   }
 
   /** Opens the certificates. */
@@ -362,6 +371,7 @@ export class LiveMode implements PageMode {
       }
     }
     this.forceReadout.show(this.frame, graph?.info ?? null, this.touches.devices);
+    this.vibration.animate(new Map(this.touches.devices.map((device) => [device, this.forceShare(device)])), now);
     this.plots.animate(now);
     if (now - this.lostCheckedAt > LOST_INTERVAL_MS) {
       this.lostCheckedAt = now;
