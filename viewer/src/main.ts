@@ -77,7 +77,6 @@ function start(): void {
   };
   const worker = runsInWorker() ? new WorkerConnection({ ...listener, loading: (what, bytes, of) => firstLoad?.show(what, bytes, of) }) : null;
   const connection = worker ?? new Connection(listener);
-  const openRecording = worker === null ? null : async (file: File) => worker.openRecording(file.name, await file.arrayBuffer());
   let firstLoad = worker === null ? null : new FirstLoad();
   if (firstLoad !== null) layout.viewArea.append(firstLoad.box);
 
@@ -120,7 +119,7 @@ function start(): void {
       }
       help = helpDialog(hello.kind);
       layout.page.append(help);
-      mode = hello.kind === "live" ? new LiveMode(sceneView, layout, notifications, display, connection, openRecording) : new LogMode(sceneView, layout, notifications, display);
+      mode = hello.kind === "live" ? new LiveMode(sceneView, layout, notifications, display, connection, worker) : new LogMode(sceneView, layout, notifications, display);
       requestAnimationFrame(draw);
     }
     mode?.hello(hello);

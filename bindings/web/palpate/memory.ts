@@ -48,6 +48,8 @@ export interface Exports {
   live_replace(live: number, address: number, length: number, parts: number, about: number, aboutLength: number): number;
   live_greet(live: number, address: number, length: number): void;
   live_receive(live: number, address: number, length: number): void;
+  live_begin_record(live: number): number;
+  live_end_record(live: number): number;
   live_advance(live: number): number;
   live_data(live: number, address: number, length: number): number;
 }

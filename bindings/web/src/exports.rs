@@ -5,7 +5,7 @@
 
 #![allow(missing_docs)]
 
-use crate::live_scene::{LiveScene, Titles};
+use crate::live_scene::{LiveScene, RecordedRun, Rescaled, Titles};
 use crate::simulation::{Array, Simulation, energy_names};
 use crate::{describe_recording, describe_scene};
 use glam::DVec3;
@@ -86,7 +86,7 @@ pub(crate) fn handle<T>(value: T) -> *mut T {
 }
 
 /// Handle of a value, or none after an error was sent.
-fn handle_or_error<T>(value: Result<T, impl Display>) -> *mut T {
+pub(crate) fn handle_or_error<T>(value: Result<T, impl Display>) -> *mut T {
     or_error(value.map(Some).map_err(|error| error.to_string())).map_or(std::ptr::null_mut(), handle)
 }
 
@@ -352,6 +352,25 @@ pub unsafe extern "C" fn live_receive(live: &mut LiveScene, address: *const u8, 
     if let Some(id) = or_error(live.receive(&message, &mut send_message)) {
         send_json(&Value::String(id));
     }
+}
+
+/// Begins a record for a log; false after an error was sent.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_begin_record(live: &mut LiveScene) -> bool {
+    or_error(live.begin_record(&mut send_message).map(|()| true))
+}
+
+/// Ends a record, which is sent: JSON with the text of the scene, the number of steps and the changes of materials, and as data the numbers of the
+/// inputs. False if none was begun.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_end_record(live: &mut LiveScene) -> bool {
+    let Some(RecordedRun { text, rescaled, inputs }) = live.end_record() else { return false };
+    let change = |Rescaled { name, of, young, density }: &Rescaled| json!({ "name": name, "of": of, "young": young, "density": density });
+    let rescaled: Value = rescaled.iter().map(change).collect();
+    send_json(&json!({ "text": text, "steps": inputs.steps(), "rescaled": rescaled }));
+    let numbers: Vec<u8> = inputs.numbers().iter().flat_map(|number| number.to_le_bytes()).collect();
+    send(DATA, &numbers);
+    true
 }
 
 /// Makes the steps that are due, and returns the time of the next deadline [s].

@@ -17,5 +17,5 @@ mod log_exports;
 mod simulation;
 
 pub use description::{describe_recording, describe_scene};
-pub use live_scene::LiveScene;
+pub use live_scene::{LiveScene, RecordedRun, Rescaled};
 pub use simulation::{Array, Simulation};

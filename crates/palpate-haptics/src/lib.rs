@@ -42,6 +42,7 @@ mod force_process;
 #[cfg(feature = "real-time")]
 pub mod guardian;
 mod haptic_update;
+mod input_record;
 #[cfg(feature = "real-time")]
 pub mod link;
 #[cfg(feature = "logs")]
@@ -72,6 +73,7 @@ pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 pub use error::{Error, LogError};
 pub use force_process::{ForceProcess, ObstacleTrajectory, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
+pub use input_record::{InputReader, InputRecord};
 pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;
 pub use playback::Playback;

@@ -23,6 +23,8 @@ mod file;
 mod files;
 mod initial_checks;
 mod library;
+#[cfg(feature = "logs")]
+mod log_maker;
 #[cfg(feature = "native")]
 mod material_choice;
 #[cfg(feature = "native")]
@@ -58,6 +60,8 @@ pub use file::{
 #[cfg(feature = "native")]
 pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
 pub use library::{SettingsChange, TouchableScene, falling_scene, read_touchable_scene};
+#[cfg(feature = "logs")]
+pub use log_maker::LogMaker;
 #[cfg(feature = "native")]
 pub use material_choice::MaterialChoice;
 #[cfg(feature = "native")]

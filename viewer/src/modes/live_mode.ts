@@ -32,7 +32,7 @@ import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
 import type { SceneView } from "../rendering/scene_view";
-import { runsInWorker } from "../protocol/worker_connection";
+import { runsInWorker, type WorkerConnection } from "../protocol/worker_connection";
 import { GamepadPointers } from "../interaction/gamepad_pointers";
 import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
@@ -95,7 +95,7 @@ export class LiveMode implements PageMode {
     private readonly notifications: Notifications,
     display: DisplayPanel,
     private readonly connection: Pick<Connection, "send">,
-    openRecording: ((file: File) => Promise<void>) | null,
+    worker: WorkerConnection | null,
   ) {
     const send = connection.send.bind(connection);
     const first: TouchMode = window.matchMedia("(pointer: coarse)").matches ? "hold" : "touch";
@@ -133,7 +133,7 @@ export class LiveMode implements PageMode {
     );
     this.sound = new SoundControl(send, notifications);
     this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
-    this.share = new Share(sceneView, notifications, () => {
+    this.share = new Share(sceneView, notifications, worker, () => {
       const scene = this.requestedScene;
       return scene === null ? null : { scene, own: this.ownSettings.values };
     });
@@ -147,12 +147,12 @@ export class LiveMode implements PageMode {
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
-    if (openRecording === null) {
+    if (worker === null) {
       meshUpload.listenForDrops();
     } else {
-      this.openFiles = new OpenFiles(notifications, (file) => {
+      this.openFiles = new OpenFiles(notifications, async (file) => {
         this.linked.end();
-        return openRecording(file);
+        worker.openRecording(file.name, await file.arrayBuffer());
       });
     }
 
@@ -161,7 +161,7 @@ export class LiveMode implements PageMode {
     this.loading.hidden = true;
     layout.chips.append(this.paceChip, this.viewers);
     layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts);
-    layout.overlayTop.append(this.share.film.box, this.forceReadout.box, this.hint.box, this.jobs.box);
+    layout.overlayTop.append(this.share.film.box, this.share.log.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
     display.section.append(...row);
@@ -253,6 +253,7 @@ export class LiveMode implements PageMode {
     this.layout.about.title = scene.about;
     document.title = `${scene.title} · palpate`;
     this.ownSettings.note(scene);
+    this.share.log.sceneBegins();
     const again = scene.id === null ? (this.meshUpload.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
     if (again !== undefined) this.scenes.addUpload(scene.title, again);
     this.scenes.setCurrent(scene.id, scene.title);
@@ -313,6 +314,7 @@ export class LiveMode implements PageMode {
     // A restarted server counts generations from the start again, so the generation alone is not enough.
     if (graph === undefined || graph.info !== this.requestedScene || frame.generation !== graph.info.generation) return;
     this.plots.update(frame);
+    this.share.log.frame(frame.time);
     this.frame = frame;
     this.frameIsNew = true;
   }
@@ -347,6 +349,7 @@ export class LiveMode implements PageMode {
     this.suspend();
     this.paceChip.hidden = true;
     this.jobs.clear();
+    this.share.log.abort();
     this.timing.clear();
     this.forceReadout.show(null, null, []);
   }

@@ -23,6 +23,8 @@ export class WorkerConnection {
   private worker: Worker | null = null;
   private requests = new Map<number, (bytes: ArrayBuffer | null) => void>();
   private lastRequest = 0;
+  /** Log that is awaited. */
+  private log: { done: (log: { bytes: ArrayBuffer; steps: number }) => void; failed: (error: Error) => void } | null = null;
 
   constructor(private readonly listener: WorkerListener) {
     setDataSource((path) => this.fetch(path));
@@ -38,6 +40,17 @@ export class WorkerConnection {
     if (logs) return;
     const scene = new URL(window.location.href).searchParams.get("scene");
     this.post({ kind: "start", base: scenesAddress(), scene });
+  }
+
+  beginLog(): void {
+    this.post({ kind: "begin_log" });
+  }
+
+  endLog(): Promise<{ bytes: ArrayBuffer; steps: number }> {
+    return new Promise((done, failed) => {
+      this.log = { done, failed };
+      this.post({ kind: "end_log" });
+    });
   }
 
   /** Opens a recording as a scene of its own. */
@@ -80,6 +93,14 @@ export class WorkerConnection {
       case "loading":
         this.listener.loading(message.what, message.bytes, message.of);
         break;
+      case "log":
+        this.log?.done({ bytes: message.bytes, steps: message.steps });
+        this.log = null;
+        break;
+      case "no_log":
+        this.log?.failed(new Error(message.reason));
+        this.log = null;
+        break;
       case "data":
         this.requests.get(message.request)?.(message.bytes);
         this.requests.delete(message.request);
@@ -97,6 +118,8 @@ export class WorkerConnection {
 
   private handleLoss(reason: string): void {
     this.close();
+    this.log?.failed(new Error(reason));
+    this.log = null;
     this.listener.state({ name: "lost", retryAt: Number.POSITIVE_INFINITY, reason });
   }
 

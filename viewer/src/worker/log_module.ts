@@ -11,6 +11,10 @@ export interface LogExports extends Exports {
   logs_greet(logs: number): void;
   logs_advance(logs: number): number;
   logs_data(logs: number, address: number, length: number): number;
+  log_maker_new(address: number, length: number, parts: number, inputs: number, inputsLength: number, startS: number): number;
+  log_maker_advance(maker: number): number;
+  log_maker_steps(maker: number): number;
+  log_maker_finish(maker: number): number;
 }
 
 /** Loads the module from the folder of the page. */

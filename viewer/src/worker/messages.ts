@@ -8,6 +8,9 @@ export type ToWorker =
   | { kind: "start_logs"; base: string; files: readonly File[] | null }
   /** Recording to open as a scene, with the name of its file. */
   | { kind: "recording"; name: string; bytes: ArrayBuffer }
+  /** Begin and end of a record for a log. */
+  | { kind: "begin_log" }
+  | { kind: "end_log" }
   /** Message of the viewer protocol, as JSON. */
   | { kind: "message"; text: string }
   /** A frame was shown. */
@@ -23,6 +26,9 @@ export type FromWorker =
   | { kind: "frame"; frame: ArrayBuffer }
   /** Block of sound. */
   | { kind: "sound"; block: ArrayBuffer }
+  /** Log of a record, or the reason that there is none. */
+  | { kind: "log"; steps: number; bytes: ArrayBuffer }
+  | { kind: "no_log"; reason: string }
   /** Answer to a request; null if there is no such data. */
   | { kind: "data"; request: number; bytes: ArrayBuffer | null }
   /** The scene has ended. */

@@ -3,6 +3,7 @@
 import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
 import type { ClientMessage, SceneSummary } from "../protocol/messages";
+import { makeLog, type RecordedRun } from "./log_writer";
 import type { ToWorker } from "./messages";
 import { post, reasonOf, tell } from "./posting";
 import { download } from "./download";
@@ -42,6 +43,9 @@ class SceneRunner {
   private live = 0;
   private opening = 0;
   private greeted = false;
+  /** Files of the scene, and those of the scene that is recorded for a log, with the time of its start [s since 1970]. */
+  private files: SceneFiles | null = null;
+  private recorded: { files: SceneFiles; startS: number } | null = null;
   private readonly frames = new FrameStream();
   private readonly ticker = new Ticker(() => this.advance());
 
@@ -104,6 +108,42 @@ class SceneRunner {
     }
   }
 
+  /** Begins a record for a log, at a start of the scene. */
+  beginLog(): void {
+    const { instance, live, files } = this;
+    if (live === 0 || files === null) return;
+    this.recorded = { files, startS: Date.now() / 1000 };
+    try {
+      instance.call((exports) => exports.live_begin_record(live));
+    } catch (error) {
+      this.recorded = null;
+      tell({ type: "error", text: reasonOf(error) });
+    }
+  }
+
+  /** Ends the record, and sends its log. */
+  async endLog(): Promise<void> {
+    const { instance, live, recorded } = this;
+    const progress = (phase: string, fraction: number | null, done = false) => tell({ type: "progress", job: "log", phase, fraction, done });
+    try {
+      this.recorded = null;
+      if (recorded === null) throw new Error("none was begun");
+      const inputs: Uint8Array[] = [];
+      const record = this.collecting(
+        (bytes) => inputs.push(bytes),
+        () => instance.described<Pick<RecordedRun, "text" | "steps" | "rescaled"> | null>((exports) => exports.live_end_record(live)),
+      );
+      if (record === null || inputs[0] === undefined) throw new Error("none was begun");
+      const run = { ...record, inputs: inputs[0], ...recorded };
+      const { bytes, steps } = await makeLog(this.base, run, (loaded, of) => progress("loading the writer", of === null ? null : loaded / of), (fraction) => progress("writing", fraction));
+      post({ kind: "log", steps, bytes }, [bytes]);
+    } catch (error) {
+      post({ kind: "no_log", reason: reasonOf(error) });
+    } finally {
+      progress("", 1, true);
+    }
+  }
+
   receive(text: string): void {
     if (this.live === 0) return;
     const { instance, live } = this;
@@ -134,14 +174,25 @@ class SceneRunner {
   answer(request: number, path: string): void {
     const { instance, live } = this;
     let bytes: ArrayBuffer | null = null;
+    if (live !== 0) {
+      this.collecting(
+        (data) => (bytes = data.buffer),
+        () => instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length))),
+      );
+    }
+    post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
+  }
+
+  /** Result of a call of the module whose data are taken. */
+  private collecting<T>(take: (data: Uint8Array<ArrayBuffer>) => void, run: () => T): T {
+    const { instance } = this;
     const before = instance.receiver;
     try {
-      instance.receiver = (_, data) => (bytes = data.slice().buffer);
-      if (live !== 0) instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length)));
+      instance.receiver = (_, data) => take(new Uint8Array(data));
+      return run();
     } finally {
       instance.receiver = before;
     }
-    post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
   }
 
   private start(files: SceneFiles): void {
@@ -166,6 +217,7 @@ class SceneRunner {
     } finally {
       recordings.forEach((recording) => exports.recording_free(recording));
     }
+    this.files = files;
     if (this.greeted) return;
     this.greeted = true;
     instance.withBytes(JSON.stringify(this.scenes), (address, length) => exports.live_greet(this.live, address, length));
@@ -208,6 +260,8 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
   if (message.kind === "start") void start(message.base, message.scene);
   else if (message.kind === "message") runner?.receive(message.text);
   else if (message.kind === "recording") runner?.openRecording(message.name, new Uint8Array(message.bytes));
+  else if (message.kind === "begin_log") runner?.beginLog();
+  else if (message.kind === "end_log") void runner?.endLog();
   else if (message.kind === "shown") runner?.shown();
   else if (message.kind === "data") runner?.answer(message.request, message.path);
 };

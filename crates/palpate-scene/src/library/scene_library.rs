@@ -129,7 +129,7 @@ impl SceneLibrary {
 
     /// Reads the text of a scene, adds pointers if it has none, and makes it the current scene.
     fn open_text(&self, mut current: Current, text: String) -> Result<OpenedScene, SceneError> {
-        let TouchableScene { scene, text } =
+        let TouchableScene { scene, text, .. } =
             read_touchable_scene(&current.path, text, &PartsInMemory::default())?;
         current.text = text.parse().map_err(|error| {
             SceneError::of_file(SceneErrorKind::Syntax, &current.path, format!("{error}"))
