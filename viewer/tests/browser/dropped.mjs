@@ -1,9 +1,9 @@
 // Files that are dropped onto the page without a server: logs play and are compared, recordings become scenes, and bad files are told.
 
 import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { isDeepStrictEqual } from "node:util";
 import { crc32 } from "node:zlib";
@@ -156,6 +156,7 @@ export const droppedCases = [
       const paths = ["log/0/frames?from=0&count=60", `log/0/frames?from=60&count=${last - 59}`, "log/0/series", "scene/0/object/0/surface"];
       await page.waitForFunction(async (at) => (await window.palpate.connection.fetch(`log/0/frames?from=${at}&count=1`)).byteLength > 0, last, { polling: 200, timeout: 60_000 });
       const theirs = await served(path, last, paths);
+      rmSync(dirname(path), { recursive: true });
       for (const [at, of] of paths.entries()) {
         const own = Buffer.from(await page.evaluate(async (asked) => [...new Uint8Array(await window.palpate.connection.fetch(asked))], of));
         // The order of keys is that of the build.

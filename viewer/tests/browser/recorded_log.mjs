@@ -1,9 +1,9 @@
 // Log that the page without a server records: the real program repeats it, with the forces that the page has shown.
 
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { dirname, join } from "node:path";
 import { assert, assertNoConsoleErrors, latestFrame, pixelOf, screenshot, waitForRest, waitForScene } from "./browser.mjs";
 import { drop } from "./dropped.mjs";
 import { start } from "./servers.mjs";
@@ -114,6 +114,7 @@ export const recordedLogCases = [
       assert(/^palpate-bounce-\d{4}-\d\d-\d\d\.mcap$/.test(log.split("/").at(-1)), log);
       // The page plays its own log.
       await drop(page, { "own.mcap": readFileSync(log) });
+      rmSync(dirname(log), { recursive: true });
       await page.waitForFunction(() => document.documentElement.dataset.kind === "logs" && window.palpate?.sceneView.graphs[0]?.frame, null, { timeout: 60_000 });
       assertNoConsoleErrors(page);
     },
@@ -135,6 +136,7 @@ export const recordedLogCases = [
       await screenshot(page, "log-recording-phone");
       const log = await savedLog(page, () => page.click('[aria-label^="Reset"]'));
       const { rows } = replayed(log);
+      rmSync(dirname(log), { recursive: true });
       assert(rows.length >= 300, `${rows.length} steps`);
       assert(!(await page.isVisible(".scene-log")), "the box stays");
       assertNoConsoleErrors(page);
