@@ -13,7 +13,7 @@ export interface WrittenLog {
   steps: number;
 }
 
-/** What records logs. */
+/** Recorder of logs. */
 export interface LogSource {
   /** Begins a record, at a start of the scene. */
   beginLog(): void;

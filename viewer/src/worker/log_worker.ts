@@ -68,7 +68,15 @@ async function start(base: string, given: readonly File[] | null): Promise<void>
     const made = new LogRunner(instance);
     const warnings: (string | null)[] = [];
     // One after the other: each needs its memory twice.
-    for (const file of files) warnings.push(made.add(file.name, new Uint8Array(await file.arrayBuffer())));
+    for (const file of files) {
+      try {
+        warnings.push(made.add(file.name, new Uint8Array(await file.arrayBuffer())));
+      } catch (error) {
+        // An error of its scene names the scene only.
+        const reason = reasonOf(error);
+        throw new Error(reason.startsWith(file.name) ? reason : `${file.name}: ${reason}`);
+      }
+    }
     runner = made;
     runner.start();
     for (const text of warnings) if (text !== null) tell({ type: "info", text });

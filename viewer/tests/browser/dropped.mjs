@@ -179,7 +179,7 @@ export const droppedCases = [
         ["text.mcap", Buffer.from("no log at all"), "text.mcap: the log"],
         ["cut.mcap", SAMPLE.subarray(0, 300), "cut.mcap: the log"],
         ["zeros.mcap", Buffer.alloc(5000), "zeros.mcap: the log"],
-        ["other.mcap", withoutRecording, "cannot read the recording gone.palp"],
+        ["other.mcap", withoutRecording, "other.mcap: finger_on_floor.toml: line 9: cannot read the recording gone.palp"],
         ["mesh.stl", Buffer.from("solid"), "palpate record"],
       ];
       for (const [name, bytes, text] of bad) {
