@@ -8,6 +8,8 @@ import { PageLayout } from "./ui/page_layout";
 import { helpDialog } from "./ui/help_dialog";
 import { DisplayPanel } from "./ui/display_panel";
 import { Notifications } from "./ui/notifications";
+import { FirstLoad } from "./ui/first_load";
+import { scenesAddress, showsLogs } from "./protocol/local_logs";
 import { SceneView } from "./rendering/scene_view";
 import type { DisplaySettings } from "./rendering/scene_graph";
 import { prefersDark, loadPreferences, savePreferences } from "./preferences";
@@ -73,7 +75,10 @@ function start(): void {
     state: (state) => showState(state),
     decodeFailed: (what) => notifications.notifyOnce("unreadable", `The server sent a message that this page cannot read; it was dropped (${what}).`),
   };
-  const connection = runsInWorker() ? new WorkerConnection(listener) : new Connection(listener);
+  const worker = runsInWorker() ? new WorkerConnection({ ...listener, loading: (what, bytes, of) => firstLoad?.show(what, bytes, of) }) : null;
+  const connection = worker ?? new Connection(listener);
+  let firstLoad = worker === null ? null : new FirstLoad();
+  if (firstLoad !== null) layout.viewArea.append(firstLoad.box);
 
   function handleMessage(message: ServerMessage): void {
     if (message.type === "hello") {
@@ -89,6 +94,8 @@ function start(): void {
   }
 
   function selectMode(hello: Hello): void {
+    firstLoad?.end();
+    firstLoad = null;
     if (hello.protocol !== PROTOCOL) {
       notifications.showBanner(`This page speaks protocol ${PROTOCOL}, the server ${hello.protocol}. Reload the page.`, {
         text: "Reload",
@@ -112,7 +119,7 @@ function start(): void {
       }
       help = helpDialog(hello.kind);
       layout.page.append(help);
-      mode = hello.kind === "live" ? new LiveMode(sceneView, layout, notifications, display, connection) : new LogMode(sceneView, layout, notifications, display);
+      mode = hello.kind === "live" ? new LiveMode(sceneView, layout, notifications, display, connection, worker) : new LogMode(sceneView, layout, notifications, display);
       requestAnimationFrame(draw);
     }
     mode?.hello(hello);
@@ -124,9 +131,17 @@ function start(): void {
     } else if (state.name === "lost") {
       mode?.connectionLost();
       const why = state.reason === "" ? "" : ` (${state.reason})`;
-      if (runsInWorker()) notifications.showBanner(`The simulation has ended${why}.`, { text: "Start again", run: () => connection.retryNow() });
+      if (worker !== null) showEnd(state.reason, why);
       else notifications.showBanner(`The connection to palpate is lost${why}. Reconnecting …`, { text: "Reconnect now", run: () => connection.retryNow() });
     }
+  }
+
+  /** Banner with the reason that the worker has ended, and the way on. */
+  function showEnd(reason: string, why: string): void {
+    firstLoad?.end();
+    if (showsLogs()) notifications.showBanner(`The log cannot be shown: ${reason}`, { text: "Back to the scenes", run: () => window.location.assign(scenesAddress()) });
+    else if (mode === null) notifications.showBanner(`The scene could not be loaded: ${reason}. Look at the connection, and load the page again.`, { text: "Load again", run: () => window.location.reload() });
+    else notifications.showBanner(`The simulation has ended${why}.`, { text: "Start again", run: () => connection.retryNow() });
   }
 
   function draw(now: number): void {

@@ -34,7 +34,7 @@ pub fn page() -> PathBuf {
 
 /// Build the module, the npm package and the page; false, with a message, where no toolchain for WebAssembly can be had.
 pub fn build() -> Result<bool, String> {
-    let Some(module) = module()? else {
+    let Some(module) = build_module(&[], "palpate.wasm")? else {
         println!(
             "skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}"
         );
@@ -48,7 +48,8 @@ pub fn build() -> Result<bool, String> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&root().join(licence), &package.join("dist").join(licence))?;
     }
-    build_page(&module)?;
+    let Some(logs) = build_module(&["--features", "logs"], "palpate-logs.wasm")? else { return Ok(false) };
+    build_page(&[module, logs])?;
     report(&package)?;
     Ok(true)
 }
@@ -64,15 +65,16 @@ pub fn test() -> Result<(), String> {
     let chromium = machine::need_chromium()?;
     let examples = ["run", "test:examples", "--silent"];
     viewer::npm(&package(), &examples, &[("CHROMIUM", &chromium)])?;
-    let variables = [("PAGE", page()), ("CHROMIUM", chromium)];
+    let variables = [("PAGE", page()), ("CHROMIUM", chromium), ("PALPATE", program)];
     let variables = variables.each_ref().map(|(name, path)| (*name, path.as_path()));
     viewer::npm(&root().join("viewer"), &["run", "test:browser", "--silent"], &variables)
 }
 
-/// WebAssembly module; none where no toolchain for it can be had.
-fn module() -> Result<Option<PathBuf>, String> {
+/// WebAssembly module, kept by a name; none where no toolchain for it can be had.
+fn build_module(features: &[&str], name: &str) -> Result<Option<PathBuf>, String> {
     let mut cargo = cargo_command();
     cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
+    cargo.args(features);
     if build_std(&mut cargo, "std,panic_abort")? {
         cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS.join(" "));
     } else if is_installed(TARGET)? {
@@ -80,13 +82,18 @@ fn module() -> Result<Option<PathBuf>, String> {
     } else {
         return Ok(None);
     }
-    eprintln!("building the WebAssembly module");
+    eprintln!("building the WebAssembly module {name}");
     run(&mut cargo)?;
-    Ok(Some(root().join("target").join(TARGET).join("web/palpate_web.wasm")))
+    // The next build takes its place.
+    let kept = root().join("target/web/modules").join(name);
+    fs::create_dir_all(root().join("target/web/modules"))
+        .map_err(|error| format!("target/web/modules: {error}"))?;
+    copy(&root().join("target").join(TARGET).join("web/palpate_web.wasm"), &kept)?;
+    Ok(Some(kept))
 }
 
-/// The page with the module and the built-in scenes: files that any server serves.
-fn build_page(module: &Path) -> Result<(), String> {
+/// The page with the modules and the built-in scenes: files that any server serves.
+fn build_page(modules: &[PathBuf]) -> Result<(), String> {
     viewer::build()?;
     let page = page();
     empty(&page)?;
@@ -95,7 +102,9 @@ fn build_page(module: &Path) -> Result<(), String> {
     let html = fs::read_to_string(&index).map_err(|error| format!("{}: {error}", index.display()))?;
     let switched = html.replacen("<html", "<html data-transport=\"worker\"", 1);
     write(&index, switched.as_bytes())?;
-    copy(module, &page.join("palpate.wasm"))?;
+    for module in modules {
+        copy(module, &page.join(module.file_name().unwrap_or_default()))?;
+    }
     let scenes = page.join("scenes");
     run(Command::new(palpate()?).arg("scenes").arg("--output").arg(&scenes))
 }

@@ -25,6 +25,7 @@ export interface Exports {
   recording_positions(recording: number): number;
   recording_triangles(recording: number): number;
   recording_rescaled(recording: number, young: number, density: number): number;
+  recording_falling_scene(recording: number, name: number, nameLength: number): void;
   scene_files(address: number, length: number): void;
   parts_new(): number;
   parts_free(parts: number): void;
@@ -47,6 +48,8 @@ export interface Exports {
   live_replace(live: number, address: number, length: number, parts: number, about: number, aboutLength: number): number;
   live_greet(live: number, address: number, length: number): void;
   live_receive(live: number, address: number, length: number): void;
+  live_begin_record(live: number): number;
+  live_end_record(live: number): number;
   live_advance(live: number): number;
   live_data(live: number, address: number, length: number): number;
 }
@@ -120,7 +123,7 @@ export class Instance {
   described<T>(run: (exports: Exports) => unknown): T {
     this.json = null;
     this.call(run);
-    return this.json as T;
+    return this.takeJson() as T;
   }
 
   /** Last JSON that was sent since it was taken, or null. */

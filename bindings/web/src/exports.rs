@@ -5,12 +5,12 @@
 
 #![allow(missing_docs)]
 
-use crate::live_scene::{LiveScene, Titles};
+use crate::live_scene::{LiveScene, RecordedRun, Rescaled, Titles};
 use crate::simulation::{Array, Simulation, energy_names};
 use crate::{describe_recording, describe_scene};
 use glam::DVec3;
 use palpate::Recording;
-use palpate_scene::{PartsInMemory, RunMode, Scene, named_files, read_scene_text};
+use palpate_scene::{PartsInMemory, RunMode, Scene, falling_scene, named_files, read_scene_text};
 use palpate_viewer::{PageMessage, SceneSummary};
 use serde_json::{Value, json};
 use std::alloc::Layout;
@@ -23,7 +23,7 @@ const ERROR: u32 = 0;
 const JSON: u32 = 1;
 const TEXT: u32 = 2;
 const FRAME: u32 = 3;
-const DATA: u32 = 4;
+pub(crate) const DATA: u32 = 4;
 const SOUND: u32 = 5;
 
 #[link(wasm_import_module = "palpate")]
@@ -36,16 +36,16 @@ unsafe extern "C" {
     fn host_now() -> f64;
 }
 
-fn send(kind: u32, bytes: &[u8]) {
+pub(crate) fn send(kind: u32, bytes: &[u8]) {
     // SAFETY: JavaScript reads so many bytes there.
     unsafe { host_send(kind, bytes.as_ptr(), bytes.len()) }
 }
 
-fn send_json(value: &Value) {
+pub(crate) fn send_json(value: &Value) {
     send(JSON, value.to_string().as_bytes());
 }
 
-fn send_message(message: PageMessage) {
+pub(crate) fn send_message(message: PageMessage) {
     match message {
         PageMessage::Text(text) => send(TEXT, text.as_bytes()),
         PageMessage::Frame(frame) => send(FRAME, &frame),
@@ -53,13 +53,13 @@ fn send_message(message: PageMessage) {
     }
 }
 
-fn now() -> f64 {
+pub(crate) fn now() -> f64 {
     // SAFETY: a function of JavaScript without effects.
     unsafe { host_now() }
 }
 
 /// Result, or the default of its type after an error was sent.
-fn or_error<T: Default>(result: Result<T, String>) -> T {
+pub(crate) fn or_error<T: Default>(result: Result<T, String>) -> T {
     result.unwrap_or_else(|text| {
         send(ERROR, text.as_bytes());
         T::default()
@@ -67,7 +67,7 @@ fn or_error<T: Default>(result: Result<T, String>) -> T {
 }
 
 /// Bytes that JavaScript has written.
-unsafe fn bytes<'a>(address: *const u8, length: usize) -> &'a [u8] {
+pub(crate) unsafe fn bytes<'a>(address: *const u8, length: usize) -> &'a [u8] {
     if length == 0 {
         return &[];
     }
@@ -76,17 +76,17 @@ unsafe fn bytes<'a>(address: *const u8, length: usize) -> &'a [u8] {
 }
 
 /// Text that JavaScript has written.
-unsafe fn text(address: *const u8, length: usize) -> String {
+pub(crate) unsafe fn text(address: *const u8, length: usize) -> String {
     // SAFETY: as promised by the caller of the export.
     String::from_utf8_lossy(unsafe { bytes(address, length) }).into_owned()
 }
 
-fn handle<T>(value: T) -> *mut T {
+pub(crate) fn handle<T>(value: T) -> *mut T {
     Box::into_raw(Box::new(value))
 }
 
 /// Handle of a value, or none after an error was sent.
-fn handle_or_error<T>(value: Result<T, impl Display>) -> *mut T {
+pub(crate) fn handle_or_error<T>(value: Result<T, impl Display>) -> *mut T {
     or_error(value.map(Some).map_err(|error| error.to_string())).map_or(std::ptr::null_mut(), handle)
 }
 
@@ -150,6 +150,17 @@ pub unsafe extern "C" fn recording_rescaled(
     density: f64,
 ) -> *mut Arc<Recording> {
     handle_or_error(recording.rescaled(young, density).map(Arc::new))
+}
+
+/// Sends the text of a scene in which the recorded object falls on a floor; the name is that of its file.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn recording_falling_scene(
+    recording: &Arc<Recording>,
+    name: *const u8,
+    name_length: usize,
+) {
+    // SAFETY: as promised by the caller.
+    send_json(&json!(falling_scene(recording, &unsafe { text(name, name_length) })));
 }
 
 /// Sends the files that a scene names.
@@ -341,6 +352,25 @@ pub unsafe extern "C" fn live_receive(live: &mut LiveScene, address: *const u8, 
     if let Some(id) = or_error(live.receive(&message, &mut send_message)) {
         send_json(&Value::String(id));
     }
+}
+
+/// Begins a record for a log; false after an error was sent.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_begin_record(live: &mut LiveScene) -> bool {
+    or_error(live.begin_record(&mut send_message).map(|()| true))
+}
+
+/// Ends a record, which is sent: JSON with the text of the scene, the number of steps and the changes of materials, and as data the numbers of the
+/// inputs. False if none was begun.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_end_record(live: &mut LiveScene) -> bool {
+    let Some(RecordedRun { text, rescaled, inputs }) = live.end_record() else { return false };
+    let change = |Rescaled { name, of, young, density }: &Rescaled| json!({ "name": name, "of": of, "young": young, "density": density });
+    let rescaled: Value = rescaled.iter().map(change).collect();
+    send_json(&json!({ "text": text, "steps": inputs.steps(), "rescaled": rescaled }));
+    let numbers: Vec<u8> = inputs.numbers().iter().flat_map(|number| number.to_le_bytes()).collect();
+    send(DATA, &numbers);
+    true
 }
 
 /// Makes the steps that are due, and returns the time of the next deadline [s].

@@ -12,8 +12,10 @@ mod description;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod live_scene;
+#[cfg(all(target_arch = "wasm32", feature = "logs"))]
+mod log_exports;
 mod simulation;
 
 pub use description::{describe_recording, describe_scene};
-pub use live_scene::LiveScene;
+pub use live_scene::{LiveScene, RecordedRun, Rescaled};
 pub use simulation::{Array, Simulation};

@@ -1,6 +1,7 @@
 //! Live scene of the viewer's page, run in a worker of the page.
 
 use palpate::Recording;
+use palpate_haptics::InputRecord;
 use palpate_scene::{PartsInMemory, SettingsChange, TouchableScene, read_touchable_scene};
 use palpate_viewer::{
     LocalRequest, LocalScene, MaterialDescription, PageMessage, PhysicsSettings, SceneSummary, ViewerDevice,
@@ -30,12 +31,47 @@ struct SceneText {
     titles: Titles,
     text: String,
     parts: PartsInMemory,
+    /// Changes of materials, in their order.
+    rescaled: Vec<Rescaled>,
+    /// Names of added pointers, about whose size nobody is warned.
+    added: Vec<String>,
+}
+
+impl SceneText {
+    fn new(titles: Titles, text: String, parts: PartsInMemory) -> Self {
+        Self { titles, text, parts, rescaled: Vec::new(), added: Vec::new() }
+    }
+}
+
+/// Recording of another material, made of the recording of a name [Pa, kg/m³].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rescaled {
+    /// Name of the new recording.
+    pub name: String,
+    /// Name of the recording that it was made of, maybe the same.
+    pub of: String,
+    /// Young's modulus [Pa].
+    pub young: f64,
+    /// Density [kg/m³].
+    pub density: f64,
 }
 
 /// Live scene, with the text that it was made of.
 pub struct LiveScene {
     local: LocalScene,
     current: SceneText,
+    /// Scene of the record.
+    recorded: Option<SceneText>,
+}
+
+/// Record of a run: the scene, and the inputs of its steps.
+pub struct RecordedRun {
+    /// Text of the scene, with added pointers.
+    pub text: String,
+    /// Changes of materials since the scene was opened, in their order.
+    pub rescaled: Vec<Rescaled>,
+    /// Initial states and inputs.
+    pub inputs: InputRecord,
 }
 
 impl LiveScene {
@@ -44,8 +80,12 @@ impl LiveScene {
     /// # Errors
     /// Text, when the scene cannot be read, or needs a device of a machine.
     pub fn open(titles: Titles, text: String, parts: PartsInMemory) -> Result<Self, String> {
-        let (scene, current) = read(SceneText { titles, text, parts })?;
-        Ok(Self { local: LocalScene::new(scene).map_err(|error| error.to_string())?, current })
+        let (scene, current) = read(SceneText::new(titles, text, parts))?;
+        Ok(Self {
+            local: LocalScene::new(scene).map_err(|error| error.to_string())?,
+            current,
+            recorded: None,
+        })
     }
 
     /// Starts another scene in place of this one; on an error this one goes on.
@@ -59,7 +99,7 @@ impl LiveScene {
         parts: PartsInMemory,
         send: Send,
     ) -> Result<(), String> {
-        self.start(SceneText { titles, text, parts }, false, send)
+        self.start(SceneText::new(titles, text, parts), false, send)
     }
 
     /// Sends the first messages to the page. `scenes` can be opened.
@@ -87,6 +127,22 @@ impl LiveScene {
                 self.start(changed, false, send).map(|()| None)
             }
         }
+    }
+
+    /// Begins a record for a log, at a start of the scene.
+    ///
+    /// # Errors
+    /// Text, when the scene cannot be started.
+    pub fn begin_record(&mut self, send: Send) -> Result<(), String> {
+        self.local.begin_record(send).map_err(|error| error.to_string())?;
+        self.recorded = Some(self.current.clone());
+        Ok(())
+    }
+
+    /// Ends the record, if one was begun.
+    pub fn end_record(&mut self) -> Option<RecordedRun> {
+        let SceneText { text, rescaled, .. } = self.recorded.take()?;
+        Some(RecordedRun { text, rescaled, inputs: self.local.end_record()? })
     }
 
     /// Makes the steps that are due; `now_s` reads the clock [s].
@@ -127,12 +183,15 @@ impl LiveScene {
         let mut changed = self.current.clone();
         // One name, so that the recording of the former material goes.
         let name = format!("object-{object}.palp");
+        let mut of = String::new();
         changed.text = edited(&changed.text, |table| {
             let entry = table.get_mut("object").and_then(|objects| objects.get_mut(object));
             let entry = entry.and_then(Value::as_table_mut).ok_or("the scene has no such object")?;
-            entry.insert("recording".into(), Value::String(name.clone()));
+            let before = entry.insert("recording".into(), Value::String(name.clone()));
+            of = before.and_then(|before| before.as_str().map(str::to_string)).unwrap_or_default();
             Ok(())
         })?;
+        changed.rescaled.push(Rescaled { name: name.clone(), of, young, density });
         changed.parts.recordings.insert(name.into(), Arc::new(rescaled));
         Ok(changed)
     }
@@ -147,9 +206,11 @@ fn edited(text: &str, change: impl FnOnce(&mut Table) -> Result<(), String>) -> 
 
 /// Scene of a text, and the text with the pointers that were added.
 fn read(of: SceneText) -> Result<(ViewerScene, SceneText), String> {
-    let SceneText { titles, text, parts } = of;
+    let SceneText { titles, text, parts, rescaled, mut added } = of;
     let read = read_touchable_scene(Path::new("scene.toml"), text, &parts);
-    let TouchableScene { scene, text } = read.map_err(|error| error.to_string())?;
+    let TouchableScene { mut scene, text, added: new } = read.map_err(|error| error.to_string())?;
+    added.extend(new);
+    scene.warnings.retain(|warning| !added.contains(&warning.part));
     let Titles { id, title, about } = titles.clone();
     let recordable: Vec<bool> = scene.model.recordings().map(Recording::is_rescalable).collect();
     let description = describe_scene(&scene, (id, title, about), &recordable);
@@ -165,7 +226,7 @@ fn read(of: SceneText) -> Result<(ViewerScene, SceneText), String> {
         Some(path) => ViewerDevice::Path(path.clone(), device.mode),
         None => ViewerDevice::Pointer,
     });
-    Ok((scene, SceneText { titles, text, parts }))
+    Ok((scene, SceneText { titles, text, parts, rescaled, added }))
 }
 
 fn settings_change(settings: PhysicsSettings) -> SettingsChange {

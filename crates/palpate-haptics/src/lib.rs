@@ -14,7 +14,8 @@
 //! The processes exchange values through triple buffers: no process waits for another. Times are in seconds since a common start, and
 //! a cycle is a function of time, so that a loop can also be closed in simulated time, without threads.
 //!
-//! Without the feature `real-time` the crate has what is a function of time, and no thread, clock, driver, link or log: WebAssembly runs that.
+//! Without the feature `real-time` the crate has what is a function of time, and no thread, clock, driver or link, and without the feature `logs` no
+//! log: WebAssembly runs that.
 //!
 //! | you want to | start with |
 //! |---|---|
@@ -41,9 +42,10 @@ mod force_process;
 #[cfg(feature = "real-time")]
 pub mod guardian;
 mod haptic_update;
+mod input_record;
 #[cfg(feature = "real-time")]
 pub mod link;
-#[cfg(feature = "real-time")]
+#[cfg(feature = "logs")]
 pub mod log;
 mod motion_check;
 mod motion_path;
@@ -71,6 +73,7 @@ pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 pub use error::{Error, LogError};
 pub use force_process::{ForceProcess, ObstacleTrajectory, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
+pub use input_record::{InputReader, InputRecord};
 pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;
 pub use playback::Playback;

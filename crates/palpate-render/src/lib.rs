@@ -17,7 +17,8 @@ pub use browser::{ImageSink, find_browser, program_runs, render_log};
 
 pub use error::RenderError;
 pub use gif::write_gif;
-pub use log_frames::{FrameSpacing, LogFramePlayer};
+pub use log_frames::LogFramePlayer;
+pub use palpate_viewer::FrameSpacing;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,58 +1,17 @@
 //! Frames of a log for the viewer: the log is replayed, and some of its steps become frames.
 
 use crate::error::RenderError;
-use palpate_haptics::Snapshot;
 use palpate_scene::{LogReplay, Progress, ReplayError};
-use palpate_viewer::{LogFrameBuilder, LogFrames, describe_scene};
+use palpate_viewer::{FrameSpacing, FrameSteps, LogFrames, LogPlayer};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Upper bound of the frames of a log: ten minutes at 60 Hz, some 100 MB.
-const MAX_FRAMES: u64 = 36_000;
-
 /// Log whose frames are computed.
 pub struct LogFramePlayer {
-    log: LogReplay,
-    steps: FrameSteps,
-    builder: LogFrameBuilder,
+    player: LogPlayer,
     /// Frames, for the viewer's server.
     pub frames: Arc<LogFrames>,
-}
-
-/// Steps that become frames; step 0 is the initial state.
-enum FrameSteps {
-    /// Every n-th.
-    Every(u64),
-    /// Given steps, ascending.
-    At(Vec<u64>),
-}
-
-impl FrameSteps {
-    fn contains(&self, step: u64) -> bool {
-        match self {
-            Self::Every(every) => step.is_multiple_of(*every),
-            Self::At(steps) => steps.binary_search(&step).is_ok(),
-        }
-    }
-
-    fn spacing(&self, steps: u64, step_s: f64) -> FrameSpacing {
-        match self {
-            Self::Every(every) => {
-                FrameSpacing { count: steps / every + 1, interval_s: *every as f64 * step_s }
-            }
-            Self::At(chosen) => FrameSpacing { count: chosen.len() as u64, interval_s: step_s },
-        }
-    }
-}
-
-/// Number of frames and the interval between them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameSpacing {
-    /// Number.
-    pub count: u64,
-    /// Interval [s].
-    pub interval_s: f64,
 }
 
 impl LogFramePlayer {
@@ -61,11 +20,7 @@ impl LogFramePlayer {
     /// # Errors
     /// As [`LogReplay::read`].
     pub fn read(path: &Path, number: usize, rate_hz: f64) -> Result<Self, ReplayError> {
-        Self::of(path, number, |log| {
-            let step_s = log.scene.model.parameters().step_s;
-            let every = (1.0 / (rate_hz * step_s)).round().max(1.0) as u64;
-            FrameSteps::Every(every.max(log.steps.div_ceil(MAX_FRAMES)))
-        })
+        Self::of(path, number, |log| FrameSteps::at_rate(log, rate_hz))
     }
 
     /// Reads a log of which given steps become frames, ascending; step 0 is the initial state.
@@ -82,27 +37,20 @@ impl LogFramePlayer {
         choose: impl FnOnce(&LogReplay) -> FrameSteps,
     ) -> Result<Self, ReplayError> {
         let log = LogReplay::read(path)?;
-        let step_s = log.scene.model.parameters().step_s;
         let steps = choose(&log);
-        let spacing = steps.spacing(log.steps, step_s);
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let end = if log.is_cut() { "; the log was cut here" } else { "" };
-        let about = format!("{:.1} s at {:.0} Hz{end}", log.steps as f64 * step_s, 1.0 / step_s);
-        let description = describe_scene(&log.scene, (None, name.clone(), about), &[]);
-        let model = log.scene.model.clone();
-        let (frames, builder) =
-            LogFrames::new(number, name, model, description, spacing.count, spacing.interval_s);
-        Ok(Self { log, steps, builder, frames })
+        let player = LogPlayer::new(log, name, number, steps)?;
+        Ok(Self { frames: player.frames.clone(), player })
     }
 
     /// The log.
     pub fn log(&self) -> &LogReplay {
-        &self.log
+        self.player.log()
     }
 
     /// Number and interval of its frames.
     pub fn spacing(&self) -> FrameSpacing {
-        self.steps.spacing(self.log.steps, self.log.scene.model.parameters().step_s)
+        self.player.spacing()
     }
 
     /// Computes all frames; progress counts steps.
@@ -110,35 +58,24 @@ impl LogFramePlayer {
     /// # Errors
     /// When the log cannot be replayed, or `stop` is set. The frames so far remain.
     pub fn compute(self, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<(), RenderError> {
-        let Self { log, steps, mut builder, .. } = self;
-        let computed = compute_frames(&log, &steps, &mut builder, stop, progress);
-        builder.finish(computed.as_ref().err().map(ToString::to_string));
-        computed
+        let Self { mut player, .. } = self;
+        progress.begin("steps", player.log().steps);
+        let computed = compute_frames(&mut player, stop, progress);
+        let replayed = player.finish(computed.as_ref().err().map(ToString::to_string));
+        computed.and(replayed.map(drop).map_err(RenderError::from))
     }
 }
 
 fn compute_frames(
-    log: &LogReplay,
-    steps: &FrameSteps,
-    builder: &mut LogFrameBuilder,
+    player: &mut LogPlayer,
     stop: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<(), RenderError> {
-    let (mut state, start) = (log.initial_state()?, log.initial_input()?);
-    let mut snapshot = Snapshot::new(&log.scene.model, &state, &start);
-    if steps.contains(0) {
-        builder.push(&snapshot);
-    }
-    progress.begin("steps", log.steps);
-    let mut number = 0;
-    log.replay(&mut state, log.steps, |input, state, _| {
-        number += 1;
+    while player.advance()? {
         progress.advance(1);
-        if steps.contains(number) {
-            snapshot.capture(number, input, state);
-            builder.push(&snapshot);
+        if stop.load(Ordering::Relaxed) {
+            return Err(RenderError::ReplayInterrupted);
         }
-        if stop.load(Ordering::Relaxed) { Err(RenderError::ReplayInterrupted) } else { Ok(()) }
-    })?;
+    }
     Ok(())
 }

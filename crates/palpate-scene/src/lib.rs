@@ -6,8 +6,8 @@
 //! SceneLibrary      → built-in scenes, scene files and uploaded meshes, with changes of their settings
 //! ```
 //!
-//! Without the feature `native` there are scene files whose parts are in memory, and no files, recording, tables, logs and library: WebAssembly
-//! uses that.
+//! Without the feature `native` there are scene files whose parts are in memory, and no files, recording, tables and library: WebAssembly
+//! uses that. The feature `logs` has logs of such scenes.
 //!
 //! Errors are values: a [`SceneError`] has its kind, file, line, key and message. Nothing here prints or ends the process.
 
@@ -23,6 +23,8 @@ mod file;
 mod files;
 mod initial_checks;
 mod library;
+#[cfg(feature = "logs")]
+mod log_maker;
 #[cfg(feature = "native")]
 mod material_choice;
 #[cfg(feature = "native")]
@@ -36,7 +38,7 @@ mod recipe;
 #[cfg(feature = "native")]
 mod record_options;
 mod recording_file;
-#[cfg(feature = "native")]
+#[cfg(feature = "logs")]
 mod replay;
 mod scene;
 #[cfg(feature = "native")]
@@ -57,7 +59,9 @@ pub use file::{
 };
 #[cfg(feature = "native")]
 pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
-pub use library::{SettingsChange, TouchableScene, read_touchable_scene};
+pub use library::{SettingsChange, TouchableScene, falling_scene, read_touchable_scene};
+#[cfg(feature = "logs")]
+pub use log_maker::LogMaker;
 #[cfg(feature = "native")]
 pub use material_choice::MaterialChoice;
 #[cfg(feature = "native")]
@@ -73,8 +77,8 @@ pub use recipe::{RecordingRecipe, cache_folder};
 #[cfg(feature = "native")]
 pub use record_options::{BodySource, PreparedBody, RecordOptions};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
-#[cfg(feature = "native")]
-pub use replay::{Difference, LogReplay, ReplayError, Replayed};
+#[cfg(feature = "logs")]
+pub use replay::{Difference, LogReplay, ReplayCursor, ReplayError, Replayed};
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 #[cfg(feature = "native")]
 pub use scene_log::SceneLog;

@@ -11,13 +11,17 @@ use std::path::Path;
 /// # Errors
 /// When the path is no regular file, the file is empty, or its content is refused by the runtime.
 pub fn read_recording(path: &Path) -> Result<Recording, SceneError> {
-    let refused = |message: String| SceneError::of_file(SceneErrorKind::Recording, path, message);
     let failed = |error: std::io::Error| SceneError::io("read the recording", path, &error);
-    let bytes = read_regular_file(path).map_err(failed)?;
+    recording_of_bytes(path, &read_regular_file(path).map_err(failed)?)
+}
+
+/// Recording of the bytes of a file, which errors name.
+pub(crate) fn recording_of_bytes(path: &Path, bytes: &[u8]) -> Result<Recording, SceneError> {
+    let refused = |message: String| SceneError::of_file(SceneErrorKind::Recording, path, message);
     if bytes.is_empty() {
         return Err(refused(format!("{}: the file is empty", path.display())));
     }
-    Recording::from_bytes(&bytes).map_err(|error| refused(format!("{}: {error}", path.display())))
+    Recording::from_bytes(bytes).map_err(|error| refused(format!("{}: {error}", path.display())))
 }
 
 /// Certificate of a recording in words, as an indented table for a terminal.

@@ -4,16 +4,22 @@
 //! difference is reported: a change of the solver changes last digits.
 
 use crate::error::SceneError;
-use crate::file::{Relocated, RunMode, read_relocated_scene};
+use crate::file::{PartsInMemory, RunMode, named_files, read_scene_in_memory};
+#[cfg(feature = "native")]
+use crate::file::{Relocated, read_relocated_scene};
+use crate::recording_file::recording_of_bytes;
 use crate::scene::Scene;
 use palpate::{DeviceMode, Input, State, step};
+#[cfg(feature = "native")]
 use palpate_export::{TemporaryFolder, part_of};
 use palpate_haptics::SceneNames;
-use palpate_haptics::log::LogReader;
+use palpate_haptics::log::{LogReader, LoggedStep, StepCursor};
+#[cfg(feature = "native")]
 use palpate_mesh::read_regular_file;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Reason that a log cannot be replayed.
@@ -120,7 +126,15 @@ pub struct LogReplay {
     names: SceneNames,
     modes: Vec<DeviceMode>,
     // The unpacked files must outlive the scene: tables are read on first use.
-    _folder: TemporaryFolder,
+    #[cfg(feature = "native")]
+    _folder: Option<TemporaryFolder>,
+}
+
+/// Place in the replay of a log, for a program that computes it step by step.
+pub struct ReplayCursor {
+    steps: StepCursor,
+    done: u64,
+    first_difference: Option<Difference>,
 }
 
 impl LogReplay {
@@ -128,6 +142,7 @@ impl LogReplay {
     ///
     /// # Errors
     /// When it cannot be read, or its scene is refused.
+    #[cfg(feature = "native")]
     pub fn read(path: &Path) -> Result<Self, ReplayError> {
         let bytes = read_regular_file(path).map_err(|source| {
             let part = part_of(path);
@@ -138,16 +153,19 @@ impl LogReplay {
                 _ => ReplayError::Io { action: "read the log", path: path.into(), source },
             }
         })?;
-        let named = |error| ReplayError::Log { path: path.to_path_buf(), error };
-        let reader = LogReader::new(bytes).map_err(named)?;
-        let facts = reader.metadata().map_err(named)?;
-        let files = reader.files().map_err(named)?;
-        let steps = reader.step_count();
-        let (mut scene, folder) = unpack(files, facts.get("scene").map(Path::new))?;
-        scene.inputs.push(path.to_path_buf());
-        let names = scene.names();
-        let modes = scene.devices.iter().map(|device| device.mode).collect();
-        Ok(Self { path: path.to_path_buf(), reader, facts, scene, steps, names, modes, _folder: folder })
+        let content = LogContent::new(path, bytes)?;
+        let (scene, folder) = unpack(content.files()?, content.scene())?;
+        Ok(Self { _folder: Some(folder), ..content.with(scene) })
+    }
+
+    /// Log of the bytes of a file, whose scene stays in memory: its recordings and paths, but no table and no mesh. Errors name `path`.
+    ///
+    /// # Errors
+    /// When it is no log, or its scene is refused.
+    pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ReplayError> {
+        let content = LogContent::new(path, bytes)?;
+        let scene = scene_in_memory(content.files()?, content.scene())?;
+        Ok(content.with(scene))
     }
 
     /// State before the first step: that of the scene, or the one that the log resumes from.
@@ -212,38 +230,22 @@ impl LogReplay {
         max_steps: u64,
         mut visit: impl FnMut(&Input, &State, Duration) -> Result<(), E>,
     ) -> Result<Replayed, E> {
-        let path = || self.path.clone();
-        let is_current = self.version() == env!("CARGO_PKG_VERSION");
-        let (mut done, mut first_difference) = (0, None);
-        for logged in self.reader.logged_steps().take(max_steps.try_into().unwrap_or(usize::MAX)) {
-            let logged = logged.map_err(|error| self.named(error))?;
-            if logged.step != done + 1 {
-                let gap = ReplayError::MissedSteps { path: path(), step: logged.step, previous: done };
-                return Err(gap.into());
-            }
-            let input = logged.input(&self.names, &self.modes).map_err(|error| self.named(error))?;
+        let mut cursor = self.cursor();
+        for _ in 0..max_steps {
+            let Some(next) = cursor.next(self) else { break };
+            let (logged, input) = next?;
             let before = Instant::now();
             step(&self.scene.model, state, &input);
             let took = before.elapsed();
-            if first_difference.is_none() {
-                let found = logged.first_difference(&self.names, state.output());
-                first_difference = found.map(|(quantity, then, now)| Difference {
-                    step: logged.step,
-                    quantity,
-                    logged: then,
-                    computed: now,
-                });
-            }
-            if let Some(difference) = first_difference.take_if(|_| is_current) {
-                return Err(ReplayError::Differs { path: path(), difference }.into());
-            }
-            done = logged.step;
+            cursor.compare(self, &logged, state)?;
             visit(&input, state, took)?;
         }
-        if done == 0 {
-            return Err(ReplayError::NoSteps(path()).into());
-        }
-        Ok(Replayed { steps: done, first_difference })
+        Ok(cursor.finish(self)?)
+    }
+
+    /// Place before the first step.
+    pub fn cursor(&self) -> ReplayCursor {
+        ReplayCursor { steps: self.reader.step_cursor(), done: 0, first_difference: None }
     }
 
     fn named(&self, error: palpate_haptics::Error) -> ReplayError {
@@ -251,7 +253,134 @@ impl LogReplay {
     }
 }
 
+impl ReplayCursor {
+    /// Next logged step with its input; `None` at the end.
+    ///
+    /// # Errors
+    /// When it cannot be read, or steps before it are missing.
+    pub fn next(&mut self, log: &LogReplay) -> Option<Result<(LoggedStep, Input), ReplayError>> {
+        let logged = match self.steps.next(&log.reader)? {
+            Ok(logged) => logged,
+            Err(error) => return Some(Err(log.named(error))),
+        };
+        if logged.step != self.done + 1 {
+            let (path, step, previous) = (log.path.clone(), logged.step, self.done);
+            return Some(Err(ReplayError::MissedSteps { path, step, previous }));
+        }
+        let input = logged.input(&log.names, &log.modes).map_err(|error| log.named(error));
+        Some(input.map(|input| (logged, input)))
+    }
+
+    /// Compares a step with its state after it.
+    ///
+    /// # Errors
+    /// When a number differs in a log of this version.
+    pub fn compare(
+        &mut self,
+        log: &LogReplay,
+        logged: &LoggedStep,
+        state: &State,
+    ) -> Result<(), ReplayError> {
+        if self.first_difference.is_none() {
+            let found = logged.first_difference(&log.names, state.output());
+            self.first_difference = found.map(|(quantity, then, now)| Difference {
+                step: logged.step,
+                quantity,
+                logged: then,
+                computed: now,
+            });
+        }
+        let is_current = log.version() == env!("CARGO_PKG_VERSION");
+        if let Some(difference) = self.first_difference.take_if(|_| is_current) {
+            return Err(ReplayError::Differs { path: log.path.clone(), difference });
+        }
+        self.done = logged.step;
+        Ok(())
+    }
+
+    /// Result of the steps so far.
+    ///
+    /// # Errors
+    /// When there were none.
+    pub fn finish(self, log: &LogReplay) -> Result<Replayed, ReplayError> {
+        match self.done {
+            0 => Err(ReplayError::NoSteps(log.path.clone())),
+            steps => Ok(Replayed { steps, first_difference: self.first_difference }),
+        }
+    }
+}
+
+/// Log whose scene has not been read.
+struct LogContent {
+    path: PathBuf,
+    reader: LogReader<'static>,
+    facts: BTreeMap<String, String>,
+}
+
+impl LogContent {
+    fn new(path: &Path, bytes: Vec<u8>) -> Result<Self, ReplayError> {
+        let named = |error| ReplayError::Log { path: path.to_path_buf(), error };
+        let reader = LogReader::new(bytes).map_err(named)?;
+        let facts = reader.metadata().map_err(named)?;
+        Ok(Self { path: path.to_path_buf(), reader, facts })
+    }
+
+    fn files(&self) -> Result<Vec<(String, Vec<u8>)>, ReplayError> {
+        self.reader.files().map_err(|error| ReplayError::Log { path: self.path.clone(), error })
+    }
+
+    fn scene(&self) -> Option<&Path> {
+        self.facts.get("scene").map(Path::new)
+    }
+
+    fn with(self, mut scene: Scene) -> LogReplay {
+        let Self { path, reader, facts } = self;
+        let steps = reader.step_count();
+        scene.inputs.push(path.clone());
+        let names = scene.names();
+        let modes = scene.devices.iter().map(|device| device.mode).collect();
+        LogReplay {
+            path,
+            reader,
+            facts,
+            scene,
+            steps,
+            names,
+            modes,
+            #[cfg(feature = "native")]
+            _folder: None,
+        }
+    }
+}
+
+/// Scene of a log from its files: the recordings and motion paths among them, by the names that the scene gives them.
+fn scene_in_memory(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Result<Scene, ReplayError> {
+    let scene = scene.ok_or(ReplayError::NoScene)?;
+    let mut files: BTreeMap<PathBuf, Vec<u8>> =
+        files.into_iter().map(|(name, content)| (PathBuf::from(name), content)).collect();
+    let text = files.remove(scene).unwrap_or_default();
+    let mut parts = PartsInMemory::default();
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    // A scene that cannot be read is refused below, with the line.
+    for name in named_files(&String::from_utf8_lossy(&text)).unwrap_or_default() {
+        let path = folder.join(&name);
+        let Some(content) = files.get(&path) else { continue };
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("csv") => drop(parts.paths.insert(name, String::from_utf8_lossy(content).into_owned())),
+            Some("palp") => {
+                drop(parts.recordings.insert(name, Arc::new(recording_of_bytes(&path, content)?)));
+            }
+            // A mesh, or a recording of another name.
+            _ => drop(recording_of_bytes(&path, content).map(|recording| {
+                parts.recordings.insert(name, Arc::new(recording));
+            })),
+        }
+    }
+    Ok(read_scene_in_memory(scene, text, &parts, RunMode::RealTime)?)
+}
+
 /// Scene of a log, and the temporary folder with its files.
+#[cfg(feature = "native")]
 fn unpack(
     files: Vec<(String, Vec<u8>)>,
     scene: Option<&Path>,

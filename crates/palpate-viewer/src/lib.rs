@@ -5,7 +5,8 @@
 //!      ← frames: modal coordinates, poses and residual displacements, 60 per second
 //! ```
 //!
-//! Without the feature `server` there is the protocol and a [`LocalScene`], which a page runs by itself, as in a Web Worker.
+//! Without the feature `server` there is the protocol and a [`LocalScene`], which a page runs by itself, as in a Web Worker; with the feature `logs`
+//! logs as well, [`LocalLogs`].
 //!
 //! `docs/viewer-protocol.md` defines the protocol with the page, `viewer/`, which is embedded here. A [`SceneProvider`]
 //! makes the scenes: the server knows neither scene files nor recording. No page can delay the force process: frames
@@ -19,9 +20,14 @@ mod describe;
 mod error;
 #[cfg(feature = "server")]
 mod live;
+mod local_log;
+#[cfg(feature = "logs")]
+mod local_logs;
 mod local_scene;
-#[cfg(feature = "server")]
+#[cfg(feature = "logs")]
 mod log_frames;
+#[cfg(feature = "logs")]
+mod log_player;
 mod page_requests;
 mod pointers;
 mod protocol;
@@ -35,9 +41,14 @@ pub use describe::describe_scene;
 pub use error::SceneError;
 #[cfg(feature = "server")]
 pub use error::{ServerError, TlsError, TokenError};
+pub use local_log::{LARGEST_RECORD_BYTES, LONGEST_RECORD_S};
+#[cfg(feature = "logs")]
+pub use local_logs::LocalLogs;
 pub use local_scene::{LocalRequest, LocalScene, PageMessage};
-#[cfg(feature = "server")]
+#[cfg(feature = "logs")]
 pub use log_frames::{LogFrameBuilder, LogFrames};
+#[cfg(feature = "logs")]
+pub use log_player::{FrameSpacing, FrameSteps, LogPlayer};
 pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
     MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,

@@ -5,6 +5,7 @@
 
 use crate::current::CurrentScene;
 use crate::error::SceneError;
+use crate::local_log::LocalRecord;
 use crate::page_requests::{Effect, SceneControls, SceneRequest, unreadable};
 use crate::pointers::{Pointers, lock};
 use crate::protocol::{
@@ -16,7 +17,8 @@ use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, is_resumable};
 use crate::static_data::StaticData;
 use palpate::{DeviceMode, Model, State};
 use palpate_haptics::{
-    Cycle, DevicePort, ForcePort, ForceProcess, ObstacleTrajectory, Overrun, Playback, Snapshot, Timing, port,
+    Cycle, DevicePort, ForcePort, ForceProcess, InputRecord, ObstacleTrajectory, Overrun, Playback, Snapshot,
+    Timing, port,
 };
 use palpate_sound::{SoundParameters, StepRecord, Synthesiser};
 use std::sync::Mutex;
@@ -81,6 +83,8 @@ pub struct LocalScene {
     frames: u32,
     /// Sound, while the page wants it.
     sound: Option<LocalSound>,
+    /// Record for a log.
+    record: Option<LocalRecord>,
 }
 
 /// Sound of the steps since the last block.
@@ -134,6 +138,7 @@ impl LocalScene {
             stride: 1,
             frames: 0,
             sound: None,
+            record: None,
         })
     }
 
@@ -154,17 +159,35 @@ impl LocalScene {
         };
         let next = Self::at(self.current.generation + 1, scene, state)?;
         let is_heard = self.sound.is_some();
+        let record = self.record.take().map(|record| LocalRecord { has_ended: true, ..record });
         *self = Self {
             playback: std::mem::take(&mut self.playback),
             status_at_s: self.status_at_s,
             format: self.format,
             stride: self.stride,
             frames: self.frames,
+            record,
             ..next
         };
         self.switch_sound(is_heard);
         self.send_scene(send);
         Ok(())
+    }
+
+    /// Begins a record for a log, at a start of the scene: from its present state, where the scene allows it.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn begin_record(&mut self, send: &mut dyn FnMut(PageMessage)) -> Result<(), SceneError> {
+        self.start(self.current.scene.clone(), true, send)?;
+        let inputs = InputRecord::new(&self.process.state().snapshots());
+        self.record = Some(LocalRecord { inputs, has_ended: false });
+        Ok(())
+    }
+
+    /// Ends the record, if one was begun: of the scene from its start to now, to the next start of a scene, or to its limits.
+    pub fn end_record(&mut self) -> Option<InputRecord> {
+        self.record.take().map(|record| record.inputs)
     }
 
     /// Sends the first messages: hello, scene and frame. `scenes` can be opened.
@@ -283,6 +306,9 @@ impl LocalScene {
         let is_due = self.playback.is_due(self.tick);
         if is_due {
             self.process.cycle(time_s);
+            if let Some(record) = &mut self.record {
+                record.push(self.process.input(), step_s);
+            }
             // In slow motion and in a pause its frequencies would be wrong.
             if let Some(sound) = self.sound.as_mut().filter(|_| self.playback.is_at_full_speed()) {
                 sound.add(self.process.state());

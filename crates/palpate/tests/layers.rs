@@ -107,7 +107,7 @@ const DIRECTIONS: &[(&str, &[&str])] = &[
     ),
     // Its tests write a store.
     ("palpate-c", &["palpate", "palpate-scene", "palpate-store"]),
-    ("palpate-web", &["palpate", "palpate-scene", "palpate-viewer"]),
+    ("palpate-web", &["palpate", "palpate-haptics", "palpate-scene", "palpate-viewer"]),
     (
         "palpate-python",
         &["palpate", "palpate-export", "palpate-fem", "palpate-haptics", "palpate-mesh", "palpate-scene"],

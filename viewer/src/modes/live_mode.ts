@@ -6,6 +6,7 @@ import type { Frame } from "../protocol/frame";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import { FrameMismatch } from "../rendering/elastic/elastic_mesh";
 import { MeshUpload } from "../ui/mesh_upload";
+import { OpenFiles } from "../ui/open_files";
 import { element } from "../ui/elements";
 import { ForceReadout } from "../ui/force_readout";
 import type { PageLayout } from "../ui/page_layout";
@@ -20,6 +21,7 @@ import { TimingPanel } from "../ui/timing_panel";
 import { LostObjects } from "../ui/lost_objects";
 import { OwnSettings } from "../ui/physics_settings";
 import { Pace, paceText } from "../ui/pace";
+import { vibrationSwitch } from "../ui/vibration_switch";
 import { ScaleLock } from "../ui/scale_lock";
 import type { SoundBlock } from "../sound/sound_block";
 import { SoundControl } from "../sound/sound_control";
@@ -30,11 +32,12 @@ import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import { ScenesPanel } from "../ui/scenes_panel";
 import type { SceneView } from "../rendering/scene_view";
-import { runsInWorker } from "../protocol/worker_connection";
+import { runsInWorker, type WorkerConnection } from "../protocol/worker_connection";
 import { GamepadPointers } from "../interaction/gamepad_pointers";
 import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
 import { PointerEvents } from "../interaction/pointer_events";
+import type { Vibration } from "../interaction/vibration";
 import { Touches } from "../interaction/touches";
 import type { PageMode } from "./page_mode";
 
@@ -56,6 +59,7 @@ export class LiveMode implements PageMode {
   private readonly pointers: PointerEvents;
   private readonly keyboard: KeyboardPointer;
   private readonly gamepads: GamepadPointers;
+  private readonly vibration: Vibration;
   private readonly toolbar: LiveToolbar;
   private readonly ghost: GhostFinger;
   private readonly sound: SoundControl;
@@ -63,6 +67,8 @@ export class LiveMode implements PageMode {
   private readonly forceReadout = new ForceReadout();
   private readonly jobs = new JobList(() => this.cancelJob());
   private readonly meshUpload: MeshUpload;
+  /** Files, on a page without a server. */
+  private readonly openFiles: OpenFiles | null = null;
   private readonly scenes: ScenesPanel;
   private readonly physics: PhysicsPanel;
   private readonly material: MaterialPanel;
@@ -89,6 +95,7 @@ export class LiveMode implements PageMode {
     private readonly notifications: Notifications,
     display: DisplayPanel,
     private readonly connection: Pick<Connection, "send">,
+    worker: WorkerConnection | null,
   ) {
     const send = connection.send.bind(connection);
     const first: TouchMode = window.matchMedia("(pointer: coarse)").matches ? "hold" : "touch";
@@ -102,10 +109,9 @@ export class LiveMode implements PageMode {
     this.pointers.mode = first;
     const mode = () => this.pointers.mode;
     this.keyboard = new KeyboardPointer(sceneView, this.touches, mode);
-    this.gamepads = new GamepadPointers(sceneView, this.touches, mode, (device) => {
-      const force = this.frame?.devices[device]?.force ?? [0, 0, 0];
-      return Math.hypot(...force) / (sceneView.graphs[0]?.forceRange.value ?? 1);
-    });
+    this.gamepads = new GamepadPointers(sceneView, this.touches, mode, (device) => this.forceShare(device));
+    const { vibration, row } = vibrationSwitch();
+    this.vibration = vibration;
     this.touches.onBegin = () => {
       this.ghost.stop();
       this.hint.dismiss();
@@ -127,7 +133,7 @@ export class LiveMode implements PageMode {
     );
     this.sound = new SoundControl(send, notifications);
     this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
-    this.share = new Share(sceneView, notifications, () => {
+    this.share = new Share(sceneView, notifications, worker, () => {
       const scene = this.requestedScene;
       return scene === null ? null : { scene, own: this.ownSettings.values };
     });
@@ -141,15 +147,25 @@ export class LiveMode implements PageMode {
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
+    if (worker === null) {
+      meshUpload.listenForDrops();
+    } else {
+      this.openFiles = new OpenFiles(notifications, async (file) => {
+        this.linked.end();
+        worker.openRecording(file.name, await file.arrayBuffer());
+      });
+    }
+
     this.viewers.hidden = true;
     this.paceChip.hidden = true;
     this.loading.hidden = true;
     layout.chips.append(this.paceChip, this.viewers);
     layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts);
-    layout.overlayTop.append(this.share.film.box, this.forceReadout.box, this.hint.box, this.jobs.box);
+    layout.overlayTop.append(this.share.film.box, this.share.log.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.loading, new ScaleLock(sceneView).button);
-    layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section);
+    display.section.append(...row);
+    layout.controls.append(this.scenes.section, display.section, this.physics.section, this.material.section, meshUpload.section, ...(this.openFiles === null ? [] : [this.openFiles.section]));
     layout.measurements.append(...this.plots.sections, this.timing.section, this.accuracy.section);
     layout.page.append(meshUpload.dialog, this.share.element);
     sceneView.drawOverlay = (context, view) => {
@@ -158,6 +174,12 @@ export class LiveMode implements PageMode {
       this.touches.draw(context, view);
       this.ghost.draw(context, view);
     };
+  }
+
+  /** Force on a device, as a share of the displayed force range. */
+  private forceShare(device: number): number {
+    const force = this.frame?.devices[device]?.force ?? [0, 0, 0];
+    return Math.hypot(...force) / (this.sceneView.graphs[0]?.forceRange.value ?? 1);
   }
 
   /** Opens the certificates. */
@@ -231,7 +253,8 @@ export class LiveMode implements PageMode {
     this.layout.about.title = scene.about;
     document.title = `${scene.title} · palpate`;
     this.ownSettings.note(scene);
-    const again = scene.id === null ? this.meshUpload.again(scene.title) : undefined;
+    this.share.log.sceneBegins();
+    const again = scene.id === null ? (this.meshUpload.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
     if (again !== undefined) this.scenes.addUpload(scene.title, again);
     this.scenes.setCurrent(scene.id, scene.title);
     this.physics.update(scene);
@@ -291,6 +314,7 @@ export class LiveMode implements PageMode {
     // A restarted server counts generations from the start again, so the generation alone is not enough.
     if (graph === undefined || graph.info !== this.requestedScene || frame.generation !== graph.info.generation) return;
     this.plots.update(frame);
+    this.share.log.frame(frame.time);
     this.frame = frame;
     this.frameIsNew = true;
   }
@@ -325,6 +349,7 @@ export class LiveMode implements PageMode {
     this.suspend();
     this.paceChip.hidden = true;
     this.jobs.clear();
+    this.share.log.abort();
     this.timing.clear();
     this.forceReadout.show(null, null, []);
   }
@@ -349,6 +374,7 @@ export class LiveMode implements PageMode {
       }
     }
     this.forceReadout.show(this.frame, graph?.info ?? null, this.touches.devices);
+    this.vibration.animate(new Map(this.touches.devices.map((device) => [device, this.forceShare(device)])), now);
     this.plots.animate(now);
     if (now - this.lostCheckedAt > LOST_INTERVAL_MS) {
       this.lostCheckedAt = now;

@@ -10,6 +10,8 @@ import { Player } from "../playback/player";
 import { Timeline } from "../playback/timeline";
 import { element } from "../ui/elements";
 import type { PageLayout } from "../ui/page_layout";
+import { OpenFiles } from "../ui/open_files";
+import { runsInWorker } from "../protocol/worker_connection";
 import { JobList } from "../ui/job_list";
 import { ScaleLock } from "../ui/scale_lock";
 import type { DisplayPanel } from "../ui/display_panel";
@@ -65,6 +67,7 @@ export class LogMode implements PageMode {
     layout.viewArea.append(this.captions, new ScaleLock(sceneView).button);
     sceneView.showsLogs = true;
     layout.controls.append(display.section);
+    if (runsInWorker()) layout.controls.append(new OpenFiles(notifications, null).section);
     layout.measurements.append(this.accuracy.section);
     sceneView.canvas.setAttribute("aria-label", "The scene of the log. Drag to rotate the view.");
   }

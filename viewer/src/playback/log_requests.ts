@@ -1,6 +1,6 @@
 // HTTP requests for the frames and time series of a log.
 
-import { serverUrl, fetchBytes } from "../protocol/urls";
+import { fetchBytes } from "../protocol/urls";
 import type { Series } from "../protocol/messages";
 import { splitFrames } from "../protocol/frame";
 
@@ -10,9 +10,8 @@ export async function fetchFrames(log: number, from: number, count: number): Pro
 }
 
 export async function fetchSeries(log: number): Promise<Series> {
-  const response = await fetch(serverUrl(`log/${log}/series`), { cache: "no-store" });
-  if (!response.ok) throw new Error(`series of log ${log}: ${response.status} ${response.statusText}`);
-  const series = (await response.json()) as Partial<Series>;
+  const bytes = await fetchBytes(`log/${log}/series`, new AbortController().signal, () => undefined);
+  const series = JSON.parse(new TextDecoder().decode(bytes)) as Partial<Series>;
   if (!Array.isArray(series.t) || !Array.isArray(series.devices) || typeof series.energy !== "object") {
     throw new Error(`series of log ${log} cannot be read`);
   }

@@ -4,6 +4,7 @@ import type { FromWorker, ToWorker } from "../worker/messages";
 import type { ConnectionListener } from "./connection";
 import { deliver } from "./deliver";
 import type { ClientMessage } from "./messages";
+import { scenesAddress, showsLogs, startLogWorker } from "./local_logs";
 import { setDataSource } from "./urls";
 
 /** Whether this page runs its scene by itself: a static site says so. */
@@ -11,24 +12,50 @@ export function runsInWorker(): boolean {
   return document.documentElement.dataset.transport === "worker";
 }
 
+/** Callbacks of a session with a worker. */
+export interface WorkerListener extends ConnectionListener {
+  /** Progress of a first download: bytes that have come, of how many where it is known. */
+  loading(what: string, bytes: number, of: number | null): void;
+}
+
 /** Session with a worker. */
 export class WorkerConnection {
   private worker: Worker | null = null;
   private requests = new Map<number, (bytes: ArrayBuffer | null) => void>();
   private lastRequest = 0;
+  /** Log that is awaited. */
+  private log: { done: (log: { bytes: ArrayBuffer; steps: number }) => void; failed: (error: Error) => void } | null = null;
 
-  constructor(private readonly listener: ConnectionListener) {
+  constructor(private readonly listener: WorkerListener) {
     setDataSource((path) => this.fetch(path));
   }
 
   start(): void {
     this.listener.state({ name: "connecting" });
-    const worker = new Worker(new URL("../worker/scene_worker.ts", import.meta.url), { type: "module" });
+    const logs = showsLogs();
+    const worker = logs ? startLogWorker(null) : new Worker(new URL("../worker/scene_worker.ts", import.meta.url), { type: "module" });
     this.worker = worker;
     worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
     worker.onerror = (event) => this.handleLoss(event.message || "the worker cannot be started");
-    const page = new URL(window.location.href);
-    this.post({ kind: "start", base: new URL(".", page).href, scene: page.searchParams.get("scene") });
+    if (logs) return;
+    const scene = new URL(window.location.href).searchParams.get("scene");
+    this.post({ kind: "start", base: scenesAddress(), scene });
+  }
+
+  beginLog(): void {
+    this.post({ kind: "begin_log" });
+  }
+
+  endLog(): Promise<{ bytes: ArrayBuffer; steps: number }> {
+    return new Promise((done, failed) => {
+      this.log = { done, failed };
+      this.post({ kind: "end_log" });
+    });
+  }
+
+  /** Opens a recording as a scene of its own. */
+  openRecording(name: string, bytes: ArrayBuffer): void {
+    this.post({ kind: "recording", name, bytes });
   }
 
   send(message: ClientMessage): void {
@@ -63,6 +90,17 @@ export class WorkerConnection {
       case "sound":
         this.deliver(message.block);
         break;
+      case "loading":
+        this.listener.loading(message.what, message.bytes, message.of);
+        break;
+      case "log":
+        this.log?.done({ bytes: message.bytes, steps: message.steps });
+        this.log = null;
+        break;
+      case "no_log":
+        this.log?.failed(new Error(message.reason));
+        this.log = null;
+        break;
       case "data":
         this.requests.get(message.request)?.(message.bytes);
         this.requests.delete(message.request);
@@ -80,6 +118,8 @@ export class WorkerConnection {
 
   private handleLoss(reason: string): void {
     this.close();
+    this.log?.failed(new Error(reason));
+    this.log = null;
     this.listener.state({ name: "lost", retryAt: Number.POSITIVE_INFINITY, reason });
   }
 

@@ -14,7 +14,7 @@ export function clock(seconds: number): string {
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }
 
-/** File name of a film of a scene. */
+/** File name of a film or log of a scene. */
 export function filmName(scene: string, ending: string, date: Date): string {
   const plain = scene.normalize("NFKD").toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "").slice(0, 40);
   const day = [date.getFullYear(), date.getMonth() + 1, date.getDate()].map((part) => String(part).padStart(2, "0")).join("-");
@@ -86,7 +86,8 @@ export class FilmControl {
   }
 }
 
-function download(data: Blob, name: string): void {
+/** Hands a file to the downloads. */
+export function download(data: Blob, name: string): void {
   const address = URL.createObjectURL(data);
   element("a", { attributes: { href: address, download: name } }).click();
   window.setTimeout(() => URL.revokeObjectURL(address), DOWNLOAD_MS);

@@ -1,7 +1,8 @@
-// Share dialog: link with QR code, HTML of a frame, film.
+// Share dialog: link with QR code, HTML of a frame, film, log.
 
 import { element, iconButton } from "../ui/elements";
 import { LARGEST_BYTES, LONGEST_S } from "./film";
+import { LONGEST_LOG_S } from "./log_control";
 import { qrCode } from "./qr_code";
 
 /** Offer of the dialog for a scene. */
@@ -12,6 +13,8 @@ export interface Offer {
   frame: string | null;
   /** Whether this browser records films, and whether it records one. */
   film: "possible" | "running" | "impossible";
+  /** Whether this page records logs, and whether it records one. */
+  log: "possible" | "running" | "impossible";
 }
 
 /** Time for which a button says that it has copied [ms]. */
@@ -22,10 +25,11 @@ export class ShareDialog {
   private readonly body = element("div", { class: "share-parts" });
   private readonly status = element("p", { class: "for-screen-readers", role: "status" });
 
-  /** `film` starts or ends a film. */
+  /** `film` starts or ends a film, `log` a log. */
   constructor(
     private readonly offer: () => Offer,
     private readonly film: () => void,
+    private readonly log: () => void,
   ) {
     const close = () => this.dialog.close();
     this.dialog.append(element("header", {}, element("h2", { id: "share-title", text: "Share" }), iconButton("close", "Close (Escape)", close)), this.body, this.status);
@@ -38,9 +42,9 @@ export class ShareDialog {
 
   open(): void {
     if (this.dialog.open) return;
-    const { link, frame, film } = this.offer();
+    const { link, frame, film, log } = this.offer();
     this.status.textContent = "";
-    this.body.replaceChildren(...this.linkParts(link), ...(link === null ? [] : this.frameParts(frame)), ...this.filmParts(film));
+    this.body.replaceChildren(...this.linkParts(link), ...(link === null ? [] : this.frameParts(frame)), ...this.filmParts(film), ...this.logParts(log));
     this.dialog.showModal();
     this.dialog.querySelector<HTMLElement>(".first")?.focus();
   }
@@ -77,20 +81,27 @@ export class ShareDialog {
   private filmParts(film: Offer["film"]): HTMLElement[] {
     const title = element("h3", { text: "Film" });
     if (film === "impossible") return [section(title, element("p", { text: "This browser records no film (it has no MediaRecorder for canvases)." }))];
-    const button = element("button", {
-      class: "button",
-      type: "button",
-      text: film === "running" ? "Stop and save" : "Record",
-      on: {
-        click: () => {
-          // After the closing, which moves the focus.
-          this.dialog.addEventListener("close", () => this.film(), { once: true });
-          this.dialog.close();
-        },
-      },
-    });
+    const button = this.closingButton(film === "running" ? "Stop and save" : "Record", this.film);
     const limit = `${LONGEST_S / 60}\u00a0minutes or ${LARGEST_BYTES / 1e6}\u00a0MB`;
     return [section(title, element("div", { class: "copy-row" }, element("p", { text: `The scene as you see it, with its forces and without the panels, up to ${limit}.` }), button))];
+  }
+
+  private logParts(log: Offer["log"]): HTMLElement[] {
+    const title = element("h3", { text: "Log" });
+    if (log === "impossible") return [section(title, element("p", { text: "palpate serve --log run.mcap records every step, from the start of the scene." }))];
+    const button = this.closingButton(log === "running" ? "Stop and save log" : "Record log", this.log);
+    const about = `Every step with your presses, from now on, up to ${LONGEST_LOG_S}\u00a0seconds or 200\u00a0MB: palpate replay repeats it, and this page plays it. The scene begins again; what restarts it ends the log.`;
+    return [section(title, element("div", { class: "copy-row" }, element("p", { text: about }), button))];
+  }
+
+  /** Button that closes the dialog, and then acts. */
+  private closingButton(text: string, act: () => void): HTMLElement {
+    const click = () => {
+      // After the closing, which moves the focus.
+      this.dialog.addEventListener("close", () => act(), { once: true });
+      this.dialog.close();
+    };
+    return element("button", { class: "button", type: "button", text, on: { click } });
   }
 
   private copyButton(label: string, field: HTMLInputElement | HTMLTextAreaElement, isFirst = false): HTMLButtonElement {

@@ -20,7 +20,7 @@ const LIVE_KEYS: readonly [string, string][] = [
   [".", "Single step while paused"],
   ["[ and ]", "Slower and faster"],
   ["R", "Reset: the scene from its start, with its own settings and view"],
-  ["S", "Share: link, QR code, film"],
+  ["S", "Share: link, QR code, film, log"],
 ];
 
 const LOG_KEYS: readonly [string, string][] = [

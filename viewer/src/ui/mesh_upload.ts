@@ -2,11 +2,14 @@
 
 import { serverUrl } from "../protocol/urls";
 import { element, section } from "./elements";
+import { kindOfFile } from "./open_files";
+import { listenForDrops } from "./file_drop";
 import { MaterialFields, PRESETS } from "./material_panel";
 import type { JobList } from "./job_list";
 import type { Notifications } from "./notifications";
 
 const EXTENSIONS = [".msh", ".vtk", ".vtu", ".mesh", ".veg", ".inp", ".obj", ".stl", ".ply", ".off"];
+const DROP = "Drop a mesh here to record it: solid elements (.msh, .vtk, .vtu, .mesh, .veg, .inp) or a closed surface (.stl, .obj, .ply, .off)";
 const SCALES: readonly [string, number][] = [
   ["millimetres", 0.001],
   ["centimetres", 0.01],
@@ -17,7 +20,6 @@ const SCALES: readonly [string, number][] = [
 export class MeshUpload {
   readonly section: HTMLElement;
   readonly dialog = element("dialog", { class: "upload-dialog", attributes: { "aria-labelledby": "upload-title" } });
-  private readonly dropTarget = element("div", { class: "drop-target", text: "Drop a mesh here to record it: solid elements (.msh, .vtk, .vtu, .mesh, .veg, .inp) or a closed surface (.stl, .obj, .ply, .off)" });
   private readonly scale = element("select");
   private readonly modes = element("input", { type: "number", attributes: { min: "1", max: "2000", value: "200" } });
   private readonly fields = new MaterialFields();
@@ -73,30 +75,24 @@ export class MeshUpload {
       void this.post();
     });
     this.dialog.append(form);
-    this.listenForDrops();
   }
 
-  private listenForDrops(): void {
-    const holdsFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") === true;
-    document.body.append(this.dropTarget);
-    window.addEventListener("dragover", (event) => {
-      if (!holdsFiles(event)) return;
-      event.preventDefault();
-      this.dropTarget.classList.add("visible");
-    });
-    window.addEventListener("dragleave", (event) => {
-      if (event.relatedTarget === null) this.dropTarget.classList.remove("visible");
-    });
-    window.addEventListener("drop", (event) => {
-      if (!holdsFiles(event)) return;
-      event.preventDefault();
-      this.dropTarget.classList.remove("visible");
-      const file = event.dataTransfer?.files[0];
-      if (file !== undefined) this.open(file);
-    });
+  /** Takes files that are dropped onto the page. */
+  listenForDrops(): void {
+    listenForDrops(DROP, ([file]) => this.open(file));
   }
 
-  private open(file: File): void {
+  /** Asks about a mesh file that is to be recorded. */
+  open(file: File): void {
+    const kind = kindOfFile(file.name);
+    if (kind === "log") {
+      this.notifications.notify(`${file.name} is a log: palpate serve ${file.name} plays it`, "error");
+      return;
+    }
+    if (kind === "recording") {
+      this.notifications.notify(`${file.name} is a recording: name it in a scene file (docs/scene.md), and palpate serve opens that`, "error");
+      return;
+    }
     if (!EXTENSIONS.some((extension) => file.name.toLowerCase().endsWith(extension))) {
       this.notifications.notify(`${file.name} is not a supported mesh file. Supported: ${EXTENSIONS.join(", ")}`, "error");
       return;

@@ -1,4 +1,4 @@
-// List of the scenes that can be opened, with the meshes that this page has uploaded.
+// List of the scenes that can be opened, with the objects that were dropped onto this page.
 
 import type { SceneSummary } from "../protocol/messages";
 import { element, section } from "./elements";
@@ -20,7 +20,7 @@ export class ScenesPanel {
     this.show();
   }
 
-  /** Keeps an uploaded mesh in the list; a newer one of its title takes its place. */
+  /** Keeps a dropped object in the list; a newer one of its title takes its place. */
   addUpload(title: string, open: () => void): void {
     this.uploads.set(title, open);
     this.show();
@@ -35,8 +35,8 @@ export class ScenesPanel {
       return element("li", {}, button);
     };
     this.list.replaceChildren(
+      ...[...this.uploads].map(([title, open]) => entry(uploadKey(title), title, "Your own object, kept while this page is open.", open)),
       ...this.scenes.map(({ id, title, about }) => entry(id, title, about, () => this.open(id))),
-      ...[...this.uploads].map(([title, open]) => entry(uploadKey(title), title, "Your own mesh, kept while this page is open.", open)),
     );
   }
 

@@ -4,6 +4,13 @@
 export type ToWorker =
   /** Start: address of the folder of `palpate.wasm` and `scenes/`, and the scene to open, or the first. */
   | { kind: "start"; base: string; scene: string | null }
+  /** Start of a worker that plays logs, those that the browser keeps if none are given. */
+  | { kind: "start_logs"; base: string; files: readonly File[] | null }
+  /** Recording to open as a scene, with the name of its file. */
+  | { kind: "recording"; name: string; bytes: ArrayBuffer }
+  /** Begin and end of a record for a log. */
+  | { kind: "begin_log" }
+  | { kind: "end_log" }
   /** Message of the viewer protocol, as JSON. */
   | { kind: "message"; text: string }
   /** A frame was shown. */
@@ -13,10 +20,15 @@ export type ToWorker =
 
 /** Message to the page. */
 export type FromWorker =
+  /** Progress of a first download: bytes that have come, of how many where it is known. */
+  | { kind: "loading"; what: string; bytes: number; of: number | null }
   | { kind: "message"; text: string }
   | { kind: "frame"; frame: ArrayBuffer }
   /** Block of sound. */
   | { kind: "sound"; block: ArrayBuffer }
+  /** Log of a record, or the reason that there is none. */
+  | { kind: "log"; steps: number; bytes: ArrayBuffer }
+  | { kind: "no_log"; reason: string }
   /** Answer to a request; null if there is no such data. */
   | { kind: "data"; request: number; bytes: ArrayBuffer | null }
   /** The scene has ended. */

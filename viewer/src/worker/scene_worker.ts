@@ -2,26 +2,19 @@
 
 import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
-import type { ClientMessage, SceneSummary, ServerMessage } from "../protocol/messages";
-import type { FromWorker, ToWorker } from "./messages";
+import type { ClientMessage, SceneSummary } from "../protocol/messages";
+import { makeLog, type RecordedRun } from "./log_writer";
+import type { ToWorker } from "./messages";
+import { post, reasonOf, tell } from "./posting";
+import { download } from "./download";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
 import { Ticker } from "./ticker";
 
 /** Frames that are under way to the page at once; newer ones take the place of older ones. */
 const MAX_FRAMES_UNDER_WAY = 3;
 
-function post(message: FromWorker, transfer: Transferable[] = []): void {
-  (self as unknown as { postMessage(message: FromWorker, transfer: Transferable[]): void }).postMessage(message, transfer);
-}
-
-function tell(message: ServerMessage): void {
-  post({ kind: "message", text: JSON.stringify(message) });
-}
-
-/** Text of anything that was thrown. */
-function reasonOf(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
-}
+/** Name that the scene of a dropped recording gives it. */
+const DROPPED = "dropped.palp";
 
 /** Frames to the page, no more than it can show. */
 class FrameStream {
@@ -50,6 +43,9 @@ class SceneRunner {
   private live = 0;
   private opening = 0;
   private greeted = false;
+  /** Files of the scene, and those of the scene that is recorded for a log, with the time of its start [s since 1970]. */
+  private files: SceneFiles | null = null;
+  private recorded: { files: SceneFiles; startS: number } | null = null;
   private readonly frames = new FrameStream();
   private readonly ticker = new Ticker(() => this.advance());
 
@@ -74,14 +70,77 @@ class SceneRunner {
     const summary = id === null ? this.scenes[0] : this.scenes.find((scene) => scene.id === id);
     if (summary === undefined) throw new Error(`there is no scene ${JSON.stringify(id)}; there are ${this.scenes.map((scene) => scene.id).join(", ")}`);
     const progress = (fraction: number | null, done = false) => tell({ type: "progress", job: "scene", phase: "loading", fraction, done });
+    const onProgress = (bytes: number, of: number | null) => {
+      // Before the page is greeted it has no list of jobs.
+      if (this.greeted) progress(of === null ? null : bytes / of);
+      else post({ kind: "loading", what: "the first recording", bytes, of });
+    };
     try {
-      const files = await fetchScene(this.instance, this.base, summary, progress);
+      const files = await fetchScene(this.instance, this.base, summary, onProgress);
       if (number === this.opening) this.start(files);
     } catch (error) {
       // Nobody waits any more for one that another has replaced.
       if (number === this.opening) throw error;
     } finally {
       if (number === this.opening) progress(1, true);
+    }
+  }
+
+  /** Opens a scene in which the object of a recording falls on a floor. */
+  openRecording(name: string, bytes: Uint8Array): void {
+    const { instance } = this;
+    this.opening += 1;
+    try {
+      if (bytes.byteLength === 0) throw new Error("the file is empty");
+      const recording = instance.withBytes(bytes, (address, length) => instance.call((exports) => exports.recording_read(address, length)));
+      const text = (() => {
+        try {
+          return instance.withBytes(DROPPED, (at, length) => instance.described<string>((exports) => exports.recording_falling_scene(recording, at, length)));
+        } finally {
+          instance.exports.recording_free(recording);
+        }
+      })();
+      const summary = { id: "", title: name, about: "Your own recording. Press and drag it." };
+      this.start({ summary, text, recordings: new Map([[DROPPED, bytes]]), paths: new Map() });
+    } catch (error) {
+      if (instance.stopped === null) tell({ type: "error", text: `${name}: ${reasonOf(error)}` });
+      else this.fail(instance.stopped);
+    }
+  }
+
+  /** Begins a record for a log, at a start of the scene. */
+  beginLog(): void {
+    const { instance, live, files } = this;
+    if (live === 0 || files === null) return;
+    this.recorded = { files, startS: Date.now() / 1000 };
+    try {
+      instance.call((exports) => exports.live_begin_record(live));
+    } catch (error) {
+      this.recorded = null;
+      tell({ type: "error", text: reasonOf(error) });
+    }
+  }
+
+  /** Ends the record, and sends its log. */
+  async endLog(): Promise<void> {
+    const { instance, live, recorded } = this;
+    const progress = (phase: string, fraction: number | null, done = false) => tell({ type: "progress", job: "log", phase, fraction, done });
+    try {
+      this.recorded = null;
+      if (recorded === null) throw new Error("none was begun");
+      const inputs: Uint8Array[] = [];
+      const record = this.collecting(
+        (bytes) => inputs.push(bytes),
+        () => instance.described<Pick<RecordedRun, "text" | "steps" | "rescaled"> | null>((exports) => exports.live_end_record(live)),
+      );
+      if (record === null || inputs[0] === undefined) throw new Error("none was begun");
+      const run = { ...record, inputs: inputs[0], ...recorded };
+      const { bytes, steps } = await makeLog(this.base, run, (loaded, of) => progress("loading the writer", of === null ? null : loaded / of), (fraction) => progress("writing", fraction));
+      post({ kind: "log", steps, bytes }, [bytes]);
+    } catch (error) {
+      post({ kind: "no_log", reason: reasonOf(error) });
+    } finally {
+      progress("", 1, true);
     }
   }
 
@@ -115,14 +174,25 @@ class SceneRunner {
   answer(request: number, path: string): void {
     const { instance, live } = this;
     let bytes: ArrayBuffer | null = null;
+    if (live !== 0) {
+      this.collecting(
+        (data) => (bytes = data.buffer),
+        () => instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length))),
+      );
+    }
+    post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
+  }
+
+  /** Result of a call of the module whose data are taken. */
+  private collecting<T>(take: (data: Uint8Array<ArrayBuffer>) => void, run: () => T): T {
+    const { instance } = this;
     const before = instance.receiver;
     try {
-      instance.receiver = (_, data) => (bytes = data.slice().buffer);
-      if (live !== 0) instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length)));
+      instance.receiver = (_, data) => take(new Uint8Array(data));
+      return run();
     } finally {
       instance.receiver = before;
     }
-    post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
   }
 
   private start(files: SceneFiles): void {
@@ -147,6 +217,7 @@ class SceneRunner {
     } finally {
       recordings.forEach((recording) => exports.recording_free(recording));
     }
+    this.files = files;
     if (this.greeted) return;
     this.greeted = true;
     instance.withBytes(JSON.stringify(this.scenes), (address, length) => exports.live_greet(this.live, address, length));
@@ -173,7 +244,9 @@ let runner: SceneRunner | null = null;
 
 async function start(base: string, scene: string | null): Promise<void> {
   try {
-    const [instance, scenes] = await Promise.all([Instance.load(new URL("palpate.wasm", base)), fetchScenes(base)]);
+    const progress = (bytes: number, of: number | null) => post({ kind: "loading", what: "the simulation", bytes, of });
+    const module = download(new URL("palpate.wasm", base), progress).then((bytes) => Instance.load(bytes));
+    const [instance, scenes] = await Promise.all([module, fetchScenes(base)]);
     runner = new SceneRunner(instance, base, scenes);
     const known = scenes.some(({ id }) => id === scene);
     await runner.open(known ? scene : null);
@@ -186,6 +259,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
   const message = event.data;
   if (message.kind === "start") void start(message.base, message.scene);
   else if (message.kind === "message") runner?.receive(message.text);
+  else if (message.kind === "recording") runner?.openRecording(message.name, new Uint8Array(message.bytes));
+  else if (message.kind === "begin_log") runner?.beginLog();
+  else if (message.kind === "end_log") void runner?.endLog();
   else if (message.kind === "shown") runner?.shown();
-  else runner?.answer(message.request, message.path);
+  else if (message.kind === "data") runner?.answer(message.request, message.path);
 };

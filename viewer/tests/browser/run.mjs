@@ -6,6 +6,8 @@
 import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
 import { comparisonCases } from "./comparison.mjs";
+import { droppedCases } from "./dropped.mjs";
+import { firstLoadCases } from "./first_load.mjs";
 import { firstViewCases } from "./first_view.mjs";
 import { handCases } from "./hand.mjs";
 import { liveCases } from "./live.mjs";
@@ -15,6 +17,8 @@ import { shareCases } from "./share.mjs";
 import { soundCases } from "./sound.mjs";
 import { touchCases } from "./touching.mjs";
 import { robustCases } from "./robust.mjs";
+import { vibrationCases } from "./vibration.mjs";
+import { recordedLogCases } from "./recorded_log.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
@@ -22,7 +26,7 @@ const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...robustCases, ...soundCases, ...shareCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;

@@ -47,7 +47,7 @@ export class NeedsServer extends Error {}
 const TYPES = { html: "text/html", js: "text/javascript", css: "text/css", json: "application/json", wasm: "application/wasm" };
 
 /** Plain file server of the folder PAGE: the page that runs its scene by itself. */
-async function serveFiles({ scene, ...others }) {
+async function serveFiles({ scene, pace, ...others }) {
   const given = Object.keys(others).filter((key) => others[key] !== undefined && key !== "port");
   if (given.length > 0) throw new NeedsServer(given.join(", "));
   const server = createHttpServer(async (request, response) => {
@@ -55,7 +55,10 @@ async function serveFiles({ scene, ...others }) {
     const path = decodeURIComponent(pathname.endsWith("/") ? `${pathname}index.html` : pathname);
     try {
       const content = await readFile(join(process.env.PAGE, normalize(path)));
-      response.writeHead(200, { "content-type": TYPES[path.split(".").at(-1)] ?? "application/octet-stream" }).end(content);
+      const type = TYPES[path.split(".").at(-1)] ?? "application/octet-stream";
+      response.writeHead(200, { "content-type": type, "content-length": content.length });
+      if (pace === undefined) response.end(content);
+      else await pace(path, content, response);
     } catch {
       response.writeHead(404).end();
     }
@@ -66,7 +69,7 @@ async function serveFiles({ scene, ...others }) {
   return { url: `http://127.0.0.1:${port}/${query}`, port, close: () => new Promise((done) => (server.close(done), server.closeAllConnections())) };
 }
 
-/** Starts a server. `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene; `token`: its token. */
+/** Starts a server. `pace`: function of a path, content and response that sends the content, of the plain file server; `port`: reused for a restarted server; `log`: log file of the real server; `scene`: its built-in scene; `token`: its token. */
 export async function start(options = {}) {
   if (process.env.PAGE) return serveFiles(options);
   const port = options.port ?? (await freePort());

@@ -15,7 +15,7 @@ const RECORD = '.share-dialog button:text-is("Record")';
 const FRAME = '[aria-label="HTML of a frame with this scene"]';
 
 async function openDialog(page) {
-  await page.click('[aria-label="Share: link, QR code, film (S)"]');
+  await page.click('[aria-label="Share: link, QR code, film, log (S)"]');
   await page.waitForSelector("dialog.share-dialog[open]");
 }
 

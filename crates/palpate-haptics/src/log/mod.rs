@@ -13,18 +13,24 @@
 //! A log is a series of chunks, each of at most half a second and whole by itself: one that was cut is read up to its last whole
 //! chunk, and [`recover`] makes a whole one of it.
 
+mod file;
 mod messages;
 mod reader;
 mod record_layout;
 mod record_reader;
 mod records;
+#[cfg(feature = "real-time")]
 mod recovery;
 mod scan;
 mod schemas;
 mod summary;
+#[cfg(feature = "real-time")]
 mod writer;
 
-pub use reader::{LogReader, LoggedDevice, LoggedStep};
+pub use file::{LogFile, LogStart};
+pub use reader::{LogReader, LoggedDevice, LoggedStep, StepCursor};
 pub use records::{FrameRecord, StepRecord};
+#[cfg(feature = "real-time")]
 pub use recovery::{Recovered, recover};
+#[cfg(feature = "real-time")]
 pub use writer::{LogSender, LogSummary, LogWriter, WrittenLog};

@@ -1,11 +1,11 @@
 //! Log reader: scene, initial state and steps of a log, and comparison of a step with a replayed one.
 
+use super::file::START;
 use super::messages::{DeviceMessage, EnergyMessage, StartMessage, StepMessage};
 use super::record_layout;
 use super::record_reader::RecordReader;
 use super::scan::{Scan, unreadable};
 use super::summary::{step_channel, step_count, summary_of};
-use super::writer::START;
 use crate::error::{Error, LogError};
 use crate::scene_names::SceneNames;
 use glam::DVec3;
@@ -121,20 +121,25 @@ impl<'a> LogReader<'a> {
 
     /// Steps in order. After an error there are no more.
     pub fn logged_steps(&self) -> impl Iterator<Item = Result<LoggedStep, Error>> {
-        Steps { records: RecordReader::new(self.bytes()), channel: step_channel(&self.summary) }
+        let mut steps = self.step_cursor();
+        std::iter::from_fn(move || steps.next(self))
+    }
+
+    /// Place before the first step.
+    pub fn step_cursor(&self) -> StepCursor {
+        StepCursor { records: RecordReader::new(self.bytes()), channel: step_channel(&self.summary) }
     }
 }
 
-/// Iterator over the steps of a log.
-struct Steps<'a> {
-    records: RecordReader<'a>,
+/// Place among the steps of a log, for a program that reads them bit by bit.
+pub struct StepCursor {
+    records: RecordReader,
     channel: Option<u16>,
 }
 
-impl Iterator for Steps<'_> {
-    type Item = Result<LoggedStep, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+impl StepCursor {
+    /// Next step of the log that the cursor was made for; `None` at the end, and after an error.
+    pub fn next(&mut self, log: &LogReader) -> Option<Result<LoggedStep, Error>> {
         let channel = self.channel?;
         let step = |opcode, data: &[u8]| -> Result<Option<StepMessage>, Error> {
             if opcode != MESSAGE {
@@ -148,7 +153,7 @@ impl Iterator for Steps<'_> {
             }
         };
         let found = loop {
-            match self.records.next(step)?.map_err(unreadable).and_then(|step| step) {
+            match self.records.next(log.bytes(), step)?.map_err(unreadable).and_then(|step| step) {
                 Ok(None) => {}
                 Ok(Some(message)) => break Ok(LoggedStep { step: message.step, message }),
                 Err(error) => break Err(error),

@@ -8,6 +8,7 @@
 use super::record_layout::{parse, split_record};
 use mcap::records::{ChunkHeader, Record, op};
 use mcap::{MAGIC, McapError};
+#[cfg(not(target_family = "wasm"))]
 use std::io::Read;
 
 /// Largest chunk of a file that is shorter [bytes]: our chunks have 1 MiB and a message.
@@ -18,10 +19,12 @@ pub(super) fn length_limit(file_length: usize) -> usize {
     file_length.max(MIN_LENGTH_LIMIT)
 }
 
-/// Reader of the records after the first bytes of a file, [`MAGIC`], up to its footer.
-pub(super) struct RecordReader<'a> {
-    /// Records that are left outside of chunks.
-    rest: &'a [u8],
+/// Reader of the records after the first bytes of a file, [`MAGIC`], up to its footer. Every call gets the file's bytes, so that they may lie beside it.
+pub(super) struct RecordReader {
+    /// Offset of the next record outside of chunks [bytes].
+    at: usize,
+    /// Whether nothing follows: the footer was read, or an error found.
+    is_at_end: bool,
     /// Records of the current chunk.
     chunk: Vec<u8>,
     /// Length of its records that have been read [bytes].
@@ -30,47 +33,59 @@ pub(super) struct RecordReader<'a> {
     length_limit: usize,
 }
 
-impl<'a> RecordReader<'a> {
-    /// Records of a whole file, or of its beginning.
-    pub fn new(bytes: &'a [u8]) -> Self {
-        let rest = bytes.strip_prefix(MAGIC).unwrap_or_default();
-        Self { rest, chunk: Vec::new(), read: 0, length_limit: length_limit(bytes.len()) }
+impl RecordReader {
+    /// Reader of a whole file, or of its beginning.
+    pub fn new(bytes: &[u8]) -> Self {
+        let is_at_end = !bytes.starts_with(MAGIC);
+        let length_limit = length_limit(bytes.len());
+        Self { at: MAGIC.len(), is_at_end, chunk: Vec::new(), read: 0, length_limit }
+    }
+
+    /// Records outside of chunks that are left.
+    fn rest<'a>(&self, bytes: &'a [u8]) -> &'a [u8] {
+        if self.is_at_end { &[] } else { bytes.get(self.at..).unwrap_or_default() }
     }
 
     /// Passes the opcode and content of the next record that is no chunk to `visit`; `None` at the end, and after an error.
-    pub fn next<T>(&mut self, visit: impl FnOnce(u8, &[u8]) -> T) -> Option<Result<T, McapError>> {
-        match self.find_record() {
+    pub fn next<T>(
+        &mut self,
+        bytes: &[u8],
+        visit: impl FnOnce(u8, &[u8]) -> T,
+    ) -> Option<Result<T, McapError>> {
+        match self.find_record(bytes) {
             Ok(true) => {
                 let record = &self.chunk[self.read..];
                 let (content, after) = split_record(record)?;
                 self.read = self.chunk.len() - after.len();
                 Some(Ok(visit(record[0], content)))
             }
-            Ok(false) if self.rest.is_empty() => None,
             Ok(false) => {
-                let (opcode, (content, after)) = (self.rest[0], split_record(self.rest)?);
-                self.rest = if opcode == op::FOOTER { &[] } else { after };
+                let (content, after) = split_record(self.rest(bytes))?;
+                let opcode = bytes[self.at];
+                self.is_at_end = opcode == op::FOOTER;
+                self.at = bytes.len() - after.len();
                 Some(Ok(visit(opcode, content)))
             }
             Err(error) => {
-                (self.rest, self.read) = (&[], self.chunk.len());
+                (self.is_at_end, self.read) = (true, self.chunk.len());
                 Some(Err(error))
             }
         }
     }
 
     /// Unpacks chunks up to the next record, and checks its length. Gives whether it is in the current chunk.
-    fn find_record(&mut self) -> Result<bool, McapError> {
+    fn find_record(&mut self, bytes: &[u8]) -> Result<bool, McapError> {
         while self.read == self.chunk.len() {
-            if self.rest.is_empty() {
+            let rest = self.rest(bytes);
+            if rest.is_empty() {
                 return Ok(false);
             }
-            let (content, after) = split_record(self.rest).ok_or(McapError::UnexpectedEof)?;
-            if self.rest[0] != op::CHUNK {
+            let (content, after) = split_record(rest).ok_or(McapError::UnexpectedEof)?;
+            if rest[0] != op::CHUNK {
                 return Ok(false);
             }
             (self.chunk, self.read) = (unpacked(content, self.length_limit)?, 0);
-            self.rest = after;
+            self.at = bytes.len() - after.len();
         }
         split_record(&self.chunk[self.read..]).map(|_| true).ok_or(McapError::UnexpectedEoc)
     }
@@ -87,15 +102,11 @@ pub(super) fn unpacked(content: &[u8], length_limit: usize) -> Result<Vec<u8>, M
     let ChunkHeader { uncompressed_size, uncompressed_crc, compression, .. } = header;
     let length = usize::try_from(uncompressed_size).ok().filter(|length| *length <= length_limit);
     let length = length.ok_or(McapError::ChunkTooLarge(uncompressed_size))?;
-    let mut records = Vec::new();
-    match compression.as_str() {
-        "" => records.extend_from_slice(&data),
-        "zstd" => {
-            let decoder = zstd::stream::read::Decoder::with_buffer(&data[..])?;
-            decoder.take(length as u64 + 1).read_to_end(&mut records)?;
-        }
+    let records = match compression.as_str() {
+        "" => data.into_owned(),
+        "zstd" => decompressed(&data, length)?,
         _ => return Err(McapError::UnsupportedCompression(compression)),
-    }
+    };
     if records.len() != length {
         return Err(McapError::UnexpectedEoc);
     }
@@ -105,4 +116,22 @@ pub(super) fn unpacked(content: &[u8], length_limit: usize) -> Result<Vec<u8>, M
         return Err(McapError::BadChunkCrc { saved: uncompressed_crc, calculated });
     }
     Ok(records)
+}
+
+/// Decompressed content of Zstandard frames, of which a byte beyond a length is enough to see that they are longer.
+#[cfg(not(target_family = "wasm"))]
+fn decompressed(data: &[u8], length: usize) -> Result<Vec<u8>, McapError> {
+    let mut content = Vec::new();
+    let decoder = zstd::stream::read::Decoder::with_buffer(data)?;
+    decoder.take(length as u64 + 1).read_to_end(&mut content)?;
+    Ok(content)
+}
+
+/// Decompressed content of Zstandard frames, at most of a length.
+#[cfg(target_family = "wasm")]
+fn decompressed(data: &[u8], length: usize) -> Result<Vec<u8>, McapError> {
+    let mut content = Vec::with_capacity(length);
+    let decoded = ruzstd::decoding::FrameDecoder::new().decode_all_to_vec(data, &mut content);
+    decoded.map_err(|error| McapError::DecompressionError(error.to_string()))?;
+    Ok(content)
 }

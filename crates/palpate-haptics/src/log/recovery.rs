@@ -1,10 +1,10 @@
 //! Recovery of a log that was cut: a whole file with all that can be read.
 
+use super::file::{CHUNK_BYTES, failed, write_options};
 use super::record_layout;
 use super::record_reader::RecordReader;
 use super::scan::{Scan, unreadable};
 use super::summary::{step_count, summary_of};
-use super::writer::{CHUNK_BYTES, failed, write_options};
 use crate::error::{Error, LogError};
 use mcap::records::{Record, op};
 use mcap::{Attachment, Writer};
@@ -33,9 +33,10 @@ pub fn recover<W: Write + Seek>(bytes: &[u8], out: W) -> Result<(Recovered, W), 
         return Err(LogError::NoWholeStep.into());
     }
     let mut writer = write_options().create(out).map_err(failed)?;
-    let mut records = RecordReader::new(&bytes[..whole]);
+    let kept = &bytes[..whole];
+    let mut records = RecordReader::new(kept);
     let mut chunk_bytes = 0;
-    while let Some(copied) = records.next(|opcode, data| {
+    while let Some(copied) = records.next(kept, |opcode, data| {
         chunk_bytes += data.len();
         copy(&mut writer, opcode, data)
     }) {

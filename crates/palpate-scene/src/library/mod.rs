@@ -2,6 +2,7 @@
 
 #[cfg(feature = "native")]
 mod built_in;
+mod falling;
 #[cfg(feature = "native")]
 mod instruments;
 mod pointers;
@@ -14,6 +15,7 @@ mod touchable;
 
 #[cfg(feature = "native")]
 pub use built_in::{BUILT_IN_SCENES, BuiltInScene, paper_cube_recipe};
+pub use falling::falling_scene;
 #[cfg(feature = "native")]
 pub use scene_library::{MeshUpload, OpenedScene, SceneLibrary};
 pub use settings::SettingsChange;

@@ -3,6 +3,7 @@
 //! A scene is represented by its text: a change edits the text, which is read as any scene file.
 
 use super::built_in::{self, BUILT_IN_SCENES, BuiltInScene};
+use super::falling::falling_scene;
 use super::settings::{SettingsChange, set};
 use super::touchable::{TouchableScene, read_touchable_scene};
 use crate::error::{SceneError, SceneErrorKind};
@@ -128,7 +129,7 @@ impl SceneLibrary {
 
     /// Reads the text of a scene, adds pointers if it has none, and makes it the current scene.
     fn open_text(&self, mut current: Current, text: String) -> Result<OpenedScene, SceneError> {
-        let TouchableScene { scene, text } =
+        let TouchableScene { scene, text, .. } =
             read_touchable_scene(&current.path, text, &PartsInMemory::default())?;
         current.text = text.parse().map_err(|error| {
             SceneError::of_file(SceneErrorKind::Syntax, &current.path, format!("{error}"))
@@ -292,14 +293,7 @@ impl SceneLibrary {
         let recorded = recipe.record_mesh(mesh, progress).map_err(without_folder)?;
         let path = recipe.store(&recorded, &folder)?;
         let recording = read_recording(&path)?;
-        let lowest =
-            recording.surface.positions.iter().map(|position| position.y).fold(f64::INFINITY, f64::min);
-        let height = recording.surface.diagonal() * 0.1 - lowest;
-        let text = format!(
-            "gravity = [0.0, -9.81, 0.0]\n[[object]]\nname = \"object\"\nrecording = {:?}\nposition = [0.0, {height:?}, 0.0]\n\
-             [[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nfriction = 1.0\n",
-            path.display().to_string(),
-        );
+        let text = falling_scene(&recording, &path.display().to_string());
         let uploads = self.lock().uploads;
         let current = Current {
             id: None,

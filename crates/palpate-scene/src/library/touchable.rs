@@ -13,6 +13,8 @@ pub struct TouchableScene {
     pub scene: Scene,
     /// Its text, with added pointers.
     pub text: String,
+    /// Names of the pointers that were added now.
+    pub added: Vec<String>,
 }
 
 /// Reads the text of a scene, with four pointers where it has none. Files are looked for beside `path`, which errors name, unless they are in
@@ -34,5 +36,5 @@ pub fn read_touchable_scene(
     let (mut scene, text) = read_edited_scene(path, text, parts, RunMode::RealTime, edit)?;
     // Nobody has chosen the size of added pointers.
     scene.warnings.retain(|warning| !added.contains(&warning.part));
-    Ok(TouchableScene { scene, text })
+    Ok(TouchableScene { scene, text, added })
 }

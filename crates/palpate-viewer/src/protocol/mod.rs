@@ -12,7 +12,7 @@ pub use description::{
     ObstacleDescription, SceneDescription, ShapeDescription, View,
 };
 pub use frame::{FrameEncoder, FrameFormat};
-#[cfg(feature = "server")]
+#[cfg(feature = "logs")]
 pub(crate) use messages::LogEntry;
 pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, decodes};
 pub(crate) use messages::{ClientMessage, Hello, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status};
