@@ -444,7 +444,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::grasp(&self.inner, device, object, point)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     /// Let a device of rows let go, as :meth:`Simulation.release`.
@@ -463,7 +463,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::release(&self.inner, device)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     /// Take a device out of rows, as :meth:`Simulation.deactivate`.
@@ -482,7 +482,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::deactivate(&self.inner, device)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     fn __len__(&self) -> usize {

@@ -21,6 +21,8 @@ mod devices;
 mod error;
 mod file;
 mod files;
+#[cfg(feature = "native")]
+mod growing_log;
 mod initial_checks;
 mod library;
 #[cfg(feature = "native")]
@@ -41,6 +43,8 @@ mod replay;
 mod scene;
 #[cfg(feature = "native")]
 mod scene_log;
+#[cfg(feature = "native")]
+mod session;
 mod step_check;
 #[cfg(feature = "native")]
 mod supports;
@@ -55,6 +59,8 @@ pub use file::{
     PartsInMemory, Relocated, RunMode, named_files, read_driven_scene, read_path, read_piped_scene,
     read_relocated_scene, read_scene, read_scene_text,
 };
+#[cfg(feature = "native")]
+pub use growing_log::{Failures, GrowingLog, Teller, create_part};
 #[cfg(feature = "native")]
 pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
 pub use library::{SettingsChange, TouchableScene, read_touchable_scene};

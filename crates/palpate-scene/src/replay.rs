@@ -5,7 +5,7 @@
 
 use crate::error::SceneError;
 use crate::file::{Relocated, RunMode, read_relocated_scene};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneDevice};
 use palpate::{DeviceMode, Input, State, step};
 use palpate_export::{TemporaryFolder, part_of};
 use palpate_haptics::SceneNames;
@@ -146,7 +146,13 @@ impl LogReplay {
         let (mut scene, folder) = unpack(files, facts.get("scene").map(Path::new))?;
         scene.inputs.push(path.to_path_buf());
         let names = scene.names();
-        let modes = scene.devices.iter().map(|device| device.mode).collect();
+        // Since logs hold initial states, they tell of every held point: a device that has none has let go of the scene's.
+        let tells_held_points = reader.start(&names).map_err(named)?.is_some();
+        let mode = |device: &SceneDevice| match device.mode {
+            DeviceMode::Held(_) if tells_held_points => DeviceMode::Touch,
+            mode => mode,
+        };
+        let modes = scene.devices.iter().map(mode).collect();
         Ok(Self { path: path.to_path_buf(), reader, facts, scene, steps, names, modes, _folder: folder })
     }
 
