@@ -1,6 +1,6 @@
 //! Start of a session: its scheduling, its state and its log.
 
-use crate::errors::{Class, exception, scene_error};
+use crate::errors::{Class, exception, input_error, scene_error};
 use crate::progress::warn;
 use crate::scalars::Whole;
 use crate::scene::Scene as PythonScene;
@@ -56,6 +56,12 @@ pub fn begin_log(
     path: &Path,
     (state, failure): (&State, &LogFailure),
 ) -> PyResult<SessionLog> {
+    if path.file_name().is_none() {
+        return Err(input_error(
+            py,
+            format!("log is {:?}, expected the name of a file", path.display().to_string()),
+        ));
+    }
     let raise = |error| scene_error(py, &error);
     // What is in no file goes to files, which the log takes along.
     let mut folder = None;

@@ -223,6 +223,7 @@ def test_wrong_arguments_are_refused_and_nothing_starts(cube, touching, held, pr
         ({"timeout": np.nan}, "timeout is NaN s"),
         ({"priority": 100}, "priority is 100, expected 1 to 99"),
         ({"core": -1}, "core is -1"),
+        ({"log": ""}, 'log is "", expected the name of a file'),
         ({"start": palpate.Simulation(palpate.Scene([palpate.Object("a", cube), palpate.Object("b", cube, position=[1, 0, 0])])).snapshot()}, "modes"),
     ]:
         with pytest.raises(palpate.InputError, match=text):
