@@ -1,11 +1,12 @@
 //! Readings of a state: what a simulation returns of it.
 
-use crate::arrays::{array, flat, pose_row, twist_row};
+use crate::arrays::{array, flat};
 use crate::contacts::ContactLayout;
 use crate::errors::{Class, catch_panic, exception, internal_error};
 use glam::DVec3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use palpate::{DeformationSnapshot, EnergyLedger, Model, Output, StepStatus};
+use palpate_scene::{pose_row, twist_row};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -40,6 +40,7 @@ mod record_options;
 mod recording_file;
 #[cfg(feature = "native")]
 mod replay;
+mod rows;
 mod scene;
 #[cfg(feature = "native")]
 mod scene_log;
@@ -81,6 +82,7 @@ pub use record_options::{BodySource, PreparedBody, RecordOptions};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
 #[cfg(feature = "native")]
 pub use replay::{Difference, LogReplay, ReplayError, Replayed};
+pub use rows::{pose_of_row, pose_row, twist_row};
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 #[cfg(feature = "native")]
 pub use scene_log::SceneLog;
