@@ -84,9 +84,10 @@ def test_the_newest_output_is_that_of_a_simulation_of_as_many_steps(touching):
 
 def test_a_hand_that_is_moved_meanwhile_is_in_the_log_and_repeats(touching, press, tmp_path, palpate_run):
     with palpate.Session(touching, log=tmp_path / "run.mcap") as session:
-        for position in press[::10]:
+        # From just above the cube; each position is in two steps or more.
+        for position in press[::5] + [0, 0, 0.0045]:
             session.move(position)
-            time.sleep(0.002)
+            steps_of(session, 2)
         session.move([0, 0, 0.2], device="finger")
         assert steps_of(session, 2).positions[0, 2] == 0.2
     log = palpate.Log(tmp_path / "run.mcap")
@@ -160,11 +161,15 @@ def test_a_session_pauses_steps_singly_and_goes_slowly(held):
         steps_of(session, 5)
         session.is_paused = True
         assert session.is_paused
+
+        def stands_still():
+            at = session.steps
+            time.sleep(0.05)
+            return session.steps == at
+
         # A step may be in the making.
-        time.sleep(0.05)
+        until(stands_still)
         at = session.steps
-        time.sleep(0.05)
-        assert session.steps == at
         session.request_step()
         until(lambda: session.steps == at + 1)
         session.slowdown = 3
@@ -277,6 +282,7 @@ def test_ctrl_c_ends_the_wait_and_the_block_ends_the_session(held):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt), palpate.Session(held) as session:
+            steps_of(session, 1)
             threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
             session.wait()
     finally:
