@@ -7,7 +7,8 @@
 >>> series = simulation.run(steps=100)
 
 Lengths are metres, times seconds, forces newtons; vectors are in world axes. A recording is made once of a mesh (:func:`record`) or read from
-a file (:meth:`Recording.open`); a :class:`Scene` puts recordings among planes, obstacles and devices; a :class:`Simulation` steps it, a :class:`Batch` many of it.
+a file (:meth:`Recording.open`); a :class:`Scene` puts recordings among planes, obstacles and devices; a :class:`Simulation` steps it, a :class:`Batch` many of it; a
+:class:`Session` runs it in real time.
 """
 
 from palpate._coupling import RigidCoupling
@@ -22,7 +23,7 @@ from palpate._errors import (
     SceneError,
     StepError,
 )
-from palpate._palpate import Batch, Log, Recording, Simulation, Snapshot, __version__, record
+from palpate._palpate import Batch, Log, Output, Recording, Session, Simulation, Snapshot, __version__, record
 from palpate._scene import Clamp, Device, Object, Obstacle, Plane, Probe, Scene
 from palpate._viewer import Viewer, view
 
@@ -37,6 +38,7 @@ __all__ = [
     "MeshError",
     "Object",
     "Obstacle",
+    "Output",
     "PalpateError",
     "PalpateWarning",
     "Plane",
@@ -46,6 +48,7 @@ __all__ = [
     "RigidCoupling",
     "Scene",
     "SceneError",
+    "Session",
     "Simulation",
     "Snapshot",
     "StepError",

@@ -1,9 +1,10 @@
-//! Arrays of arguments, checked: numbers of a shape, and conversions of vectors and poses to rows of numbers.
+//! Arrays of arguments, checked: numbers of a shape, and conversions of vectors to rows of numbers, and of rows to poses.
 
 use crate::errors::input_error;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use palpate::{Pose, Twist};
+use palpate::Pose;
+use palpate_scene::pose_of_row;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -138,27 +139,14 @@ pub fn flat(vectors: impl IntoIterator<Item = DVec3>) -> Vec<f64> {
     vectors.into_iter().flat_map(|vector| vector.to_array()).collect()
 }
 
-/// Row of a pose: x, y, z [m], qw, qx, qy, qz.
-pub fn pose_row(pose: &Pose) -> [f64; 7] {
-    let (p, q) = (pose.position, pose.orientation);
-    [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
-}
-
-/// Row of a velocity: linear [m/s], angular [rad/s].
-pub fn twist_row(twist: &Twist) -> [f64; 6] {
-    let (v, w) = (twist.linear, twist.angular);
-    [v.x, v.y, v.z, w.x, w.y, w.z]
-}
-
 /// Pose of a row x, y, z, qw, qx, qy, qz; the quaternion has length 1 to a thousandth.
 pub fn pose_of(row: &[f64]) -> Result<Pose, String> {
-    let &[x, y, z, w, i, j, k] = row else { return Err("a pose has seven numbers".into()) };
-    let length = (w * w + i * i + j * j + k * k).sqrt();
+    let row = row.try_into().map_err(|_| "a pose has seven numbers")?;
+    let (pose, length) = pose_of_row(row);
     if (length - 1.0).abs() > UNIT {
         return Err(format!("the quaternion (qw, qx, qy, qz) has the length {length}, expected 1"));
     }
-    let orientation = DQuat::from_xyzw(i / length, j / length, k / length, w / length);
-    Ok(Pose { position: DVec3::new(x, y, z), orientation })
+    Ok(pose)
 }
 
 /// Deviation of a quaternion's length from 1 that is taken for round-off of a printed one.

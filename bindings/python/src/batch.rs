@@ -126,7 +126,8 @@ impl Batch {
         let mut numbers = vec![0.0; len * outputs.row_length()];
         fill_rows(&rows, &mut numbers, outputs.row_length());
         outputs.write(py, &numbers)?;
-        let rows = Rows { rows, outputs: numbers, motion: BatchMotion::new(&inner, len), workers };
+        let motion = BatchMotion::new(&inner, len);
+        let rows = Rows { rows, outputs: numbers, motion, workers, is_backward: false };
         let layout = ContactLayout::new(&inner);
         Ok(Self { scene, inner, layout, outputs, len, threads, rows: Mutex::new(rows) })
     }
@@ -172,21 +173,11 @@ impl Batch {
         clamps: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Py<PyArrayDyn<f64>>> {
         let mut guard = self.lock(py)?;
-        let Rows { rows, outputs, motion, workers } = &mut *guard;
-        motion.read(py, &self.inner, false, &Arguments { positions, obstacles, clamps })?;
-        let (scene, motion, length) = (&*self.inner, &*motion, self.outputs.row_length());
-        let step_row = |at: usize, row: &mut Row, outputs: &mut [f64]| {
-            let has_failed = row.step(scene, motion, (0, at));
-            row.fill(outputs);
-            has_failed.then_some(at)
-        };
-        let failed = py.detach(|| {
-            workers.run(|| {
-                let each = rows.par_iter_mut().zip(outputs.par_chunks_mut(length)).enumerate();
-                each.filter_map(|(at, (row, outputs))| step_row(at, row, outputs)).collect::<Vec<usize>>()
-            })
-        });
+        let all = &mut *guard;
+        all.motion.read(py, &self.inner, false, &Arguments { positions, obstacles, clamps })?;
+        let failed = py.detach(|| all.step(&self.inner, self.outputs.row_length()));
         let failed = failed.map_err(|error| no_threads(py, &error))?;
+        let Rows { rows, outputs, .. } = all;
         self.outputs.write(py, outputs)?;
         match failure_of(py, rows, failed)? {
             None => Ok(self.outputs.array(py, Part::Forces)),
@@ -444,7 +435,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::grasp(&self.inner, device, object, point)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     /// Let a device of rows let go, as :meth:`Simulation.release`.
@@ -463,7 +454,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::release(&self.inner, device)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     /// Take a device out of rows, as :meth:`Simulation.deactivate`.
@@ -482,7 +473,7 @@ impl Batch {
         rows: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let change = ModeChange::deactivate(&self.inner, device)?;
-        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run))
+        self.change(py, &chosen_rows(self.len, rows)?, |_, row| change.apply(&self.inner, &mut row.run.modes))
     }
 
     fn __len__(&self) -> usize {

@@ -1,10 +1,10 @@
 //! Outputs of a batch: arrays that every step writes over.
 
-use crate::arrays::{array, pose_row, twist_row};
+use crate::arrays::array;
 use crate::errors::{Class, exception};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use palpate::Output;
-use palpate_scene::Scene;
+use palpate_scene::{Scene, pose_row, twist_row};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice, PyTuple};
 

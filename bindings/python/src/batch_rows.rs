@@ -9,6 +9,7 @@ use crate::workers::Workers;
 use palpate_fem::check_memory;
 use palpate_scene::Scene;
 use pyo3::prelude::*;
+use rayon::ThreadPoolBuildError;
 use rayon::prelude::*;
 
 /// Number of rows by whose memory that of all is estimated.
@@ -21,9 +22,36 @@ pub struct Rows {
     pub outputs: Vec<f64>,
     pub motion: BatchMotion,
     pub workers: Workers,
+    /// Whether the next step goes from the last row to the first.
+    pub is_backward: bool,
 }
 
 impl Rows {
+    /// Step all rows with their motions, and write their numbers, of a length; gives the rows that failed, in their order. Steps go to and fro:
+    /// the states of the rows that were stepped last are still in the cache.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn step(&mut self, scene: &Scene, length: usize) -> Result<Vec<usize>, ThreadPoolBuildError> {
+        let Self { rows, outputs, motion, workers, is_backward } = self;
+        let (motion, backward) = (&*motion, std::mem::replace(is_backward, !*is_backward));
+        let step_row = |(at, (row, outputs)): (usize, (&mut Row, &mut [f64]))| {
+            let has_failed = row.step(scene, motion, (0, at));
+            row.fill(outputs);
+            has_failed.then_some(at)
+        };
+        let mut failed: Vec<usize> = workers.run(|| {
+            let each = rows.par_iter_mut().zip(outputs.par_chunks_mut(length)).enumerate();
+            if backward {
+                each.rev().filter_map(step_row).collect()
+            } else {
+                each.filter_map(step_row).collect()
+            }
+        })?;
+        failed.sort_unstable();
+        Ok(failed)
+    }
+
     /// State of a row that has not failed.
     pub fn whole(&self, py: Python<'_>, at: usize) -> PyResult<&RunState> {
         match &self.rows[at].failure {

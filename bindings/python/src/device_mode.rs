@@ -2,7 +2,6 @@
 
 use crate::arrays::Numbers;
 use crate::errors::{catch_panic, input_error, internal_error, scene_error};
-use crate::run_state::RunState;
 use crate::scene::Scene;
 use glam::DVec3;
 use palpate::{DeviceMode, Grasp};
@@ -52,6 +51,11 @@ impl ModeChange {
         Self::of(scene, py, number, DeviceMode::Held(grasp), &refused)
     }
 
+    /// Number of the device.
+    pub fn device(&self) -> usize {
+        self.device
+    }
+
     /// Device that lets go, and touches with its tip from now on.
     pub fn release(scene: &palpate_scene::Scene, device: &Bound<'_, PyAny>) -> PyResult<Self> {
         Self::of(scene, device.py(), Scene::device(scene, device)?, DeviceMode::Touch, "")
@@ -96,13 +100,13 @@ impl ModeChange {
     ///
     /// # Errors
     /// Text, if another device holds the same point: no force could satisfy both.
-    pub fn apply(&self, scene: &palpate_scene::Scene, run: &mut RunState) -> Result<(), String> {
+    pub fn apply(&self, scene: &palpate_scene::Scene, modes: &mut [DeviceMode]) -> Result<(), String> {
         let is_held = matches!(self.mode, DeviceMode::Held(_));
         let holds = |(at, mode): (usize, &DeviceMode)| at != self.device && is_held && *mode == self.mode;
-        if let Some(other) = run.modes.iter().enumerate().position(holds) {
+        if let Some(other) = modes.iter().enumerate().position(holds) {
             return Err(format!("device {:?} holds the same point", scene.devices[other].name));
         }
-        run.modes[self.device] = self.mode;
+        modes[self.device] = self.mode;
         Ok(())
     }
 }

@@ -15,6 +15,7 @@ mod errors;
 mod keywords;
 mod log;
 mod motion;
+mod output;
 mod progress;
 mod readings;
 mod record;
@@ -24,6 +25,11 @@ mod run_state;
 mod scalars;
 mod scene;
 mod series;
+mod session;
+mod session_hands;
+mod session_report;
+mod session_start;
+mod session_thread;
 mod simulation;
 mod snapshot;
 mod starts;
@@ -40,5 +46,9 @@ fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::Batch>()?;
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<log::Log>()?;
+    module.add_class::<session::Session>()?;
+    module.add_class::<output::Output>()?;
+    let stop_sessions = wrap_pyfunction!(session_thread::stop_sessions, module)?;
+    module.py().import("atexit")?.call_method1("register", (stop_sessions,))?;
     module.add_function(wrap_pyfunction!(record::record, module)?)
 }

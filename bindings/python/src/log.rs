@@ -1,12 +1,13 @@
 //! `palpate.Log`: a log of a run as arrays.
 
-use crate::arrays::{array, pose_row, read_only, twist_row};
+use crate::arrays::{array, read_only};
 use crate::errors::{Class, catch_panic, exception, file_error, internal_error};
 use crate::scalars::FilePath;
 use numpy::PyArray1;
 use palpate::EnergyLedger;
 use palpate_haptics::log::{LogReader, LoggedStep};
 use palpate_mesh::read_regular_file;
+use palpate_scene::{pose_row, twist_row};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;

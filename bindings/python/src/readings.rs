@@ -1,11 +1,12 @@
 //! Readings of a state: what a simulation returns of it.
 
 use crate::arrays::{array, flat};
+use crate::contacts::ContactLayout;
 use crate::errors::{Class, catch_panic, exception, internal_error};
 use glam::DVec3;
-use numpy::{PyArray2, PyArrayMethods};
-use palpate::{EnergyLedger, Output, State, StepStatus};
-use palpate_scene::Scene;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use palpate::{DeformationSnapshot, EnergyLedger, Model, Output, StepStatus};
+use palpate_scene::{pose_row, twist_row};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -30,9 +31,72 @@ pub fn status_by_name<'py>(py: Python<'py>, status: &StepStatus) -> PyResult<Bou
     Ok(dict)
 }
 
-/// Row of a force [N] and a torque [N·m].
-pub fn load_row(force: DVec3, torque: DVec3) -> [f64; 6] {
-    [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+/// Forces on the hands [N].
+pub fn forces(output: &Output) -> Vec<[f64; 3]> {
+    output.devices.iter().map(|device| device.force_on_hand.to_array()).collect()
+}
+
+/// Held points, and centres of the tips [m].
+pub fn proxies(output: &Output) -> Vec<[f64; 3]> {
+    output.devices.iter().map(|device| device.proxy.to_array()).collect()
+}
+
+/// Poses of the objects.
+pub fn poses(output: &Output) -> Vec<[f64; 7]> {
+    output.objects.iter().map(|object| pose_row(&object.pose)).collect()
+}
+
+/// Velocities of the objects.
+pub fn velocities(output: &Output) -> Vec<[f64; 6]> {
+    output.objects.iter().map(|object| twist_row(&object.twist)).collect()
+}
+
+/// Forces [N] and torques [N·m] on the clamps.
+pub fn clamp_loads(output: &Output) -> Vec<[f64; 6]> {
+    let row = |[f, t]: [DVec3; 2]| [f.x, f.y, f.z, t.x, t.y, t.z];
+    output.clamps.iter().map(|clamp| row([clamp.force, clamp.torque])).collect()
+}
+
+/// Net forces on planes and obstacles [N].
+pub fn obstacle_forces(output: &Output) -> Vec<[f64; 3]> {
+    output.obstacles.iter().map(|own| own.force.to_array()).collect()
+}
+
+/// Net torques on planes and obstacles [N·m].
+pub fn obstacle_torques(output: &Output) -> Vec<[f64; 3]> {
+    output.obstacles.iter().map(|own| own.torque.to_array()).collect()
+}
+
+/// Net forces on objects [N].
+pub fn object_forces(output: &Output) -> Vec<[f64; 3]> {
+    output.objects.iter().map(|own| own.force.to_array()).collect()
+}
+
+/// Net torques on objects [N·m].
+pub fn object_torques(output: &Output) -> Vec<[f64; 3]> {
+    output.objects.iter().map(|own| own.torque.to_array()).collect()
+}
+
+/// Array of rows, one for each item of an output.
+pub fn array_of<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyAny>> {
+    array(py, rows.as_flattened().to_vec(), &[rows.len(), N])
+}
+
+/// Whether each object is asleep.
+pub fn asleep<'py>(py: Python<'py>, output: &Output) -> Bound<'py, PyAny> {
+    let asleep = output.objects.iter().map(|object| object.is_asleep).collect();
+    PyArray1::<bool>::from_vec(py, asleep).into_any()
+}
+
+/// Contacts, a structured array.
+pub fn contacts<'py>(
+    py: Python<'py>,
+    layout: &ContactLayout,
+    output: &Output,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut rows = Vec::new();
+    output.contacts.iter().for_each(|contact| layout.append(output.time_s, contact, &mut rows));
+    layout.array(py, rows, false)
 }
 
 /// Write the forces on the hands into a simulation's array.
@@ -54,15 +118,13 @@ pub fn write_forces(array: &Bound<'_, PyArray2<f64>>, output: &Output) -> PyResu
 /// Positions of an object's surface nodes [m, world].
 pub fn surface<'py>(
     py: Python<'py>,
-    scene: &Scene,
-    state: &State,
-    object: usize,
+    model: &Model,
+    deformation: &DeformationSnapshot,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let model = &scene.model;
-    let rest = model.recordings().nth(object).map_or(&[][..], |own| &own.surface.positions);
-    let pose = state.output().objects[object].pose;
+    let rest = model.recordings().nth(deformation.object()).map_or(&[][..], |own| &own.surface.positions);
+    let pose = deformation.pose();
     let mut displacement = vec![DVec3::ZERO; rest.len()];
-    catch_panic(|| state.surface_displacement(model, object, &mut displacement))
+    catch_panic(|| deformation.surface_displacement(model, &mut displacement))
         .map_err(|text| internal_error(py, &text))?;
     let positions = rest.iter().zip(&displacement).map(|(rest, moved)| pose.world_from_body(*rest + *moved));
     array(py, flat(positions), &[rest.len(), 3])

@@ -5,7 +5,7 @@ use crate::errors::{Class, catch_panic, exception, internal_error};
 use crate::motion::SeriesMotion;
 use crate::progress::SIGNAL_INTERVAL;
 use glam::DVec3;
-use palpate::{DeviceMode, Grasp, Input, State, Support, Twist, step};
+use palpate::{DeviceMode, Grasp, Input, ObjectSnapshot, State, Support, Twist, step};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use std::collections::TryReserveError;
@@ -67,6 +67,11 @@ impl RunState {
         Self { state, input: scene.input_at(0.0), modes, panic: None }
     }
 
+    /// State that resumes from the objects of another one, at time 0.
+    pub fn resume(scene: &palpate_scene::Scene, objects: &[ObjectSnapshot]) -> Self {
+        Self::with(scene, State::resume(&scene.model, objects))
+    }
+
     /// State at the start of the scene, its objects placed and moving as given; those with fixed nodes or on a table as the scene says.
     ///
     /// # Errors
@@ -90,7 +95,7 @@ impl RunState {
             let (turn, inertia) = (own.pose.orientation, recording.inertia());
             own.angular_momentum = turn * (inertia * (turn.inverse() * own.twist.angular));
         }
-        Ok(Self::with(scene, State::resume(&scene.model, &objects)))
+        Ok(Self::resume(scene, &objects))
     }
 
     /// Whether a step has panicked: only a reset or a snapshot helps.

@@ -10,6 +10,7 @@ use palpate_scene::{PartsInMemory, RunMode, read_scene_text};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Scene that is ready to be simulated; immutable.
@@ -17,7 +18,10 @@ use std::sync::Arc;
 pub struct Scene {
     /// Scene, which simulations share.
     pub inner: Arc<palpate_scene::Scene>,
+    path: PathBuf,
     text: String,
+    parts: PartsInMemory,
+    reference: bool,
 }
 
 impl Scene {
@@ -29,6 +33,26 @@ impl Scene {
     /// Number of a device by its name or number.
     pub fn device(scene: &palpate_scene::Scene, given: &Bound<'_, PyAny>) -> PyResult<usize> {
         number_of("device", &scene.names().devices, given)
+    }
+}
+
+impl Scene {
+    /// Scene with the limits of a run in real time, where it states none of its own.
+    pub fn for_real_time(&self, py: Python<'_>) -> PyResult<palpate_scene::Scene> {
+        let Self { path, text, parts, reference, .. } = self;
+        if *reference {
+            return Err(input_error(
+                py,
+                "the scene was read with reference=True, which takes longer than real time",
+            ));
+        }
+        let read = py.detach(|| catch_panic(|| read_scene_text(path, text, parts, RunMode::RealTime)));
+        read.map_err(|text| internal_error(py, &text))?.map_err(|error| scene_error(py, &error))
+    }
+
+    /// Whether parts of it are in no file.
+    pub fn has_parts_in_memory(&self) -> bool {
+        !self.parts.recordings.is_empty() || !self.parts.paths.is_empty()
     }
 }
 
@@ -72,12 +96,12 @@ impl Scene {
         for warning in &inner.warnings {
             warn(py, &warning.to_string())?;
         }
-        Ok(Self { inner: Arc::new(inner), text })
+        Ok(Self { inner: Arc::new(inner), path, text, parts, reference })
     }
 
     /// Text of the scene in TOML.
     #[getter]
-    fn toml(&self) -> &str {
+    pub fn toml(&self) -> &str {
         &self.text
     }
 

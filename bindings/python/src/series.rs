@@ -1,10 +1,10 @@
 //! Series of a run: the numbers of every step, as arrays.
 
-use crate::arrays::{array, pose_row, twist_row};
+use crate::arrays::array;
 use crate::contacts::ContactLayout;
 use glam::DVec3;
 use palpate::{Input, State};
-use palpate_scene::Scene;
+use palpate_scene::{Scene, pose_row, twist_row};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::TryReserveError;

@@ -2,12 +2,12 @@
 //!
 //! A call that finds the simulation in use by another thread is an exception: `run` steps without the interpreter's lock.
 
-use crate::arrays::{array, flat, pose_row, twist_row};
+use crate::arrays::{array, flat};
 use crate::contacts::ContactLayout;
 use crate::device_mode::{ModeChange, mode_name};
 use crate::errors::{catch_panic, input_error, internal_error, lock_at_once};
 use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
-use crate::readings::{energy_by_name, load_row, status_by_name, surface, write_forces};
+use crate::readings::{self, array_of, energy_by_name, status_by_name, write_forces};
 use crate::run_length::count_steps;
 use crate::run_state::{RunState, StepFailure, held_points, run_part};
 use crate::scalars::Whole;
@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::series::Series;
 use crate::snapshot::Snapshot;
 use crate::starts::Starts;
-use numpy::{PyArray1, PyArray2};
+use numpy::PyArray2;
 use palpate::Output;
 use palpate_fem::check_memory;
 use pyo3::exceptions::PyMemoryError;
@@ -76,7 +76,7 @@ impl Simulation {
     }
 
     fn change(&self, py: Python<'_>, change: ModeChange) -> PyResult<()> {
-        change.apply(&self.inner, &mut *self.lock(py)?).map_err(|text| input_error(py, text))
+        change.apply(&self.inner, &mut self.lock(py)?.modes).map_err(|text| input_error(py, text))
     }
 
     /// Array of rows, one for each item of the output.
@@ -85,8 +85,7 @@ impl Simulation {
         py: Python<'py>,
         rows: impl FnOnce(&Output) -> Vec<[f64; N]>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let rows = rows(self.lock(py)?.state.output());
-        array(py, rows.as_flattened().to_vec(), &[rows.len(), N])
+        array_of(py, rows(self.lock(py)?.state.output()))
     }
 }
 
@@ -256,61 +255,58 @@ impl Simulation {
     /// Held points, and centres of the tips that stay outside [m, world]: float64 of shape (devices, 3).
     #[getter]
     fn proxies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.devices.iter().map(|device| device.proxy.to_array()).collect())
+        self.rows(py, readings::proxies)
     }
 
     /// Centres of mass [m] and orientations of the objects, x, y, z, qw, qx, qy, qz: float64 of shape (objects, 7).
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.objects.iter().map(|object| pose_row(&object.pose)).collect())
+        self.rows(py, readings::poses)
     }
 
     /// Velocities [m/s] and angular velocities [rad/s, world] of the objects: float64 of shape (objects, 6).
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.objects.iter().map(|object| twist_row(&object.twist)).collect())
+        self.rows(py, readings::velocities)
     }
 
     /// Forces [N] and torques [N·m, world] on the clamps: float64 of shape (clamps, 6).
     #[getter]
     fn clamp_loads<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| {
-            output.clamps.iter().map(|clamp| load_row(clamp.force, clamp.torque)).collect()
-        })
+        self.rows(py, readings::clamp_loads)
     }
 
     /// Net forces of the objects on the planes and obstacles in the last step, sums over their contacts [N, world]: float64 of shape (obstacles, 3).
     #[getter]
     fn obstacle_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.obstacles.iter().map(|own| own.force.to_array()).collect())
+        self.rows(py, readings::obstacle_forces)
     }
 
     /// Torques of these forces about the positions of the planes' and obstacles' poses at the end of the step [N·m, world]: float64 of shape
     /// (obstacles, 3).
     #[getter]
     fn obstacle_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.obstacles.iter().map(|own| own.torque.to_array()).collect())
+        self.rows(py, readings::obstacle_torques)
     }
 
     /// Net forces of contacts, hands, clamps and prescribed forces on the objects in the last step [N, world], without their weights and without
     /// what their supports carry: float64 of shape (objects, 3).
     #[getter]
     fn object_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.objects.iter().map(|own| own.force.to_array()).collect())
+        self.rows(py, readings::object_forces)
     }
 
     /// Torques of these forces about the objects' centres of mass, the positions of `poses`, at the end of the step [N·m, world]: float64 of shape
     /// (objects, 3).
     #[getter]
     fn object_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.rows(py, |output| output.objects.iter().map(|own| own.torque.to_array()).collect())
+        self.rows(py, readings::object_torques)
     }
 
     /// Whether each object is asleep: bool of shape (objects,).
     #[getter]
     fn is_asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let asleep = self.lock(py)?.state.output().objects.iter().map(|object| object.is_asleep).collect();
-        Ok(PyArray1::<bool>::from_vec(py, asleep).into_any())
+        Ok(readings::asleep(py, self.lock(py)?.state.output()))
     }
 
     /// Contacts of the last step that carry force, a structured array.
@@ -319,11 +315,7 @@ impl Simulation {
     /// penetrating, `slip_speed` [m/s], `object` and `against` (names), `device` (row of the device, or -1).
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mut rows = Vec::new();
-        let run = self.lock(py)?;
-        let output = run.state.output();
-        output.contacts.iter().for_each(|contact| self.layout.append(output.time_s, contact, &mut rows));
-        self.layout.array(py, rows, false)
+        readings::contacts(py, &self.layout, self.lock(py)?.state.output())
     }
 
     /// Energy ledger of the scene [J], by name (docs/scene.md).
@@ -351,7 +343,8 @@ impl Simulation {
     ///     Positions of its surface nodes [m, world], float64 of shape (nodes, 3), for the triangles `scene.triangles(object)`.
     fn surface<'py>(&self, py: Python<'py>, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let at = Scene::object(&self.inner, object)?;
-        surface(py, &self.inner, &self.lock(py)?.state, at)
+        let deformation = self.lock(py)?.state.deformation(at);
+        readings::surface(py, &self.inner.model, &deformation)
     }
 
     /// Points that devices hold or exert forces on [m, world]: float64 of shape (devices, 3), NaN for tips. Start a hand there.

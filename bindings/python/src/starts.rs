@@ -1,10 +1,10 @@
 //! Starts that the caller gives: placements and velocities of the objects of one simulation, or of each row of a batch.
 
-use crate::arrays::{Numbers, check_finite, pose_of, pose_row, twist_row};
+use crate::arrays::{Numbers, check_finite, pose_of};
 use crate::errors::{catch_panic, input_error, internal_error};
 use crate::run_state::Start;
 use palpate::{State, Support};
-use palpate_scene::Scene;
+use palpate_scene::{Scene, pose_row, twist_row};
 use pyo3::prelude::*;
 
 /// Largest difference from the start of the scene that is round-off [m, m/s, 1].

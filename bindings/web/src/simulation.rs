@@ -1,8 +1,8 @@
 //! Simulation: a scene that the caller steps, with its input and output in flat arrays.
 
-use glam::{DQuat, DVec3};
-use palpate::{Collider, DeviceInput, DeviceMode, Grasp, Input, Pose, ResidualFieldCache, State, step};
-use palpate_scene::Scene;
+use glam::DVec3;
+use palpate::{Collider, DeviceInput, DeviceMode, Grasp, Input, ResidualFieldCache, State, step};
+use palpate_scene::{Scene, pose_of_row, pose_row, twist_row};
 use std::sync::Arc;
 
 /// Array of a simulation. The order of its rows is the scene's.
@@ -226,14 +226,15 @@ impl Simulation {
         let poses = self.input.obstacles.iter_mut().zip(obstacles.as_chunks::<7>().0);
         for ((own, row), of) in poses.zip(&self.scene.obstacles) {
             if of.path.is_none() {
-                *own = pose_of(row);
+                // What is not finite is refused by the step.
+                (*own, _) = pose_of_row(row);
             }
         }
         let clamps = &self.arrays[Array::Clamps as usize];
         let frames = self.input.clamps.iter_mut().zip(clamps.as_chunks::<7>().0);
         for ((own, row), of) in frames.zip(&self.scene.clamps) {
             if of.path.is_none() {
-                *own = pose_of(row);
+                (*own, _) = pose_of_row(row);
             }
         }
     }
@@ -251,8 +252,7 @@ impl Simulation {
         }
         for object in &output.objects {
             arrays[Array::Poses as usize].extend(pose_row(&object.pose));
-            arrays[Array::Velocities as usize].extend(object.twist.linear.to_array());
-            arrays[Array::Velocities as usize].extend(object.twist.angular.to_array());
+            arrays[Array::Velocities as usize].extend(twist_row(&object.twist));
             arrays[Array::ObjectLoads as usize].extend(object.force.to_array());
             arrays[Array::ObjectLoads as usize].extend(object.torque.to_array());
         }
@@ -284,17 +284,4 @@ impl Simulation {
 #[cfg(target_arch = "wasm32")]
 pub fn energy_names() -> Vec<&'static str> {
     palpate::EnergyLedger::default().named().into_iter().map(|(name, _)| name).collect()
-}
-
-fn pose_row(pose: &Pose) -> [f64; 7] {
-    let (p, q) = (pose.position, pose.orientation);
-    [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
-}
-
-/// Pose of a row, with a quaternion of any length; what is not finite is refused by the step.
-fn pose_of(&[x, y, z, qw, qx, qy, qz]: &[f64; 7]) -> Pose {
-    let orientation = DQuat::from_xyzw(qx, qy, qz, qw);
-    let is_unit = (orientation.length_squared() - 1.0).abs() < 1e-12;
-    let orientation = if is_unit { orientation } else { orientation.normalize() };
-    Pose { position: DVec3::new(x, y, z), orientation }
 }

@@ -7,7 +7,6 @@ mod commands;
 #[cfg(doctest)]
 mod documentation;
 mod failure;
-mod growing_log;
 mod interrupt;
 mod log_kind;
 mod progress;

@@ -57,8 +57,8 @@ impl DeformationProcess {
 
     /// Computes the deformed surfaces of a snapshot. Normals are area-weighted means over the triangles of each node.
     pub fn cycle(&mut self, snapshot: &Snapshot) -> &Frame {
-        let Snapshot { time_s, objects, .. } = snapshot;
-        self.frame.time_s = *time_s;
+        let Snapshot { objects, output, .. } = snapshot;
+        self.frame.time_s = output.time_s;
         let surfaces = objects.iter().zip(&mut self.frame.objects).zip(&mut self.caches);
         for (((deformation, frame), cache), recording) in surfaces.zip(self.model.recordings()) {
             let surface = &recording.surface;

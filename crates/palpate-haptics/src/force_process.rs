@@ -11,8 +11,8 @@ use std::sync::Arc;
 /// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
 pub type ObstacleTrajectory = Box<dyn Fn(f64) -> Pose + Send>;
 
-/// Listener to the state after every step. It must not allocate, lock or call the system.
-pub type StepListener = Box<dyn FnMut(&State) + Send>;
+/// Listener to the input of every step and the state after it. It must not allocate, lock or call the system.
+pub type StepListener = Box<dyn FnMut(&Input, &State) + Send>;
 
 /// Steps of the warm-up.
 const WARM_UP_STEPS: usize = 50;
@@ -149,7 +149,7 @@ impl ForceProcess {
         self.gravity = Some(over_time);
     }
 
-    /// Hands the state after every step to a listener.
+    /// Hands the input of every step and the state after it to a listener.
     pub fn listen(&mut self, listener: StepListener) {
         self.listener = Some(listener);
     }
@@ -262,7 +262,7 @@ impl ForceProcess {
             });
         }
         if let Some(listener) = &mut self.listener {
-            listener(&self.state);
+            listener(&self.input, &self.state);
         }
         self.state.output()
     }

@@ -87,7 +87,7 @@ pub struct Session {
     pub playback: Arc<Playback>,
     /// Channel for the timing of the force process's cycles.
     pub cycles: Option<CycleSender>,
-    /// Listener to the state after every step.
+    /// Listener to every step.
     pub listener: Option<StepListener>,
 }
 
@@ -288,7 +288,11 @@ impl Session {
         })
     }
 
-    fn check(&self) -> Result<(), Error> {
+    /// Checks the settings, as [`Self::run`] does at first.
+    ///
+    /// # Errors
+    /// If one is invalid.
+    pub fn check(&self) -> Result<(), Error> {
         let step_s = self.model.parameters().step_s;
         if !(200e-6..=10e-3).contains(&step_s) {
             return Err(SessionError::Step { step_s }.into());

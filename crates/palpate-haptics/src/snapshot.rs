@@ -1,8 +1,6 @@
 //! Snapshots: the newest state of a scene, handed from the force process to displays through a triple buffer.
 
-use palpate::{
-    ContactOutput, DeformationSnapshot, DeviceOutput, EnergyLedger, Input, Model, Output, State, StepStatus,
-};
+use palpate::{DeformationSnapshot, Input, Model, Output, State};
 use triple_buffer::triple_buffer;
 
 /// State of a scene at the end of a step, as far as a display needs it.
@@ -10,20 +8,12 @@ use triple_buffer::triple_buffer;
 pub struct Snapshot {
     /// Number of the step, from 1; 0 is the initial state.
     pub step: u64,
-    /// Simulated time [s].
-    pub time_s: f64,
     /// Deformation and pose of every object, in the model's order.
     pub objects: Vec<DeformationSnapshot>,
     /// Input of the step: devices and obstacles.
     pub input: Input,
-    /// Output of every device.
-    pub devices: Vec<DeviceOutput>,
-    /// Contacts that carry force.
-    pub contacts: Vec<ContactOutput>,
-    /// Energy ledger of the scene.
-    pub energy: EnergyLedger,
-    /// Status of the step.
-    pub status: StepStatus,
+    /// Output of the step.
+    pub output: Output,
 }
 
 /// Writing end of a snapshot buffer, held by the force process.
@@ -35,35 +25,23 @@ pub struct SnapshotReader(triple_buffer::Output<Snapshot>);
 impl Clone for Snapshot {
     /// Copy with the same capacity, so that it can be filled without allocation.
     fn clone(&self) -> Self {
-        let mut contacts = Vec::with_capacity(self.contacts.capacity());
-        contacts.extend_from_slice(&self.contacts);
-        Self {
-            objects: self.objects.clone(),
-            input: self.input.clone(),
-            devices: self.devices.clone(),
-            contacts,
-            ..*self
-        }
+        let mut output = self.output.clone();
+        output.contacts.reserve_exact(self.output.contacts.capacity() - self.output.contacts.len());
+        Self { step: self.step, objects: self.objects.clone(), input: self.input.clone(), output }
     }
 }
 
 impl Snapshot {
     /// Snapshot of an initial state, with the capacity of any later one.
     pub fn new(model: &Model, state: &State, input: &Input) -> Self {
-        let Output { time_s, devices, contacts, energy, status, .. } = state.output();
-        let capacity = contacts.capacity();
-        let mut snapshot = Self {
+        let mut output = state.output().clone();
+        output.contacts.reserve_exact(state.output().contacts.capacity() - output.contacts.len());
+        Self {
             step: 0,
-            time_s: *time_s,
             objects: (0..model.recordings().count()).map(|object| state.deformation(object)).collect(),
             input: input.clone(),
-            devices: devices.clone(),
-            contacts: Vec::with_capacity(capacity),
-            energy: *energy,
-            status: *status,
-        };
-        snapshot.contacts.extend_from_slice(contacts);
-        snapshot
+            output,
+        }
     }
 
     /// Overwrites this snapshot with the state after `step` steps.
@@ -71,13 +49,10 @@ impl Snapshot {
     /// # Real time
     /// No allocation. Cost: modes and contacts.
     pub fn capture(&mut self, step: u64, input: &Input, state: &State) {
-        let Output { time_s, devices, contacts, energy, status, .. } = state.output();
-        (self.step, self.time_s, self.energy, self.status) = (step, *time_s, *energy, *status);
+        self.step = step;
         self.objects.iter_mut().for_each(|object| object.copy_from(state));
         self.input.copy_from(input);
-        self.devices.copy_from_slice(devices);
-        self.contacts.clear();
-        self.contacts.extend_from_slice(contacts);
+        self.output.copy_from(state.output());
     }
 }
 
@@ -102,5 +77,10 @@ impl SnapshotReader {
     /// Newest snapshot; `None` if there is none newer than the last one read.
     pub fn newest(&mut self) -> Option<&Snapshot> {
         self.0.update().then(|| &*self.0.output_buffer_mut())
+    }
+
+    /// Newest snapshot, also one that was read before.
+    pub fn latest(&mut self) -> &Snapshot {
+        self.0.read()
     }
 }

@@ -21,6 +21,8 @@ mod devices;
 mod error;
 mod file;
 mod files;
+#[cfg(feature = "native")]
+mod growing_log;
 mod initial_checks;
 mod library;
 #[cfg(feature = "logs")]
@@ -40,9 +42,12 @@ mod record_options;
 mod recording_file;
 #[cfg(feature = "logs")]
 mod replay;
+mod rows;
 mod scene;
 #[cfg(feature = "native")]
 mod scene_log;
+#[cfg(feature = "native")]
+mod session;
 mod step_check;
 #[cfg(feature = "native")]
 mod supports;
@@ -57,6 +62,8 @@ pub use file::{
     PartsInMemory, Relocated, RunMode, named_files, read_driven_scene, read_path, read_piped_scene,
     read_relocated_scene, read_scene, read_scene_text,
 };
+#[cfg(feature = "native")]
+pub use growing_log::{Failures, GrowingLog, Teller, create_part};
 #[cfg(feature = "native")]
 pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
 pub use library::{SettingsChange, TouchableScene, falling_scene, read_touchable_scene};
@@ -79,6 +86,7 @@ pub use record_options::{BodySource, PreparedBody, RecordOptions};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
 #[cfg(feature = "logs")]
 pub use replay::{Difference, LogReplay, ReplayCursor, ReplayError, Replayed};
+pub use rows::{pose_of_row, pose_row, twist_row};
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 #[cfg(feature = "native")]
 pub use scene_log::SceneLog;

@@ -8,7 +8,7 @@ use crate::file::{PartsInMemory, RunMode, named_files, read_scene_in_memory};
 #[cfg(feature = "native")]
 use crate::file::{Relocated, read_relocated_scene};
 use crate::recording_file::recording_of_bytes;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneDevice};
 use palpate::{DeviceMode, Input, State, step};
 #[cfg(feature = "native")]
 use palpate_export::{TemporaryFolder, part_of};
@@ -155,7 +155,7 @@ impl LogReplay {
         })?;
         let content = LogContent::new(path, bytes)?;
         let (scene, folder) = unpack(content.files()?, content.scene())?;
-        Ok(Self { _folder: Some(folder), ..content.with(scene) })
+        Ok(Self { _folder: Some(folder), ..content.with(scene)? })
     }
 
     /// Log of the bytes of a file, whose scene stays in memory: its recordings and paths, but no table and no mesh. Errors name `path`.
@@ -165,7 +165,7 @@ impl LogReplay {
     pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ReplayError> {
         let content = LogContent::new(path, bytes)?;
         let scene = scene_in_memory(content.files()?, content.scene())?;
-        Ok(content.with(scene))
+        content.with(scene)
     }
 
     /// State before the first step: that of the scene, or the one that the log resumes from.
@@ -333,13 +333,19 @@ impl LogContent {
         self.facts.get("scene").map(Path::new)
     }
 
-    fn with(self, mut scene: Scene) -> LogReplay {
+    fn with(self, mut scene: Scene) -> Result<LogReplay, ReplayError> {
         let Self { path, reader, facts } = self;
         let steps = reader.step_count();
         scene.inputs.push(path.clone());
         let names = scene.names();
-        let modes = scene.devices.iter().map(|device| device.mode).collect();
-        LogReplay {
+        let start = reader.start(&names).map_err(|error| ReplayError::Log { path: path.clone(), error })?;
+        // Since logs hold initial states, they tell of every held point: a device that has none has let go of the scene's.
+        let mode = |device: &SceneDevice| match device.mode {
+            DeviceMode::Held(_) if start.is_some() => DeviceMode::Touch,
+            mode => mode,
+        };
+        let modes = scene.devices.iter().map(mode).collect();
+        Ok(LogReplay {
             path,
             reader,
             facts,
@@ -349,7 +355,7 @@ impl LogContent {
             modes,
             #[cfg(feature = "native")]
             _folder: None,
-        }
+        })
     }
 }
 

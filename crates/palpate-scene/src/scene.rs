@@ -211,6 +211,15 @@ impl Scene {
         self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, self.model.parameters().step_s))
     }
 
+    /// Whether it may go on from the state of another scene: nothing follows a path, and there is no clamp.
+    pub fn can_resume(&self) -> bool {
+        let follows = self.devices.iter().any(|device| device.path.is_some())
+            || self.obstacles.iter().any(|obstacle| obstacle.path.is_some())
+            || self.bases.iter().any(Option::is_some)
+            || self.gravity.is_some();
+        !follows && self.clamps.is_empty()
+    }
+
     /// Whether anything but held points can act on the objects.
     pub fn can_touch(&self) -> bool {
         let touching = self.devices.iter().any(|device| device.mode == DeviceMode::Touch);

@@ -140,9 +140,9 @@ impl LogFrameBuilder {
         let frame = self.encoder.encode(snapshot, FrameFormat::Modal);
         self.log.write(|content| {
             content.frames.push(frame);
-            content.times.push(snapshot.time_s);
-            content.energies.push(snapshot.energy);
-            for (forces, device) in content.forces.iter_mut().zip(&snapshot.devices) {
+            content.times.push(snapshot.output.time_s);
+            content.energies.push(snapshot.output.energy);
+            for (forces, device) in content.forces.iter_mut().zip(&snapshot.output.devices) {
                 forces.push(device.force_on_hand.to_array());
             }
         });

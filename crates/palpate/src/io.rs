@@ -231,3 +231,18 @@ pub struct Output {
     /// Status of the step.
     pub status: StepStatus,
 }
+
+impl Output {
+    /// Copy another output of the same scene.
+    ///
+    /// # Real time
+    /// No allocation, if there is room for its contacts.
+    pub fn copy_from(&mut self, other: &Self) {
+        (self.time_s, self.energy, self.status) = (other.time_s, other.energy, other.status);
+        self.devices.copy_from_slice(&other.devices);
+        self.objects.copy_from_slice(&other.objects);
+        self.obstacles.copy_from_slice(&other.obstacles);
+        self.clamps.copy_from_slice(&other.clamps);
+        self.contacts.clone_from(&other.contacts);
+    }
+}

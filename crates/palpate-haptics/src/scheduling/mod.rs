@@ -12,7 +12,8 @@ use std::fmt;
 /// Requested scheduling of a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scheduling {
-    /// Real-time priority, 1 to 99 (SCHED_FIFO; on Windows any is time-critical); `None` keeps the ordinary one.
+    /// Real-time priority, 1 to 99 (SCHED_FIFO; on Windows any is time-critical), with locked memory; `None` keeps the ordinary one, and the
+    /// memory as it is.
     pub priority: Option<u8>,
     /// Core that the thread is pinned to, from 0; `None` leaves the choice to the system.
     pub core: Option<usize>,
@@ -25,8 +26,8 @@ pub struct GrantedScheduling {
     pub priority: Result<Option<u8>, String>,
     /// Core that the thread is pinned to.
     pub core: Result<Option<usize>, String>,
-    /// Whether the memory of the process is locked (never swapped out).
-    pub memory: Result<(), String>,
+    /// Whether the memory of the process was locked (never swapped out).
+    pub memory: Result<bool, String>,
 }
 
 impl Scheduling {
@@ -35,7 +36,7 @@ impl Scheduling {
         GrantedScheduling {
             priority: self.apply_priority(),
             core: self.apply_core(),
-            memory: system::lock_memory(),
+            memory: if self.priority.is_some() { system::lock_memory().map(|()| true) } else { Ok(false) },
         }
     }
 
@@ -81,7 +82,8 @@ impl fmt::Display for GrantedScheduling {
             Err(why) => write!(f, ", on any core ({why})")?,
         }
         match &self.memory {
-            Ok(()) => write!(f, ", memory locked"),
+            Ok(true) => write!(f, ", memory locked"),
+            Ok(false) => write!(f, ", memory not locked"),
             Err(why) => write!(f, ", memory not locked ({why})"),
         }
     }

@@ -52,18 +52,21 @@ pub enum RunMode {
 /// # Errors
 /// When a file cannot be read, or a value is refused; with the line in the scene file.
 pub fn read_scene(path: &Path, mode: RunMode) -> Result<Scene, SceneError> {
-    read_relocated_scene(path, &Relocated::new(), mode)
+    let (text, parts, relocated) = (read_text(path, path)?, PartsInMemory::default(), Relocated::new());
+    let source =
+        Source { path, text: &text, relocated: &relocated, parts: &parts, mover: DeviceMover::Nobody };
+    read_source(&source, mode)
 }
 
-/// Reads a scene some of whose files have other paths than the scene says, as those unpacked from a log.
+/// Reads a scene some of whose files have other paths than the scene says, as those unpacked from a log. Devices without a path are where the
+/// caller says, as the log does.
 ///
 /// # Errors
 /// As [`read_scene`].
 pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -> Result<Scene, SceneError> {
-    let stored = relocated.get(path).map_or(path, PathBuf::as_path);
-    let text = read_text(path, stored)?;
+    let text = read_text(path, relocated.get(path).map_or(path, PathBuf::as_path))?;
     let parts = PartsInMemory::default();
-    let source = Source { path, text: &text, relocated, parts: &parts, mover: DeviceMover::Nobody };
+    let source = Source { path, text: &text, relocated, parts: &parts, mover: DeviceMover::Caller };
     read_source(&source, mode)
 }
 

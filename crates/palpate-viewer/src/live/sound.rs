@@ -109,7 +109,7 @@ impl Drop for SoundThread {
 
 /// Listener that records steps while a page listens.
 fn listener(mut producer: PoolProducer<StepRecord>, blocks: Arc<SoundBlocks>) -> StepListener {
-    Box::new(move |state| {
+    Box::new(move |_, state| {
         if blocks.has_listeners() {
             producer.produce(|record| record.capture(state));
         }

@@ -64,15 +64,15 @@ impl FrameEncoder {
         });
         out.u32(self.generation);
         out.u32(snapshot.step as u32);
-        out.f64(snapshot.time_s);
-        snapshot.energy.named().into_iter().for_each(|(_, energy)| out.f32(energy));
-        self.select_contacts(&snapshot.contacts);
+        out.f64(snapshot.output.time_s);
+        snapshot.output.energy.named().into_iter().for_each(|(_, energy)| out.f32(energy));
+        self.select_contacts(&snapshot.output.contacts);
         let (obstacles, devices) = (&snapshot.input.obstacles, &snapshot.input.devices);
         for count in [snapshot.objects.len(), obstacles.len(), devices.len(), self.strongest.len()] {
             out.u32(count as u32);
         }
-        let (unsolved, dropped) =
-            (snapshot.status.unsolved_islands > 0, snapshot.status.dropped_contacts > 0);
+        let status = &snapshot.output.status;
+        let (unsolved, dropped) = (status.unsolved_islands > 0, status.dropped_contacts > 0);
         out.u32(u32::from(unsolved) | u32::from(dropped) << 1);
         out.u32(0);
         for (index, object) in snapshot.objects.iter().enumerate() {
@@ -101,7 +101,7 @@ impl FrameEncoder {
         obstacles.iter().zip(&self.model.parameters().obstacles).for_each(|(pose, obstacle)| {
             out.pose(&super::description::display_pose(&obstacle.shape, pose));
         });
-        for (input, output) in devices.iter().zip(&snapshot.devices) {
+        for (input, output) in devices.iter().zip(&snapshot.output.devices) {
             out.u32(match input.mode {
                 DeviceMode::Inactive | DeviceMode::Suspended => 0,
                 DeviceMode::Touch => 1,

@@ -6,23 +6,19 @@ use super::warnings::refuse;
 use super::{Arguments, count_steps};
 use crate::commands::guard::attach_guarded;
 use crate::failure::Failure;
-use crate::growing_log::GrowingLog;
 use crate::interrupt::stop_on_interrupt;
 use crate::secret_file::read_secret_file;
 use crate::terminal::{notify, print, print_json, warn_of_stores};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate::{DeviceMode, Pose, State};
+use palpate::{DeviceMode, State};
 use palpate_haptics::link::{LinkServer, Secret};
 use palpate_haptics::log::{LogSender, LogWriter, WrittenLog};
-use palpate_haptics::{
-    DeformationProcess, DevicePort, ObstacleTrajectory, Report, Scheduling, Session, SessionDevice, port,
-};
-use palpate_scene::{Scene, SceneDevice, SceneLog, SceneObstacle, attach_path};
+use palpate_haptics::{DeformationProcess, DevicePort, Report, Scheduling, Session, SessionDevice, port};
+use palpate_scene::{GrowingLog, Scene, SceneDevice, SceneLog, attach_path};
 use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -57,9 +53,6 @@ pub struct RealtimeArguments {
 
 /// Real-time priority of the force process; the haptic updates have 10 less.
 const PRIORITY: u8 = 80;
-
-/// Time without a motion after which a device is inactive [s].
-const DEVICE_TIMEOUT_S: f64 = 0.1;
 
 /// Interval of updates of the progress bar.
 const UPDATE_INTERVAL: Duration = Duration::from_millis(200);
@@ -128,23 +121,9 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
     let devices: Result<Vec<_>, Failure> = scene.devices.iter().map(attach).collect();
     let devices = devices?;
     let server = listen(options, linked, (start, scene.model.parameters().step_s))?;
-    let session = Session {
-        model: scene.model.clone(),
-        start,
-        devices,
-        obstacle_trajectories: movers(scene),
-        clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
-        base_paths: scene.bases.clone(),
-        gravity: scene.gravity.clone(),
-        steps,
-        frame_rate_hz: options.pictures,
-        scheduling: Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) },
-        device_timeout_s: DEVICE_TIMEOUT_S,
-        state: None,
-        playback: Arc::default(),
-        cycles: None,
-        listener: None,
-    };
+    let scheduling = Scheduling { priority: Some(PRIORITY), core: options.core.or(cores.checked_sub(1)) };
+    let frame_rate_hz = options.pictures;
+    let session = Session { steps, frame_rate_hz, ..scene.session(devices, start, scheduling) };
     let (report, written) = watch(session, log, steps)?;
     let links = server.map(|server| server.counts());
     // The report is printed whatever became of the log.
@@ -232,12 +211,4 @@ pub fn read_secret(file: Option<&Path>) -> Result<Secret, Failure> {
     let Some(file) = file else { return Ok(Secret::none()) };
     let text = read_secret_file("the secret", file)?;
     Secret::new(&text).map_err(|error| Failure(format!("{}: {error}", file.display())))
-}
-
-fn movers(scene: &Scene) -> Vec<ObstacleTrajectory> {
-    let one = |obstacle: &SceneObstacle| -> ObstacleTrajectory {
-        let obstacle = obstacle.clone();
-        Box::new(move |t: f64| -> Pose { obstacle.pose_at(t) })
-    };
-    scene.obstacles.iter().map(one).collect()
 }

@@ -1,11 +1,10 @@
 //! Logs of served scenes: one for each time that a scene begins anew.
 
 use crate::failure::Failure;
-use crate::growing_log::{GrowingLog, create_part};
 use crate::terminal::{notify, warn_of_stores};
 use palpate_export::{check_target, part_of};
 use palpate_haptics::log::LogSummary;
-use palpate_scene::SceneLog;
+use palpate_scene::{GrowingLog, SceneLog, create_part};
 use palpate_viewer::{LogFile, LogOpener};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -58,14 +57,16 @@ impl LogSeries {
                 teller.note_failure(text);
                 pages(&format!("{text}. The scene goes on without it."));
             };
-            let log = GrowingLog::create(&path, &scene.inputs(), Box::new(tell)).and_then(|file| {
-                let failures = file.failures();
-                warn_of_stores(&scene);
-                let file = SeriesFile { file, step_s: scene.step_s(), series: series.clone() };
-                let log = scene.begin(Box::new(file) as Box<dyn LogFile>, state);
-                failures.tell();
-                log.map_err(|error| Failure(format!("{}: {error}", path.display())))
-            });
+            let log = GrowingLog::create(&path, &scene.inputs(), Box::new(tell))
+                .map_err(Failure::from)
+                .and_then(|file| {
+                    let failures = file.failures();
+                    warn_of_stores(&scene);
+                    let file = SeriesFile { file, step_s: scene.step_s(), series: series.clone() };
+                    let log = scene.begin(Box::new(file) as Box<dyn LogFile>, state);
+                    failures.tell();
+                    log.map_err(|error| Failure(format!("{}: {error}", path.display())))
+                });
             log.map_err(|failure| {
                 series.note_failure(&failure.0);
                 failure.0.into()
@@ -125,7 +126,7 @@ impl LogFile for SeriesFile {
         let LogSummary { steps, missed, is_cut } = summary;
         series.lock().kept += usize::from(steps > 0);
         if let Err(failure) = file.keep(summary) {
-            series.note_failure(&failure.0);
+            series.note_failure(&failure.to_string());
         }
         if is_cut {
             return;

@@ -1,6 +1,6 @@
 //! Log of a scene that runs: it grows as `NAME.part`, tells of a failure when it happens, and keeps what was written.
 
-use crate::failure::Failure;
+use crate::error::{SceneError, SceneErrorKind};
 use palpate_export::{ExportError, PartFile};
 use palpate_haptics::LogError;
 use palpate_haptics::log::{LogReader, LogSummary};
@@ -34,7 +34,10 @@ impl Failures {
 
 impl GrowingLog {
     /// Creates the file. `tell` gets the text of the first failure, when it happens.
-    pub fn create(path: &Path, inputs: &[&Path], tell: Teller) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    /// As [`PartFile::create`].
+    pub fn create(path: &Path, inputs: &[&Path], tell: Teller) -> Result<Self, SceneError> {
         let file = create_part(path, inputs)?;
         Ok(Self { file, path: path.to_path_buf(), tell, failures: Failures::default() })
     }
@@ -50,20 +53,24 @@ impl GrowingLog {
     }
 
     /// Gives a whole log its name, and says what can be had of one that is cut. A log without steps is removed.
-    pub fn keep(self, LogSummary { steps, missed, is_cut }: LogSummary) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// When the log is cut, or cannot get its name.
+    pub fn keep(self, LogSummary { steps, missed, is_cut }: LogSummary) -> Result<(), SceneError> {
         let Self { file, path, .. } = self;
-        let (path, part) = (path.display(), file.part().display().to_string());
+        let cut = |text: String| Err(SceneError::of_file(SceneErrorKind::Log, &path, text));
+        let (shown, part) = (path.display(), file.part().display().to_string());
         match (is_cut, steps) {
             (false, 0) => Ok(file.discard()?),
             (false, _) => Ok(file.finish().map(drop)?),
             (true, 0) => {
-                Err(Failure(format!("the log {path} could not be written: none of {missed} steps are kept")))
+                cut(format!("the log {shown} could not be written: none of {missed} steps are kept"))
             }
-            (true, _) => Err(Failure(format!(
-                "the log {path} is incomplete: at least the first {steps} of {} steps are kept in {part}; `palpate recover {part} -o WHOLE.mcap` \
-                 makes a whole file of them",
+            (true, _) => cut(format!(
+                "the log {shown} is incomplete: at least the first {steps} of {} steps are kept in {part}; `palpate recover {part} -o \
+                 WHOLE.mcap` makes a whole file of them",
                 steps + missed
-            ))),
+            )),
         }
     }
 
@@ -79,6 +86,9 @@ impl GrowingLog {
 }
 
 /// Creates the file of a log that grows. One that was left without a whole step is replaced.
+///
+/// # Errors
+/// As [`PartFile::create`].
 pub fn create_part(path: &Path, inputs: &[&Path]) -> Result<PartFile, ExportError> {
     match PartFile::create(path, inputs) {
         Err(ExportError::Unfinished { part, .. }) if !has_steps(&part) => {
