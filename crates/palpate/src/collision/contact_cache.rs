@@ -4,7 +4,6 @@
 
 use super::candidate::{CandidateList, CandidateSide, ContactCandidate};
 use super::contact::{Collider, Contact, ContactLaw, OtherSide};
-use super::level_of_detail::Levels;
 use crate::object::{Object, ObjectState};
 use crate::response::ContactLocation;
 use alloc::vec::Vec;
@@ -85,9 +84,8 @@ impl LevelChanges {
         Self { released: places(), needed: places() }
     }
 
-    /// Move spring forces from points that are released to those of another level of detail, against the same side, where the level changes
-    /// in this step.
-    fn apply(&self, bodies: &mut Bodies, levels: &Levels, step: u64) {
+    /// Move spring forces from points that are released to those of another level of detail, against the same side.
+    fn apply(&self, bodies: &mut Bodies) {
         let same_sides = |a: &Place, b: &Place| (a.object, a.against) == (b.object, b.against);
         let mut rest = &*self.released;
         let mut has_moved = false;
@@ -100,8 +98,7 @@ impl LevelChanges {
                 same_sides(place, first) && place.location.footprint != first.location.footprint
             };
             let needed = self.needed.iter().filter(is_other_level).map(|place| place.location);
-            let has_changed = levels.changes(first.object, first.against, step);
-            if has_changed && needed.clone().next().is_some() {
+            if needed.clone().next().is_some() {
                 bodies.move_spring_forces(first.object, group.iter().map(|place| place.location), needed);
                 has_moved = true;
             }
@@ -124,7 +121,7 @@ pub(crate) fn match_contacts(
     contacts: &mut Vec<Contact>,
     spare: &mut Vec<Contact>,
     candidates: &mut CandidateList,
-    (level_changes, levels, step): (&mut LevelChanges, &Levels, u64),
+    level_changes: &mut LevelChanges,
 ) -> u32 {
     let mut bodies = Bodies { objects, states, gravity };
     let mut dropped = candidates.dropped;
@@ -169,7 +166,7 @@ pub(crate) fn match_contacts(
             }
         }
         level_changes.released.sort_unstable_by_key(|place| (place.object, place.against, place.order));
-        level_changes.apply(&mut bodies, levels, step);
+        level_changes.apply(&mut bodies);
     }
     spare.clear();
     let mut known = contacts.iter().peekable();

@@ -5,7 +5,6 @@
 //!
 //! Equations: docs/theory.md (C30).
 
-use super::contact::Collider;
 use super::parameters::COLLISION;
 use crate::bounded_vec::BoundedVec;
 use crate::sleep::Sleepers;
@@ -102,22 +101,6 @@ impl Levels {
     /// Level of an object against an obstacle.
     pub(super) fn against_obstacle(&mut self, object: usize, obstacle: usize) -> &mut ObstacleLevel {
         &mut self.of_obstacles[object * self.obstacles + obstacle]
-    }
-
-    /// Whether the level of an object against another side changes in a step.
-    pub(super) fn changes(&self, object: usize, against: Collider, step: u64) -> bool {
-        match against {
-            // A tip that takes hold goes from its patch to a point.
-            Collider::Device(_) => true,
-            Collider::Obstacle(obstacle) => {
-                self.of_obstacles[object * self.obstacles + obstacle].detail.since == step
-            }
-            Collider::Object(other) => {
-                let objects = [object.min(other), object.max(other)];
-                let known = self.pairs.binary_search_by(|pair| pair.objects.cmp(&objects));
-                known.is_ok_and(|at| self.pairs[at].details[usize::from(object > other)].since == step)
-            }
-        }
     }
 
     /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step, or have slept since then; what they have

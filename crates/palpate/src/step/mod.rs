@@ -281,7 +281,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     context.find_pair_contacts();
     // Last, since it looks at the surface of another moment.
     (0..devices.len()).for_each(|number| context.rebuild_ahead(number));
-    let State { steps, gravity, objects, contacts, levels, workspace, output, .. } = state;
+    let State { gravity, objects, contacts, workspace, output, .. } = state;
     let Workspace { collision, spare, .. } = workspace;
     output.status.dropped_contacts += match_contacts(
         (&*model.objects, *gravity),
@@ -289,7 +289,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
         contacts,
         spare,
         &mut collision.candidates,
-        (&mut collision.level_changes, levels, *steps),
+        &mut collision.level_changes,
     );
 }
 
