@@ -2,6 +2,8 @@
 // folder of the page that runs its scene by itself.
 //   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
 //   node tests/browser/run.mjs --standin-only               leaves out what runs against the real server, too
+//
+// A case that fails is run once more: one that passes then is reported as flaky, with its error, and has a fault that is to be repaired.
 
 import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
@@ -22,6 +24,7 @@ import { recordedLogCases } from "./recorded_log.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
+const ATTEMPTS = 2;
 const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
@@ -30,6 +33,7 @@ const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...
 
 const browser = await Browser.open();
 let failed = 0;
+let flaky = 0;
 for (const { name, run, standinOnly, realOnly, serverOnly, serverlessOnly } of cases) {
   if (standinOnlyRun && !standinOnly) continue;
   if (serverless && serverOnly) {
@@ -45,20 +49,24 @@ for (const { name, run, standinOnly, realOnly, serverOnly, serverlessOnly } of c
     continue;
   }
   const began = performance.now();
-  try {
-    await run(browser);
-    console.log(`passed   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
-  } catch (error) {
-    if (error instanceof NeedsServer) {
-      console.log(`skipped  ${name} (needs a server: ${error.message})`);
-      continue;
+  for (let attempt = 1; attempt <= ATTEMPTS; attempt++) {
+    try {
+      await run(browser);
+      if (attempt > 1) flaky++;
+      console.log(`${attempt > 1 ? "FLAKY " : "passed"}   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+      break;
+    } catch (error) {
+      if (error instanceof NeedsServer) {
+        console.log(`skipped  ${name} (needs a server: ${error.message})`);
+        break;
+      }
+      if (attempt === ATTEMPTS) failed++;
+      console.log(`FAILED   ${name}${attempt < ATTEMPTS ? ", and runs again" : ""}\n${error.stack ?? error}`);
+    } finally {
+      await browser.clear();
     }
-    failed++;
-    console.log(`FAILED   ${name}\n${error.stack ?? error}`);
-  } finally {
-    await browser.clear();
   }
 }
 await browser.close();
-console.log(failed === 0 ? "all passed" : `${failed} failed`);
+console.log(`${failed === 0 ? "all passed" : `${failed} failed`}${flaky > 0 ? `, ${flaky} flaky` : ""}`);
 process.exit(failed === 0 ? 0 : 1);
