@@ -10,6 +10,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import webbrowser
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Lines of the server that an error repeats.
 _LINES = 20
+#: Origins of notebooks on this machine, which may show the page in a frame.
+_NOTEBOOKS = ("http://localhost:*", "http://127.0.0.1:*", "https://localhost:*", "vscode-webview:")
 #: Time that a server may take to end in good order, before it is killed [s].
 _PATIENCE = 5
 
@@ -32,7 +35,7 @@ _PATIENCE = 5
 class Viewer:
     """A page that shows a scene or a log, served by a process of `palpate serve` until :meth:`close`, or until Python ends; only where Python is killed it goes on.
 
-    In a notebook it shows its address as a link. It is a context manager, which closes it at the end.
+    As the result of a notebook's cell it shows the page in a frame. It is a context manager, which closes it at the end.
 
     Attributes
     ----------
@@ -40,17 +43,20 @@ class Viewer:
         Address of the page, on this machine only.
     """
 
-    def __init__(self, shown: Union[Scene, PathLike], program: str, log: PathLike | None, listen: str) -> None:
+    def __init__(self, shown: Union[Scene, PathLike], program: str, log: PathLike | None, listen: str, height: int) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="palpate-view-")
         self._said: collections.deque[str] = collections.deque(maxlen=_LINES)
         self._found = threading.Event()
         self.url = ""
+        self._height = height
+        self._is_framed = _is_notebook()
         path = os.fspath(shown) if not isinstance(shown, Scene) else os.path.join(self._folder.name, "scene.toml")
         try:
             if isinstance(shown, Scene):
                 shown.save(path)
             logged = [] if log is None else ["--log", os.fspath(log)]
-            arguments = [program, "serve", path, "--no-browser", "--listen", listen, *logged]
+            framed = [argument for origin in _NOTEBOOKS for argument in ("--frame-ancestor", origin)] if self._is_framed else []
+            arguments = [program, "serve", path, "--no-browser", "--listen", listen, *logged, *framed]
             self._process = subprocess.Popen(
                 arguments,
                 stdin=subprocess.DEVNULL,
@@ -122,18 +128,30 @@ class Viewer:
         if not self.is_open:
             return "palpate's viewer is closed"
         address = html.escape(self.url)
-        return f'palpate shows the scene at <a href="{address}" target="_blank" rel="noopener">{address}</a>'
+        link = f'palpate shows the scene at <a href="{address}" target="_blank" rel="noopener">{address}</a>'
+        if not self._is_framed:
+            return link
+        frame = f'<iframe src="{address}" title="palpate" style="width: 100%; height: {self._height}px; border: 0" allow="fullscreen"></iframe>'
+        return f"{frame}<br>{link}"
+
+
+def _is_notebook() -> bool:
+    """Whether this runs in the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    return getattr(shell, "kernel", None) is not None
 
 
 def view(
     scene: Union[Scene, PathLike],
     *,
-    open_browser: bool = True,
+    open_browser: bool | None = None,
     log: PathLike | None = None,
     program: PathLike | None = None,
     listen: str = "127.0.0.1:0",
+    height: int = 480,
 ) -> Viewer:
-    """Show a scene in the browser, in real time, to touch it with mouse, pen or fingers; or a log with a time line.
+    """Show a scene in the browser or a notebook, in real time, to touch it with mouse, pen or fingers; or a log with a time line.
 
     The scene runs in a process of its own, which `palpate serve` is: what is touched there does not change a :class:`Simulation` here.
 
@@ -141,14 +159,17 @@ def view(
     ----------
     scene : Scene or path
         Scene, or a file: a scene (TOML) or a log (MCAP).
-    open_browser : bool
-        Open the page in a new tab; without it only :attr:`Viewer.url` tells where it is.
+    open_browser : bool, optional
+        Open the page in a new tab; False: only :attr:`Viewer.url` tells where it is. Without it a tab is opened, but not from a notebook, where
+        the result of the cell is the page itself.
     log : path, optional
         File for a log of what is touched, for :class:`Log`.
     program : path, optional
         The command line's program; without it the environment variable PALPATE, or `palpate` on the path.
     listen : str
         Address and port of the page; port 0 is one that is free.
+    height : int
+        Height of the page in a notebook [pixels].
 
     Returns
     -------
@@ -171,7 +192,7 @@ def view(
     found = shutil.which(named)
     if found is None:
         raise FileError(f"the program {named!r} is not found, and palpate.view needs it: `cargo install --path crates/palpate-cli`, or give program=")
-    viewer = Viewer(scene, found, log, listen)
-    if open_browser:
+    viewer = Viewer(scene, found, log, listen, height)
+    if open_browser or open_browser is None and not _is_notebook():
         webbrowser.open_new_tab(viewer.url)
     return viewer

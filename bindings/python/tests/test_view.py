@@ -1,6 +1,8 @@
 """The page of a scene from Python."""
 
 import os
+import sys
+import types
 import urllib.error
 import urllib.request
 
@@ -55,3 +57,20 @@ def test_the_browser_is_asked_to_open_the_page(on_floor, monkeypatch):
     monkeypatch.setattr("webbrowser.open_new_tab", lambda url: opened.append(url) or True)
     with palpate.view(on_floor, program=PROGRAM) as viewer:
         assert opened == [viewer.url]
+
+
+def test_a_notebook_shows_the_page_in_a_frame(on_floor, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open_new_tab", lambda url: opened.append(url) or True)
+    shell = types.SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    with palpate.view(on_floor, program=PROGRAM, height=300) as viewer:
+        assert f'<iframe src="{viewer.url}" ' in viewer._repr_html_() and "height: 300px" in viewer._repr_html_()
+        policy = urllib.request.urlopen(viewer.url).headers["content-security-policy"]
+        assert "frame-ancestors http://localhost:* http://127.0.0.1:* " in policy
+    assert opened == [] and "closed" in viewer._repr_html_()
+    # A terminal with IPython is no notebook.
+    shell.kernel = None
+    with palpate.view(on_floor, program=PROGRAM) as viewer:
+        assert opened == [viewer.url] and "<iframe" not in viewer._repr_html_()
+        assert "frame-ancestors 'none'" in urllib.request.urlopen(viewer.url).headers["content-security-policy"]

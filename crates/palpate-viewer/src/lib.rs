@@ -60,4 +60,6 @@ pub use scene_provider::{
     JobControl, JobReport, SceneProvider, SharedTrajectory, Upload, ViewerDevice, ViewerScene,
 };
 #[cfg(feature = "server")]
-pub use server::{Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token};
+pub use server::{
+    FrameAncestor, Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token,
+};

@@ -19,9 +19,10 @@ async function freePort() {
   });
 }
 
-async function servePalpate(port, { log, scene = "bounce", token }) {
+async function servePalpate(port, { log, scene = "bounce", token, frameAncestor }) {
   const logged = log === undefined ? [] : ["--log", log];
-  const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged], {
+  const framed = frameAncestor === undefined ? [] : ["--frame-ancestor", frameAncestor];
+  const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged, ...framed], {
     stdio: ["ignore", "pipe", "pipe"],
     env: token === undefined ? process.env : { ...process.env, PALPATE_TOKEN: token },
   });

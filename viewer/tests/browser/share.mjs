@@ -259,6 +259,24 @@ export const shareCases = [
     },
   },
   {
+    name: "share: a server's page works in a frame of an origin that it names",
+    realOnly: true,
+    serverOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start({ frameAncestor: "http://127.0.0.1:*" }));
+      const quiet = withQuery(server, "?ghost=off");
+      const outer = browser.keep(await serveHtml(`<!doctype html><title>notebook</title><iframe src="${quiet}" style="width: 800px; height: 500px"></iframe>`));
+      const embedding = await browser.page(outer.url);
+      const inner = embedding.frames().find((frame) => frame.url().startsWith(new URL(server.url).origin));
+      assert(inner !== undefined, "the frame does not load");
+      await waitForScene(inner);
+      const { time } = await latestFrame(inner);
+      await inner.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.time > before + 0.5, time, { timeout: 60_000 });
+      await screenshot(embedding, "share-notebook");
+      assertNoConsoleErrors(embedding);
+    },
+  },
+  {
     name: "share: the page without a server works in a frame of another origin, also with a timer alone",
     serverlessOnly: true,
     async run(browser) {

@@ -5,6 +5,7 @@ mod body;
 mod client;
 mod connections;
 mod content;
+mod frame_ancestor;
 mod guard;
 mod headers;
 mod limits;
@@ -18,6 +19,7 @@ mod token;
 mod upload;
 
 pub use content::{Live, RenderJob, ServedContent};
+pub use frame_ancestor::FrameAncestor;
 pub use limits::Limits;
 pub use tls::TlsIdentity;
 pub use token::Token;
@@ -49,12 +51,14 @@ pub struct Settings {
     pub tls: Option<TlsIdentity>,
     /// Limits on clients.
     pub limits: Limits,
+    /// Pages of others that may show the page in a frame; none by default.
+    pub frame_ancestors: Vec<FrameAncestor>,
 }
 
 impl Settings {
     /// Settings of an address, without token and TLS.
     pub fn new(listen: SocketAddr) -> Self {
-        Self { listen, token: None, tls: None, limits: Limits::default() }
+        Self { listen, token: None, tls: None, limits: Limits::default(), frame_ancestors: Vec::new() }
     }
 }
 
@@ -65,6 +69,7 @@ pub struct Server {
     guard: Guard,
     tls: Option<TlsIdentity>,
     limits: Limits,
+    frame_ancestors: Vec<FrameAncestor>,
 }
 
 impl Server {
@@ -73,7 +78,7 @@ impl Server {
     /// # Errors
     /// If the address is in use, or beyond loopback without a token.
     pub fn bind(settings: &Settings) -> Result<Self, ServerError> {
-        let Settings { listen, token, tls, limits } = settings;
+        let Settings { listen, token, tls, limits, frame_ancestors } = settings;
         if !listen.ip().is_loopback() && token.is_none() {
             return Err(ServerError::MissingToken(*listen));
         }
@@ -83,7 +88,13 @@ impl Server {
         })?;
         listener.set_nonblocking(true)?;
         let guard = Guard::new(listen.ip().is_loopback(), token.as_ref());
-        Ok(Self { listener, guard, tls: tls.clone(), limits: limits.clone() })
+        Ok(Self {
+            listener,
+            guard,
+            tls: tls.clone(),
+            limits: limits.clone(),
+            frame_ancestors: frame_ancestors.clone(),
+        })
     }
 
     /// Bound address.
@@ -114,7 +125,7 @@ impl Server {
             .build()?;
         let served = runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener)?;
-            let router = routes::routes(state.clone());
+            let router = routes::routes(state.clone(), &self.frame_ancestors);
             let connections = Connections { listener, router, tls: self.tls, limits: self.limits };
             tokio::select! {
                 () = connections.serve(notify) => {}

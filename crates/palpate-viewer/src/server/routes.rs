@@ -2,7 +2,8 @@
 
 use super::body::read_body;
 use super::client::Client;
-use super::headers::harden;
+use super::frame_ancestor::FrameAncestor;
+use super::headers::{content_security_policy, harden};
 use super::page;
 use super::session;
 use super::state::ServerState;
@@ -24,7 +25,8 @@ use std::time::Instant;
 const MAX_FRAMES_BYTES: usize = 8 << 20;
 
 /// Router of all addresses.
-pub(super) fn routes(state: Arc<ServerState>) -> Router {
+pub(super) fn routes(state: Arc<ServerState>, frame_ancestors: &[FrameAncestor]) -> Router {
+    let policy = content_security_policy(frame_ancestors);
     Router::new()
         .route("/session", get(session::connect))
         .route("/scene/{generation}/object/{index}/surface", get(object_surface))
@@ -36,7 +38,7 @@ pub(super) fn routes(state: Arc<ServerState>) -> Router {
         .route("/image/{index}", post(image))
         .fallback(get(page::file))
         .layer(from_fn_with_state(state.clone(), check_access))
-        .layer(map_response(harden))
+        .layer(map_response(move |response| harden(policy.clone(), response)))
         .with_state(state)
 }
 

@@ -148,3 +148,13 @@ fn every_answer_says_what_a_page_may_do_and_is_kept_by_no_cache() {
     let (status, head, _) = served.answer("GET / HTTP/1.1\r\nHost: evil.example\r\nX:", b"");
     assert!(status == 403 && head.contains("content-security-policy: "), "{head}");
 }
+
+#[test]
+fn pages_that_are_named_may_show_the_page_in_a_frame() {
+    let frame_ancestors =
+        ["http://localhost:*", "vscode-webview:"].map(|text| text.parse().expect("an ancestor"));
+    let settings = Settings { frame_ancestors: frame_ancestors.to_vec(), ..local() };
+    let served = TestServer::bind(&settings, live_content().0);
+    let (_, head, _) = served.answer("GET /", b"");
+    assert!(head.contains("; frame-ancestors http://localhost:* vscode-webview:; base-uri 'none'"), "{head}");
+}

@@ -5,7 +5,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::secret_file::read_secret_file;
 use crate::terminal::notify;
 use clap::Args;
-use palpate_viewer::{Limits, ServedContent, Server, Settings, TlsIdentity, Token};
+use palpate_viewer::{FrameAncestor, Limits, ServedContent, Server, Settings, TlsIdentity, Token};
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -38,6 +38,10 @@ pub struct AccessOptions {
     /// Connections at a time; a page has up to seven [default: 256]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     max_connections: Option<u32>,
+    /// Origin of a page that may show this one in a frame, as http://localhost:8888, or http://localhost:* for any port; can be
+    /// given several times [default: none may]
+    #[arg(long = "frame-ancestor", value_name = "ORIGIN")]
+    frame_ancestors: Vec<FrameAncestor>,
     /// Do not open a browser
     #[arg(long)]
     no_browser: bool,
@@ -70,7 +74,9 @@ impl AccessOptions {
             Some(connections) => Limits { connections: connections as usize, ..Limits::default() },
             None => Limits::default(),
         };
-        let settings = Settings { token: token.clone(), tls, limits, ..Settings::new(listen) };
+        let frame_ancestors = self.frame_ancestors.clone();
+        let settings =
+            Settings { token: token.clone(), tls, limits, frame_ancestors, ..Settings::new(listen) };
         let server = match (Server::bind(&settings), self.listen) {
             (Err(_), None) => {
                 Server::bind(&Settings { listen: (Ipv4Addr::LOCALHOST, 0).into(), ..settings.clone() })
