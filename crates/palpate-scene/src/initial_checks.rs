@@ -3,7 +3,7 @@
 use crate::scene::Scene;
 use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
-use palpate::{DeviceMode, ModelObject, ObstacleMesh, Pose, Recording, Shape, Surface};
+use palpate::{DeviceMode, ModelObject, ObstacleMesh, Pose, Recording, Shape, Support, Surface};
 use palpate_haptics::MotionPath;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -141,9 +141,12 @@ fn in_obstacle(object: &Placed, name: &str, shape: &Shape, pose: Pose) -> Option
     let Penetration { depth, out, whole } = deepest(object.nodes(), shape, pose);
     if depth > object.allowed() {
         let wholly = if whole { ", wholly" } else { "" };
+        let then = match object.recording.metadata.support {
+            Support::Fixed => "its fixed nodes stay there, without force",
+            _ => "contact lets it out, without velocity, within a tenth of a second",
+        };
         let message = format!(
-            "the object {:?} begins {} inside {name:?}{wholly}: contact lets it out, without velocity, within a tenth of a \
-             second; move it by as much along {}",
+            "the object {:?} begins {} inside {name:?}{wholly}: {then}; move it by as much along {}",
             object.name,
             millimetres(depth),
             direction(out)

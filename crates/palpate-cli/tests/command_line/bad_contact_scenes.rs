@@ -457,3 +457,13 @@ fn strict_runs_end_with_the_first_warning() {
     assert!(String::from_utf8_lossy(&ended.stdout).contains("  warning      finger touched nothing"));
     workplace.succeed(&["run", "scene.toml"]);
 }
+
+#[test]
+fn fixed_nodes_that_begin_inside_an_obstacle_are_not_said_to_be_let_out() {
+    let workplace = workplace();
+    workplace.succeed(&[&CUBE[..], &["cube.palp", "--fix", "y<-0.049"]].concat());
+    workplace.write("scene.toml", SCENE.replacen("-0.06, 0.0]", "-0.04, 0.0]", 1));
+    let summary = workplace.json(&["run", "scene.toml", "--duration", "0.02", "--json"]);
+    let text = "begins 10.00 mm inside \"floor\": its fixed nodes stay there, without force; move it by as much along";
+    assert!(summary["warnings"].to_string().replace('\\', "").contains(text), "{}", summary["warnings"]);
+}
