@@ -212,9 +212,9 @@ pub(crate) fn size_question(extent: DVec3) -> Option<String> {
     }
 }
 
-/// Number rounded to four digits.
+/// Number rounded to four digits; 0 as it is.
 fn four_digits(number: f64) -> f64 {
-    let unit = 10.0_f64.powi(3 - number.log10().floor() as i32);
+    let unit = 10.0_f64.powi(3_i32.saturating_sub(number.log10().floor() as i32));
     let rounded = (number * unit).round() / unit;
     if rounded.is_finite() { rounded } else { number }
 }
@@ -234,5 +234,20 @@ fn warn_about_quality(mesh: &mut Mesh) {
              responses are too stiff there",
             Metres(centroid(mesh, number as u32))
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_any_size_have_four_digits() {
+        for (number, rounded) in
+            [(0.0, 0.0), (12.345_67, 12.35), (1e-300, 1e-300), (1e300, 1e300), (5e-324, 5e-324)]
+        {
+            assert!((four_digits(number) - rounded).abs() <= 1e-15 * rounded, "{number}");
+        }
+        assert!(four_digits(f64::NAN).is_nan() && four_digits(f64::INFINITY).is_infinite());
     }
 }
