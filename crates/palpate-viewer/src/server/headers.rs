@@ -4,6 +4,11 @@ use super::frame_ancestor::FrameAncestor;
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::Response;
 
+/// Content security policy: scripts, styles and connections of this server only, no inline code, and no frame of another page. Images may be made
+/// by the page. The stand-in of the page's tests reads it here.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+    connect-src 'self'; object-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
 /// Headers of every response. Addresses hold the token: no referrer.
 const HEADERS: [(HeaderName, &str); 4] = [
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
@@ -12,16 +17,16 @@ const HEADERS: [(HeaderName, &str); 4] = [
     (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
 ];
 
-/// Content security policy: scripts, styles and connections of this server only, and no inline code. Images may be made by the page. It is
-/// in frames of these pages only.
+/// Content security policy, in frames of these pages only.
 pub(super) fn content_security_policy(ancestors: &[FrameAncestor]) -> HeaderValue {
+    let default = HeaderValue::from_static(CONTENT_SECURITY_POLICY);
+    if ancestors.is_empty() {
+        return default;
+    }
     let named: Vec<String> = ancestors.iter().map(FrameAncestor::to_string).collect();
-    let ancestors = if named.is_empty() { "'none'".to_string() } else { named.join(" ") };
-    let policy = format!(
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; object-src 'none'; \
-         frame-ancestors {ancestors}; base-uri 'none'; form-action 'none'"
-    );
-    HeaderValue::try_from(policy).unwrap_or(HeaderValue::from_static("default-src 'none'"))
+    let framed = format!("frame-ancestors {}", named.join(" "));
+    HeaderValue::try_from(CONTENT_SECURITY_POLICY.replace("frame-ancestors 'none'", &framed))
+        .unwrap_or(default)
 }
 
 /// Response with a content security policy and these headers, kept by no cache unless it says so.
