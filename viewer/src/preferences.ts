@@ -1,9 +1,10 @@
-// Display settings stored in the browser.
+// Display settings, and the switch of the vibration, stored in the browser.
 
 import { isColourMode } from "./rendering/colours";
 import type { DisplaySettings } from "./rendering/scene_graph";
 
 const STORAGE_KEY = "palpate.display";
+const VIBRATION_KEY = "palpate.vibration";
 
 export function prefersDark(): boolean {
   return window.matchMedia("(prefers-color-scheme: dark)").matches;
@@ -33,5 +34,23 @@ export function savePreferences(settings: DisplaySettings, themeChosen: boolean)
     localStorage.setItem(STORAGE_KEY, JSON.stringify(themeChosen ? settings : always));
   } catch {
     // Without storage the defaults apply next time.
+  }
+}
+
+/** Stored switch of the vibration; null where nobody has chosen. */
+export function loadVibration(): boolean | null {
+  try {
+    const stored = localStorage.getItem(VIBRATION_KEY);
+    return stored === null ? null : stored === "on";
+  } catch {
+    return null;
+  }
+}
+
+export function saveVibration(on: boolean): void {
+  try {
+    localStorage.setItem(VIBRATION_KEY, on ? "on" : "off");
+  } catch {
+    // Without storage the default applies next time.
   }
 }

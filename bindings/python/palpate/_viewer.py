@@ -193,6 +193,6 @@ def view(
     if found is None:
         raise FileError(f"the program {named!r} is not found, and palpate.view needs it: `cargo install --path crates/palpate-cli`, or give program=")
     viewer = Viewer(scene, found, log, listen, height)
-    if open_browser or open_browser is None and not _is_notebook():
+    if open_browser or open_browser is None and not viewer._is_framed:
         webbrowser.open_new_tab(viewer.url)
     return viewer

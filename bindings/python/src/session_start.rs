@@ -63,7 +63,7 @@ pub fn begin_log(
         ));
     }
     let raise = |error| scene_error(py, &error);
-    // What is in no file goes to files, which the log takes along.
+    // Parts in memory are saved as files, which the log takes along.
     let mut folder = None;
     let content = if scene.get().has_parts_in_memory() {
         let made = TemporaryFolder::new().map_err(|error| {

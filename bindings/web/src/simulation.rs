@@ -226,7 +226,7 @@ impl Simulation {
         let poses = self.input.obstacles.iter_mut().zip(obstacles.as_chunks::<7>().0);
         for ((own, row), of) in poses.zip(&self.scene.obstacles) {
             if of.path.is_none() {
-                // What is not finite is refused by the step.
+                // Poses that are not finite are refused by the step.
                 (*own, _) = pose_of_row(row);
             }
         }

@@ -85,7 +85,7 @@ pub use scene_names::SceneNames;
 pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 #[cfg(feature = "real-time")]
 pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
-pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer};
+pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer, steps_per_frame};
 #[doc(no_inline)]
 pub use timing::{Cycle, DurationHistogram, Overrun, Percentiles, Timing, percentile_us};
 

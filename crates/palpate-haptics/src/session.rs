@@ -14,7 +14,7 @@ use crate::port::{DevicePort, ForcePort, port};
 use crate::safety::Safety;
 use crate::safety_limits::{RefusedMotions, SafetyLimits};
 use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
-use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer};
+use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer, steps_per_frame};
 use crate::timing::{Cycle, DurationHistogram, Overrun, Timing};
 use palpate::{Collider, ContactOutput, DeviceMode, Model, State};
 use std::io::{Seek, Write};
@@ -205,11 +205,8 @@ impl Session {
         std::thread::scope(|scope| {
             // Whichever way the scope is left, all threads end.
             let end_threads = SetWhenDropped(&flags);
-            let ticks_per_frame = if frame_rate_hz > 0.0 {
-                (1.0 / (frame_rate_hz * step_s)).round().max(1.0) as u64
-            } else {
-                0
-            };
+            let ticks_per_frame =
+                if frame_rate_hz > 0.0 { steps_per_frame(frame_rate_hz, step_s) } else { 0 };
             let writing = writer.map(|writer| spawn(scope, "log", move || writer.run(logged))).transpose()?;
             let is_local: Vec<bool> = updates.iter().map(Option::is_some).collect();
             let mut update_threads = Vec::new();

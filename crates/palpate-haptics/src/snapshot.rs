@@ -16,6 +16,11 @@ pub struct Snapshot {
     pub output: Output,
 }
 
+/// Number of steps from one frame to the next at a frame rate [Hz], for a step [s]: at least 1.
+pub fn steps_per_frame(rate_hz: f64, step_s: f64) -> u64 {
+    (1.0 / (rate_hz * step_s)).round().max(1.0) as u64
+}
+
 /// Writing end of a snapshot buffer, held by the force process.
 pub struct SnapshotWriter(triple_buffer::Input<Snapshot>);
 
@@ -25,8 +30,7 @@ pub struct SnapshotReader(triple_buffer::Output<Snapshot>);
 impl Clone for Snapshot {
     /// Copy with the same capacity, so that it can be filled without allocation.
     fn clone(&self) -> Self {
-        let mut output = self.output.clone();
-        output.contacts.reserve_exact(self.output.contacts.capacity() - self.output.contacts.len());
+        let output = with_capacity(&self.output);
         Self { step: self.step, objects: self.objects.clone(), input: self.input.clone(), output }
     }
 }
@@ -34,13 +38,11 @@ impl Clone for Snapshot {
 impl Snapshot {
     /// Snapshot of an initial state, with the capacity of any later one.
     pub fn new(model: &Model, state: &State, input: &Input) -> Self {
-        let mut output = state.output().clone();
-        output.contacts.reserve_exact(state.output().contacts.capacity() - output.contacts.len());
         Self {
             step: 0,
             objects: (0..model.recordings().count()).map(|object| state.deformation(object)).collect(),
             input: input.clone(),
-            output,
+            output: with_capacity(state.output()),
         }
     }
 
@@ -54,6 +56,13 @@ impl Snapshot {
         self.input.copy_from(input);
         self.output.copy_from(state.output());
     }
+}
+
+/// Copy of an output with the same capacity of contacts.
+fn with_capacity(output: &Output) -> Output {
+    let mut copy = output.clone();
+    copy.contacts.reserve_exact(output.contacts.capacity() - output.contacts.len());
+    copy
 }
 
 /// Triple buffer of snapshots: neither end waits for the other.

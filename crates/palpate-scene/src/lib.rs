@@ -26,6 +26,8 @@ mod growing_log;
 mod initial_checks;
 mod library;
 #[cfg(feature = "logs")]
+mod log_facts;
+#[cfg(feature = "logs")]
 mod log_maker;
 #[cfg(feature = "native")]
 mod material_choice;

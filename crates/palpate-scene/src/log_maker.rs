@@ -1,12 +1,12 @@
 //! Log of a run that was recorded by its inputs: its steps are computed again and written, without a file system.
 
 use crate::error::{SceneError, SceneErrorKind};
-use crate::file::{PartsInMemory, RunMode, read_scene_in_memory};
+use crate::file::{PartsInMemory, RunMode, read_scene_text};
+use crate::log_facts::log_facts;
 use crate::scene::Scene;
 use palpate::{State, step};
-use palpate_haptics::InputReader;
 use palpate_haptics::log::{FrameRecord, LogFile, LogStart, StepRecord};
-use std::collections::BTreeMap;
+use palpate_haptics::{InputReader, steps_per_frame};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -44,7 +44,7 @@ impl LogMaker {
         start_ns: u64,
     ) -> Result<Self, SceneError> {
         let failed = |reason: String| SceneError::new(SceneErrorKind::Log, reason);
-        let mut files = vec![(SCENE.to_string(), text.clone().into_bytes())];
+        let mut files = vec![(SCENE.to_string(), text.as_bytes().to_vec())];
         for (name, recording) in &parts.recordings {
             let bytes = recording.to_bytes().map_err(|error| failed(error.to_string()))?;
             files.push((name.display().to_string(), bytes));
@@ -53,23 +53,19 @@ impl LogMaker {
             files.push((name.display().to_string(), path.clone().into_bytes()));
         }
         files[1..].sort();
-        let scene = read_scene_in_memory(Path::new(SCENE), text.into_bytes(), parts, RunMode::RealTime)?;
+        let scene = read_scene_text(Path::new(SCENE), &text, parts, RunMode::RealTime)?;
         let (inputs, start) =
             InputReader::new(numbers).ok_or_else(|| failed("the inputs are no record".into()))?;
         let state = State::resume(&scene.model, &start);
         let input = scene.input_at(0.0);
         let step_s = scene.model.parameters().step_s;
-        let facts = BTreeMap::from([
-            ("scene".to_string(), SCENE.to_string()),
-            ("step_s".to_string(), format!("{step_s:?}")),
-            ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
-        ]);
+        let facts = log_facts(SCENE.to_string(), step_s);
         let begin = LogStart { names: scene.names(), facts, files: &files, state: &state, start_ns };
         let file = LogFile::new(Cursor::new(Vec::new()), begin).map_err(|error| failed(error.to_string()))?;
         Ok(Self {
             steps: StepRecord::new(&state, &input),
             frames: FrameRecord::new(&scene.model, &state, &input),
-            frame_steps: (1.0 / (FRAME_RATE_HZ * step_s)).round().max(1.0) as u64,
+            frame_steps: steps_per_frame(FRAME_RATE_HZ, step_s),
             scene,
             state,
             inputs,

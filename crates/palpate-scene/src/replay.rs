@@ -4,7 +4,7 @@
 //! difference is reported: a change of the solver changes last digits.
 
 use crate::error::SceneError;
-use crate::file::{PartsInMemory, RunMode, named_files, read_scene_in_memory};
+use crate::file::{PartsInMemory, RunMode, named_files, read_scene_text, text_of};
 #[cfg(feature = "native")]
 use crate::file::{Relocated, read_relocated_scene};
 use crate::recording_file::recording_of_bytes;
@@ -364,11 +364,11 @@ fn scene_in_memory(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Resul
     let scene = scene.ok_or(ReplayError::NoScene)?;
     let mut files: BTreeMap<PathBuf, Vec<u8>> =
         files.into_iter().map(|(name, content)| (PathBuf::from(name), content)).collect();
-    let text = files.remove(scene).unwrap_or_default();
+    let text = text_of(scene, files.remove(scene).unwrap_or_default())?;
     let mut parts = PartsInMemory::default();
     let folder = scene.parent().unwrap_or(Path::new(""));
     // A scene that cannot be read is refused below, with the line.
-    for name in named_files(&String::from_utf8_lossy(&text)).unwrap_or_default() {
+    for name in named_files(&text).unwrap_or_default() {
         let path = folder.join(&name);
         let Some(content) = files.get(&path) else { continue };
         match path.extension().and_then(|ending| ending.to_str()) {
@@ -382,7 +382,7 @@ fn scene_in_memory(files: Vec<(String, Vec<u8>)>, scene: Option<&Path>) -> Resul
             })),
         }
     }
-    Ok(read_scene_in_memory(scene, text, &parts, RunMode::RealTime)?)
+    Ok(read_scene_text(scene, &text, &parts, RunMode::RealTime)?)
 }
 
 /// Scene of a log, and the temporary folder with its files.

@@ -1,12 +1,12 @@
 //! Logs of a scene: the files, names and facts that a log carries so that it can be replayed anywhere.
 
 use crate::error::{SceneError, SceneErrorKind};
+use crate::log_facts::log_facts;
 use crate::scene::Scene;
 use palpate::{Input, Model, State};
 use palpate_haptics::SceneNames;
 use palpate_haptics::log::{LogSender, LogWriter};
 use palpate_mesh::read_regular_file;
-use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -59,11 +59,7 @@ impl SceneLog {
         state: &State,
     ) -> Result<(LogSender, LogWriter<W>), SceneError> {
         let scene = self.inputs.first().map(|path| path.display().to_string()).unwrap_or_default();
-        let facts = BTreeMap::from([
-            ("scene".to_string(), scene),
-            ("step_s".to_string(), format!("{:?}", self.step_s())),
-            ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
-        ]);
+        let facts = log_facts(scene, self.step_s());
         let start = (&*self.model, state, &self.input);
         LogWriter::new(file, self.names.clone(), facts, &self.files()?, start)
             .map_err(|error| SceneError::new(SceneErrorKind::Log, error))

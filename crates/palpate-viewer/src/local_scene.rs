@@ -18,7 +18,7 @@ use crate::static_data::StaticData;
 use palpate::{DeviceMode, Model, State};
 use palpate_haptics::{
     Cycle, DevicePort, ForcePort, ForceProcess, InputRecord, ObstacleTrajectory, Overrun, Playback, Snapshot,
-    Timing, port,
+    Timing, port, steps_per_frame,
 };
 use palpate_sound::{SoundParameters, StepRecord, Synthesiser};
 use std::sync::Mutex;
@@ -330,7 +330,7 @@ impl LocalScene {
     }
 
     fn send_frame(&mut self, send: &mut dyn FnMut(PageMessage)) {
-        let frame_ticks = (1.0 / (FRAME_RATE_HZ * self.step_s())).round().max(1.0) as u64;
+        let frame_ticks = steps_per_frame(FRAME_RATE_HZ, self.step_s());
         (self.frame_at, self.frame_step) = (self.tick + frame_ticks, self.process.steps());
         self.frames = self.frames.wrapping_add(1);
         if self.stride == 0 || !self.frames.is_multiple_of(self.stride) {

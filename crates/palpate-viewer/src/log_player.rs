@@ -3,7 +3,7 @@
 use crate::describe::describe_scene;
 use crate::log_frames::{LogFrameBuilder, LogFrames};
 use palpate::{State, step};
-use palpate_haptics::Snapshot;
+use palpate_haptics::{Snapshot, steps_per_frame};
 use palpate_scene::{LogReplay, ReplayCursor, ReplayError, Replayed};
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub enum FrameSteps {
 impl FrameSteps {
     /// Steps at a frame rate [Hz], which is lowered for long logs.
     pub fn at_rate(log: &LogReplay, rate_hz: f64) -> Self {
-        let every = (1.0 / (rate_hz * log.scene.model.parameters().step_s)).round().max(1.0) as u64;
+        let every = steps_per_frame(rate_hz, log.scene.model.parameters().step_s);
         Self::Every(every.max(log.steps.div_ceil(MAX_FRAMES)))
     }
 
@@ -58,7 +58,6 @@ pub struct LogPlayer {
     cursor: ReplayCursor,
     state: State,
     snapshot: Snapshot,
-    done: u64,
     steps: FrameSteps,
     builder: LogFrameBuilder,
     /// Frames so far.
@@ -84,7 +83,7 @@ impl LogPlayer {
         if steps.contains(0) {
             builder.push(&snapshot);
         }
-        Ok(Self { cursor: log.cursor(), state, snapshot, done: 0, log, steps, builder, frames })
+        Ok(Self { cursor: log.cursor(), state, snapshot, log, steps, builder, frames })
     }
 
     /// The log.
@@ -106,9 +105,8 @@ impl LogPlayer {
         let (logged, input) = next?;
         step(&self.log.scene.model, &mut self.state, &input);
         self.cursor.compare(&self.log, &logged, &self.state)?;
-        self.done += 1;
-        if self.steps.contains(self.done) {
-            self.snapshot.capture(self.done, &input, &self.state);
+        if self.steps.contains(logged.step) {
+            self.snapshot.capture(logged.step, &input, &self.state);
             self.builder.push(&self.snapshot);
         }
         Ok(true)

@@ -1,7 +1,12 @@
 //! Log of a live scene that was recorded by its inputs: it replays bit for bit, and ends with its limits or the next start.
 
-use palpate::State;
-use palpate_scene::{LogMaker, LogReplay, PartsInMemory, ReplayError, TouchableScene, read_touchable_scene};
+use glam::DVec3;
+use palpate::{DeviceInput, Input, State};
+use palpate_haptics::InputRecord;
+use palpate_scene::{
+    LogMaker, LogReplay, PartsInMemory, ReplayError, RunMode, TouchableScene, read_scene_text,
+    read_touchable_scene,
+};
 use palpate_testkit::FREE_BLOCK_FILE;
 use palpate_viewer::{LONGEST_RECORD_S, LocalScene, PageMessage, ViewerDevice, ViewerScene, describe_scene};
 use std::cell::Cell;
@@ -21,11 +26,17 @@ struct Page {
 
 fn ignore(_: PageMessage) {}
 
+/// The scene's recording.
+fn block() -> PartsInMemory {
+    let mut parts = PartsInMemory::default();
+    let recording = palpate::Recording::from_bytes(FREE_BLOCK_FILE).expect("a recording");
+    parts.recordings.insert("block.palp".into(), Arc::new(recording));
+    parts
+}
+
 impl Page {
     fn new() -> Self {
-        let mut parts = PartsInMemory::default();
-        let recording = palpate::Recording::from_bytes(FREE_BLOCK_FILE).expect("a recording");
-        parts.recordings.insert("block.palp".into(), Arc::new(recording));
+        let parts = block();
         let read = read_touchable_scene(Path::new("scene"), SCENE.into(), &parts).expect("a scene");
         let TouchableScene { scene, text, .. } = read;
         let description = describe_scene(&scene, (None, "A block".to_string(), String::new()), &[true]);
@@ -75,7 +86,7 @@ fn replayed(log: Vec<u8>) -> (u64, f64) {
 #[test]
 fn a_recorded_run_is_a_log_that_repeats_bit_for_bit() {
     let mut page = Page::new();
-    // It has fallen, and is pressed when the record begins: from its state.
+    // The block has fallen when the record begins, which starts from its state.
     page.run(1.0);
     page.scene.begin_record(&mut ignore).expect("a scene");
     page.run(0.1);
@@ -121,4 +132,22 @@ fn a_record_without_steps_gives_no_log() {
     let mut page = Page::new();
     page.scene.begin_record(&mut ignore).expect("a scene");
     assert!(page.log().is_none());
+}
+
+#[test]
+fn a_log_says_where_devices_are_that_nobody_moves() {
+    let parts = block();
+    // As a program of its own moves it: without a path, and no pointer of the page.
+    let text = format!("{SCENE}[[device]]\nname = \"finger\"\nmode = \"touch\"\ntip_radius = 0.01\n");
+    let scene = read_scene_text(Path::new("scene"), &text, &parts, RunMode::RealTime).expect("a scene");
+    let mut inputs = InputRecord::new(&State::new(&scene.model).snapshots());
+    for step in 0..300 {
+        let position = DVec3::Y * (0.35 - 0.001 * f64::from(step));
+        inputs.push(&Input { devices: vec![DeviceInput::touching(position)], ..scene.input_at(0.0) });
+    }
+    let mut maker = LogMaker::new(text, &parts, inputs.numbers().to_vec(), 1).expect("a scene of a log");
+    while maker.advance().expect("a step") {}
+    let (steps, largest) = replayed(maker.finish().expect("a log"));
+    assert_eq!(steps, 300);
+    assert!(largest > 0.01, "the largest force is {largest} N");
 }

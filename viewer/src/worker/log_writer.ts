@@ -35,12 +35,12 @@ export async function makeLog(base: string, run: RecordedRun, onLoad: DownloadPr
 /** Makes a log in an instance of the module. */
 export async function logOf(instance: Instance, run: RecordedRun, onProgress: (fraction: number) => void): Promise<WrittenRun> {
   const maker = begin(instance, run);
-  for (let steps = 0; instance.call(() => logExports(instance).log_maker_advance(maker)) !== 0; ) {
-    steps += STEPS_AT_ONCE;
-    onProgress(Math.min(1, steps / Math.max(1, run.steps)));
+  const written = () => logExports(instance).log_maker_steps(maker);
+  while (instance.call(() => logExports(instance).log_maker_advance(maker)) !== 0) {
+    onProgress(written() / Math.max(1, run.steps));
     await new Promise((next) => setTimeout(next, 0));
   }
-  const steps = logExports(instance).log_maker_steps(maker);
+  const steps = written();
   let log: ArrayBuffer | null = null;
   instance.receiver = (kind, bytes) => {
     if (kind === Sent.Data) log = bytes.slice().buffer as ArrayBuffer;
@@ -49,9 +49,6 @@ export async function logOf(instance: Instance, run: RecordedRun, onProgress: (f
   if (log === null) throw new Error("the log was not written");
   return { bytes: log, steps };
 }
-
-/** Steps that the module makes at once. */
-const STEPS_AT_ONCE = 500;
 
 function begin(instance: Instance, { text, rescaled, inputs, files, startS }: RecordedRun): number {
   const recordings = new Map<string, number>();

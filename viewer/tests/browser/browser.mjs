@@ -159,6 +159,18 @@ export async function waitForRest(page, timeout = 30_000) {
   throw new Error(`the object is not at rest after ${timeout / 1000} s: it moved by ${moved} between the last two poses`);
 }
 
+/** Presses the object from above, where it cannot move away, until it is felt, drags by pixels, and holds for a time [ms]. */
+export async function pressFromAbove(page, [right, down], steps, holdMs) {
+  await page.evaluate(() => window.palpate.sceneView.orbit.rotate(0, 0.7));
+  const { x, y } = await pixelOf(page, 0, 0.35);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.some((device) => Math.hypot(...device.force) > 0.02));
+  await page.mouse.move(x + right, y + down, { steps });
+  await page.waitForTimeout(holdMs);
+  await page.mouse.up();
+}
+
 /** Waits until paused pages show the same step. */
 export async function waitForSameStep(...pages) {
   const steps = () => Promise.all(pages.map(async (page) => (await latestFrame(page)).step));

@@ -205,7 +205,7 @@ export const droppedCases = [
       await drop(page, { "mine.palp": recording });
       await page.waitForFunction(() => document.querySelector("h1.title").textContent === "mine.palp");
       await latestFrame(page);
-      // It falls onto the floor.
+      // The object falls onto the floor.
       await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.contacts.length > 0, null, { timeout: 30_000 });
       const errors = await page.locator(".notification.error").allTextContents();
       assert(errors.length === 0, `errors: ${errors}`);

@@ -4,7 +4,7 @@ import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
-import { assert, assertNoConsoleErrors, latestFrame, pixelOf, screenshot, waitForRest, waitForScene } from "./browser.mjs";
+import { assert, assertNoConsoleErrors, latestFrame, pressFromAbove, screenshot, waitForRest, waitForScene } from "./browser.mjs";
 import { drop } from "./dropped.mjs";
 import { start } from "./servers.mjs";
 
@@ -34,15 +34,7 @@ function collectForces(page) {
 async function press(page) {
   await latestFrame(page);
   await waitForRest(page);
-  // On the top: pressed against the floor it cannot move away.
-  await page.evaluate(() => window.palpate.sceneView.orbit.rotate(0, 0.7));
-  const { x, y } = await pixelOf(page, 0, 0.35);
-  await page.mouse.move(x, y);
-  await page.mouse.down();
-  await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.some((device) => Math.hypot(...device.force) > 0.02));
-  await page.mouse.move(x + 20, y - 5, { steps: 4 });
-  await page.waitForTimeout(500);
-  await page.mouse.up();
+  await pressFromAbove(page, [20, -5], 4, 500);
 }
 
 /** Steps of a log as `palpate replay` computes them, by the columns of its CSV. */

@@ -1,6 +1,6 @@
 // Vibration of a phone, whose motor is replaced by a list.
 
-import { assert, assertNoConsoleErrors, pixelOf, screenshot, waitForRest, waitForScene } from "./browser.mjs";
+import { assert, assertNoConsoleErrors, pressFromAbove, screenshot, waitForRest, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 /** Page whose pulses are collected in `window.pulses`. */
@@ -19,14 +19,7 @@ async function press(page) {
   await waitForScene(page);
   await waitForRest(page);
   await page.locator(".toolbar").getByText("Touch", { exact: true }).click({ force: true });
-  await page.evaluate(() => window.palpate.sceneView.orbit.rotate(0, 0.7));
-  const { x, y } = await pixelOf(page, 0, 0.35);
-  await page.mouse.move(x, y);
-  await page.mouse.down();
-  await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.devices.some((device) => Math.hypot(...device.force) > 0.02));
-  await page.mouse.move(x + 30, y - 10, { steps: 3 });
-  await page.waitForTimeout(700);
-  await page.mouse.up();
+  await pressFromAbove(page, [30, -10], 3, 700);
 }
 
 const pulses = (page) => page.evaluate(() => window.pulses);

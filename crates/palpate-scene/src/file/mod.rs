@@ -70,22 +70,6 @@ pub fn read_relocated_scene(path: &Path, relocated: &Relocated, mode: RunMode) -
     read_source(&source, mode)
 }
 
-/// Reads a scene whose text and parts are in memory, as those of a log; none of its devices is moved by the program.
-///
-/// # Errors
-/// As [`read_scene`].
-#[cfg(feature = "logs")]
-pub(crate) fn read_scene_in_memory(
-    path: &Path,
-    bytes: Vec<u8>,
-    parts: &PartsInMemory,
-    mode: RunMode,
-) -> Result<Scene, SceneError> {
-    let (text, relocated) = (text_of(path, bytes)?, Relocated::new());
-    let source = Source { path, text: &text, relocated: &relocated, parts, mover: DeviceMover::Nobody };
-    read_source(&source, mode)
-}
-
 /// Reads a scene of bytes that are in no file, as a pipe has them: `name` stands for the file in errors, and files that the scene names are
 /// looked for beside it.
 ///
@@ -134,7 +118,8 @@ pub(crate) fn read_text(path: &Path, stored: &Path) -> Result<String, SceneError
     text_of(path, bytes)
 }
 
-fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, SceneError> {
+/// Text of the bytes of a scene file.
+pub(crate) fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|_| {
         let message = "it is not a text file; a scene is TOML (docs/scene.md)";
         SceneError::of_file(SceneErrorKind::Syntax, path, message)
