@@ -44,10 +44,11 @@ enum StepEnd {
 }
 
 impl FirState {
-    pub(crate) fn new(fir: &Fir, nodes: usize, slots: usize) -> Self {
+    pub(crate) fn new((fir, body): (&Fir, &Body), slots: usize) -> Self {
+        let nodes = body.recording.surface.positions.len();
         let history = ForceHistory::new(fir.samples(), fir.touchable_nodes());
         Self {
-            surface: ModalState::new(fir.modes.len(), nodes, slots),
+            surface: ModalState::new(body, slots),
             surface_error: 0.0,
             blocks: BlockedConvolution::new(nodes),
             displacements: [(); 2].map(|()| vec![None; nodes]),
