@@ -11,7 +11,7 @@ import { Hint } from "../ui/hint";
 import { JobList } from "../ui/job_list";
 import { LiveToolbar } from "../ui/live_toolbar";
 import { LostObjects } from "../ui/lost_objects";
-import { OwnSettings } from "../ui/physics_settings";
+import { restoration } from "../ui/physics_settings";
 import { ScaleLock } from "../ui/scale_lock";
 import type { SoundBlock } from "../sound/sound_block";
 import { SoundControl } from "../sound/sound_control";
@@ -54,7 +54,6 @@ export class LiveMode implements PageMode {
   private readonly openFiles: OpenFiles | null = null;
   private readonly lostObjects: LostObjects;
   private lostCheckedAt = 0;
-  private readonly ownSettings = new OwnSettings();
   private readonly linked: LinkedStart;
   private readonly share: Share;
   private readonly send: (message: ClientMessage) => void;
@@ -74,7 +73,10 @@ export class LiveMode implements PageMode {
       this.linked.end();
       send({ type: "open_scene", scene: id });
     });
-    notifications.onError = (text) => this.panels.physics.refused(text);
+    notifications.onError = (text) => {
+      this.panels.physics.refused(text);
+      this.linked.refused();
+    };
     this.hint = new Hint(() => this.panels.showAccuracy());
     this.pointers = new LivePointers(sceneView, this.shown, send, !this.hint.isDismissed);
     this.pointers.touches.onBegin = () => {
@@ -98,10 +100,7 @@ export class LiveMode implements PageMode {
     );
     this.sound = new SoundControl(send, notifications);
     this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
-    this.share = new Share(sceneView, notifications, worker, () => {
-      const scene = this.shown.requested;
-      return scene === null ? null : { scene, own: this.ownSettings.values };
-    });
+    this.share = new Share(sceneView, notifications, worker, () => this.shown.requested);
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
@@ -127,8 +126,9 @@ export class LiveMode implements PageMode {
   /** Begins the scene again with the settings that it came with, and shows it as at first. */
   private reset(): void {
     const scene = this.shown.requested;
-    const restoration = scene === null ? null : this.ownSettings.restoration(scene);
-    if (restoration !== null) this.send(restoration);
+    const change = scene === null ? null : restoration(scene);
+    this.linked.end();
+    if (change !== null) this.send(change);
     this.restart();
   }
 
@@ -141,7 +141,7 @@ export class LiveMode implements PageMode {
   hello(hello: Hello): void {
     this.suspend();
     this.panels.scenes.setScenes(hello.scenes);
-    this.linked.hello(hello.scenes);
+    this.linked.hello(hello);
     this.meshUpload.viewer = hello.viewer;
     this.meshUpload.section.hidden = !hello.records;
     this.panels.material.records = hello.records;
@@ -174,7 +174,6 @@ export class LiveMode implements PageMode {
   scene(scene: SceneMessage): void {
     this.suspend();
     this.pointers.clear();
-    this.ownSettings.note(scene);
     this.share.log.sceneBegins();
     const again = scene.id === null ? (this.meshUpload.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
     this.panels.scene(scene, again);

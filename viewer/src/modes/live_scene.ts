@@ -3,6 +3,7 @@
 import type { Frame } from "../protocol/frame";
 import type { SceneMessage } from "../protocol/messages";
 import { FrameMismatch } from "../rendering/elastic/elastic_mesh";
+import { downOf } from "../rendering/gravity_direction";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import type { SceneView } from "../rendering/scene_view";
 import { element } from "../ui/elements";
@@ -50,7 +51,7 @@ export class LiveScene {
         if (loadAbort.signal.aborted) return;
         const previous = this.sceneView.graphs[0]?.info ?? null;
         const sameScene = previous !== null && previous.id === scene.id && previous.objects.length === scene.objects.length;
-        if (!sameScene) this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
+        if (!sameScene) this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, downOf(scene), hasFloor(scene));
         this.sceneView.setScene(0, loaded);
         onShown();
         this.frame = null;

@@ -59,7 +59,7 @@ export class ShareDialog {
       {},
       title,
       element("div", { class: "copy-row" }, field, this.copyButton("Copy link", field, true)),
-      element("p", { text: "Opens this scene with the changed Physics settings and this view. A changed material is not part of it." }),
+      element("p", { text: "Opens this scene with the changed Physics settings and materials, and this view." }),
       ...link.limits.map((limit) => element("p", { class: "limit", text: limit })),
     );
     if (code === null) text.append(element("p", { text: "The link is too long for a QR code." }));
