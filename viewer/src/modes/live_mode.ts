@@ -100,7 +100,7 @@ export class LiveMode implements PageMode {
     );
     this.sound = new SoundControl(send, notifications);
     this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
-    this.share = new Share(sceneView, notifications, worker, () => this.shown.requested);
+    this.share = new Share(sceneView, notifications, worker, () => this.shown.requested, () => this.sound.forFilm());
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 

@@ -7,6 +7,7 @@ import type { SceneView } from "../rendering/scene_view";
 import { iconButton } from "../ui/elements";
 import type { Notifications } from "../ui/notifications";
 import { addressWith, frameHtml, limitsOf } from "./addresses";
+import type { FilmSound } from "./film";
 import { FilmControl } from "./film_control";
 import { LogControl, type LogSource } from "./log_control";
 import { linkTo, queryOf } from "./link";
@@ -24,12 +25,13 @@ export class Share {
     logs: LogSource | null,
     /** Scene that is shown. */
     private readonly shown: () => SceneMessage | null,
+    sound: () => FilmSound | null,
   ) {
     const name = () => {
       const scene = shown();
       return scene?.id ?? scene?.title ?? "";
     };
-    this.film = new FilmControl(sceneView, notifications, name);
+    this.film = new FilmControl(sceneView, notifications, name, sound);
     this.log = new LogControl(logs, notifications, name);
     this.dialog = new ShareDialog(
       () => this.offer(),

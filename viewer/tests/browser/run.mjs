@@ -9,6 +9,7 @@ import { mkdirSync } from "node:fs";
 import { Browser } from "./browser.mjs";
 import { comparisonCases } from "./comparison.mjs";
 import { droppedCases } from "./dropped.mjs";
+import { filmSoundCases } from "./film_sound.mjs";
 import { firstLoadCases } from "./first_load.mjs";
 import { firstViewCases } from "./first_view.mjs";
 import { handCases } from "./hand.mjs";
@@ -30,7 +31,7 @@ const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
