@@ -22,6 +22,7 @@ import type { DisplayPanel } from "../ui/display_panel";
 import type { Notifications } from "../ui/notifications";
 import type { SceneView } from "../rendering/scene_view";
 import { runsInWorker, type WorkerConnection } from "../protocol/worker_connection";
+import { VrSession } from "../xr/vr_session";
 import { LivePanels } from "./live_panels";
 import { LivePointers } from "./live_pointers";
 import { LiveScene } from "./live_scene";
@@ -101,6 +102,10 @@ export class LiveMode implements PageMode {
     this.sound = new SoundControl(send, notifications);
     this.linked = new LinkedStart(window.location.search, send, (text) => notifications.notify(text, "error"), forgetLink);
     this.share = new Share(sceneView, notifications, worker, () => this.shown.requested, () => this.sound.forFilm());
+    const vr = new VrSession(sceneView, this.pointers.hands, notifications, (now) => this.animate(now), () => {
+      this.pointers.stopGhost();
+      this.hint.dismiss();
+    });
     const meshUpload = new MeshUpload(notifications, this.jobs);
     this.meshUpload = meshUpload;
 
@@ -113,7 +118,7 @@ export class LiveMode implements PageMode {
       });
     }
 
-    layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts);
+    layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts, vr.button);
     layout.overlayTop.append(this.share.film.box, this.share.log.box, this.forceReadout.box, this.hint.box, this.jobs.box);
     layout.overlayBottom.append(this.lostObjects.box);
     layout.viewArea.append(this.shown.box, new ScaleLock(sceneView).button);
@@ -233,7 +238,7 @@ export class LiveMode implements PageMode {
     this.share.film.animate();
     this.pointers.animate(now, this.shown.isBuiltIn && !this.toolbar.isPaused);
     if (this.shown.showFrame(now)) this.pointers.resume();
-    this.forceReadout.show(this.shown.frame, this.sceneView.graphs[0]?.info ?? null, this.pointers.touches.devices);
+    this.forceReadout.show(this.shown.frame, this.sceneView.graphs[0]?.info ?? null, this.pointers.devices);
     this.pointers.vibrate(now);
     this.panels.animate(now);
     if (now - this.lostCheckedAt > LOST_INTERVAL_MS) {

@@ -1,7 +1,7 @@
-// Pointers of a live scene: mouse and touch screen, keyboard, gamepads, the ghost finger; what they feel shakes a phone.
+// Pointers of a live scene: mouse and touch screen, keyboard, gamepads, hands in VR, the ghost finger; what they feel shakes a phone.
 
 import { GamepadPointers } from "../interaction/gamepad_pointers";
-import { GHOST_POINTER, GhostFinger, wantsGhost } from "../interaction/ghost_finger";
+import { GhostFinger, wantsGhost } from "../interaction/ghost_finger";
 import { KeyboardPointer } from "../interaction/keyboard_pointer";
 import { PointerEvents } from "../interaction/pointer_events";
 import { Touches } from "../interaction/touches";
@@ -10,10 +10,13 @@ import type { ClientMessage, DeviceAssigned, TouchMode } from "../protocol/messa
 import type { Rectangle } from "../rendering/overlay";
 import type { SceneView } from "../rendering/scene_view";
 import { vibrationSwitch } from "../ui/vibration_switch";
+import { HAND_POINTERS, VrHands } from "../xr/vr_hands";
 import type { LiveScene } from "./live_scene";
 
 export class LivePointers {
   readonly touches: Touches;
+  /** Hands in VR. */
+  readonly hands: VrHands;
   /** Switch of the vibration, where the browser vibrates. */
   readonly vibrationRow: HTMLElement[];
   private readonly pointers: PointerEvents;
@@ -28,7 +31,8 @@ export class LivePointers {
     send: (message: ClientMessage) => void,
     ghostMayCome: boolean,
   ) {
-    this.touches = new Touches(sceneView, send, { first: 0, count: GHOST_POINTER.first });
+    this.touches = new Touches(sceneView, send, { first: 0, count: HAND_POINTERS.first });
+    this.hands = new VrHands(send);
     this.ghost = new GhostFinger(sceneView, send);
     if (!ghostMayCome || !wantsGhost(window.location.href, window.matchMedia("(prefers-reduced-motion: reduce)").matches)) this.ghost.stop();
     // Before the canvas gets the press, so that the device slot is free.
@@ -58,24 +62,32 @@ export class LivePointers {
     return Math.hypot(...force) / (this.sceneView.graphs[0]?.forceRange.value ?? 1);
   }
 
+  /** Device slots that this page's pointers and hands have. */
+  get devices(): number[] {
+    return [...this.touches.devices, ...this.hands.devices];
+  }
+
   stopGhost(): void {
     this.ghost.stop();
   }
 
   assign(message: DeviceAssigned): void {
     this.touches.assign(message.pointer, message.device);
+    this.hands.assign(message.pointer, message.device);
     this.ghost.assign(message.pointer, message.device);
   }
 
   /** Lets presses wait for the next frame of a scene that is loaded. */
   suspend(): void {
     this.touches.suspend();
+    this.hands.suspend();
     this.ghost.interrupt();
   }
 
   /** Lets presses that wait begin. */
   resume(): void {
     this.touches.resume();
+    this.hands.resume();
     this.ghost.resume();
   }
 
@@ -99,7 +111,7 @@ export class LivePointers {
   }
 
   vibrate(now: number): void {
-    this.vibration.animate(new Map(this.touches.devices.map((device) => [device, this.forceShare(device)])), now);
+    this.vibration.animate(new Map(this.devices.map((device) => [device, this.forceShare(device)])), now);
   }
 
   /** Whether a pointer other than the ghost touches the scene. */

@@ -21,6 +21,7 @@ import { sharedMaterialCases } from "./shared_material.mjs";
 import { soundCases } from "./sound.mjs";
 import { touchCases } from "./touching.mjs";
 import { robustCases } from "./robust.mjs";
+import { vrCases } from "./vr.mjs";
 import { vibrationCases } from "./vibration.mjs";
 import { recordedLogCases } from "./recorded_log.mjs";
 import { reconstructionCases } from "./reconstruction.mjs";
@@ -31,7 +32,7 @@ const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
+const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
 
 const browser = await Browser.open();
 let failed = 0;
