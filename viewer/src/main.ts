@@ -146,6 +146,8 @@ function start(): void {
 
   function draw(now: number): void {
     requestAnimationFrame(draw);
+    // A headset has a clock of its own.
+    if (sceneView.renderer.xr.isPresenting) return;
     mode?.animate(now);
     sceneView.draw(now / 1000);
   }

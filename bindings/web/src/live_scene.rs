@@ -99,7 +99,7 @@ impl LiveScene {
         parts: PartsInMemory,
         send: Send,
     ) -> Result<(), String> {
-        self.start(SceneText::new(titles, text, parts), false, send)
+        self.start(read(SceneText::new(titles, text, parts))?, false, send)
     }
 
     /// Sends the first messages to the page. `scenes` can be opened.
@@ -120,11 +120,11 @@ impl LiveScene {
                 changed.text = edited(&changed.text, |table| {
                     settings_change(settings).apply(table).map_err(|error| error.to_string())
                 })?;
-                self.start(changed, true, send).map(|()| None)
+                self.change(changed, true, send).map(|()| None)
             }
             Some(LocalRequest::ChangeMaterial(object, material)) => {
                 let changed = self.with_material(object, material)?;
-                self.start(changed, false, send).map(|()| None)
+                self.change(changed, false, send).map(|()| None)
             }
         }
     }
@@ -160,8 +160,18 @@ impl LiveScene {
         self.local.static_data(path)
     }
 
-    fn start(&mut self, text: SceneText, resumes: bool, send: Send) -> Result<(), String> {
+    /// Starts the scene again with a changed text.
+    fn change(&mut self, text: SceneText, resumes: bool, send: Send) -> Result<(), String> {
         let (scene, current) = read(text)?;
+        self.start((scene.changed_from(self.local.scene()), current), resumes, send)
+    }
+
+    fn start(
+        &mut self,
+        (scene, current): (ViewerScene, SceneText),
+        resumes: bool,
+        send: Send,
+    ) -> Result<(), String> {
         self.local.start(scene, resumes, send).map_err(|error| error.to_string())?;
         self.current = current;
         Ok(())

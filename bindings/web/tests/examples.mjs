@@ -13,10 +13,12 @@ const ELSEWHERE = {
   "/examples/block.palp": join(folder, "../../crates/palpate-testkit/recordings/free.palp"),
 };
 
+const LIBRARIES = { three: "../../viewer/node_modules/three/build", babylon: "node_modules/babylonjs" };
+
 const server = createServer(async (request, response) => {
   const { pathname } = new URL(request.url, "http://localhost");
-  const three = pathname.match(/^\/examples\/three\/(.+)$/)?.[1];
-  const path = three !== undefined ? join(folder, "../../viewer/node_modules/three/build", three) : (ELSEWHERE[pathname] ?? join(folder, pathname));
+  const [, library, file] = pathname.match(/^\/examples\/(three|babylon)\/(.+)$/) ?? [];
+  const path = library !== undefined ? join(folder, LIBRARIES[library], file) : (ELSEWHERE[pathname] ?? join(folder, pathname));
   try {
     const content = await readFile(path);
     response.writeHead(200, { "content-type": TYPES[pathname.split(".").at(-1)] ?? "application/octet-stream" }).end(content);
@@ -42,6 +44,7 @@ const press = async (page, selector) => {
 const cases = {
   "canvas.html": (page) => press(page, "canvas"),
   "three.html": (page) => press(page, "canvas"),
+  "babylon.html": (page) => press(page, "canvas"),
   "worker.html": (page) => page.locator("input").fill("1"),
 };
 // Also with frames as a slow machine has them: pointer events come together, and the page is behind the press.

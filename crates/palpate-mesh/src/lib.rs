@@ -4,7 +4,7 @@
 //! - [`Mesh`]: tetrahedra with regions and groups; [`Mesh::checked`] holds it to be one sound body.
 //! - [`SurfaceMesh`]: triangles; [`tetrahedralise`] fills them with tetrahedra.
 //! - [`Mesh::to_vtk`], [`Mesh::to_gmsh`]: files for other programs.
-//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`], [`ArchedBar`], [`TuningFork`], [`Bell`], [`Liver`], [`Jelly`]: generated meshes.
+//! - [`box_mesh`], [`split_box_mesh`], [`ball_mesh`], [`ArchedBar`], [`TuningFork`], [`Bell`], [`Liver`], [`Jelly`], [`Duck`]: generated meshes.
 #![doc = "\n"]
 #![doc = include_str!("../README.md")]
 #![deny(missing_docs)]
@@ -40,6 +40,7 @@ mod soft_bodies;
 mod stl;
 mod surface_mesh;
 mod tetgen;
+mod toy_duck;
 mod vega;
 mod volume_mesh;
 mod vtk;
@@ -59,4 +60,5 @@ pub use repair::{MergeNodes, PieceChoice, Repair};
 pub use report::{ANGLE_BIN_DEG, MeshReport, PieceReport, RegionReport, SurfaceReport, VolumeReport};
 pub use soft_bodies::{Jelly, Liver};
 pub use surface_mesh::{SurfaceFile, SurfaceMesh};
+pub use toy_duck::Duck;
 pub use volume_mesh::{Mesh, MidEdgeNode, NodeGroup, Region, RegionMaterial, VolumeFile};

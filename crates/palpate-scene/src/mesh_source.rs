@@ -3,7 +3,7 @@
 use crate::error::{SceneError, SceneErrorKind};
 use palpate_fem::Progress;
 use palpate_mesh::{
-    ArchedBar, Bell, CellSplit, Files, Jelly, Liver, Mesh, MeshError, MeshFile, MeshingParameters,
+    ArchedBar, Bell, CellSplit, Duck, Files, Jelly, Liver, Mesh, MeshError, MeshFile, MeshingParameters,
     SurfaceMesh, TuningFork, ball_mesh, split_box_mesh,
 };
 use std::collections::BTreeMap;
@@ -162,14 +162,16 @@ fn primitive(source: &str) -> Result<Option<Mesh>, SceneError> {
         let mesh = match (name, fineness.map(str::parse::<f64>)) {
             ("liver", None) => Liver::default().mesh(),
             ("liver", Some(Ok(cell_size))) => Liver { cell_size, ..Liver::default() }.mesh(),
+            ("duck", None) => Duck::default().mesh(),
+            ("duck", Some(Ok(cell_size))) => Duck { cell_size }.mesh(),
             ("jelly", None) => Jelly::default().mesh(),
             ("jelly", Some(Ok(rings))) if (1.0..=100.0).contains(&rings) && rings.fract() == 0.0 => {
                 Jelly { rings: rings as u32, ..Jelly::default() }.mesh()
             }
             _ => {
                 return Err(mesh_error(format!(
-                    "{source:?} is no body; write body:liver or body:liver/CELL, as in body:liver/0.01, in metres; body:jelly or \
-                     body:jelly/RINGS, as in body:jelly/4, 1 to 100"
+                    "{source:?} is no body; write body:liver or body:liver/CELL, as in body:liver/0.01, in metres; body:duck or \
+                     body:duck/CELL; body:jelly or body:jelly/RINGS, as in body:jelly/4, 1 to 100"
                 )));
             }
         };
@@ -254,7 +256,8 @@ mod tests {
         let fine = |source| read_mesh(source).map(|mesh| mesh.tets.len()).ok();
         assert_eq!([fine("body:jelly/3"), fine("body:jelly")], [Some(486), Some(1152)]);
         assert!(fine("body:liver/0.02") < fine("body:liver"));
-        for wrong in ["body:heart", "body:liver/x", "body:jelly/0", "body:jelly/2.5"] {
+        assert!(fine("body:duck/0.013") < fine("body:duck"));
+        for wrong in ["body:heart", "body:liver/x", "body:duck/x", "body:jelly/0", "body:jelly/2.5"] {
             assert!(
                 text(read_mesh(wrong)).contains("is no body; write body:liver or body:liver/CELL"),
                 "{wrong}"

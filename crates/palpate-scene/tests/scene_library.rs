@@ -44,7 +44,7 @@ fn a_scene_file_gets_pointers_and_its_settings_can_be_changed() {
     assert_eq!(error.kind, SceneErrorKind::UnknownValue);
     assert_eq!(
         error.to_string(),
-        "there is no scene \"nothing\"; there are bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, bar, fork, bell"
+        "there is no scene \"nothing\"; there are bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, duck, bar, fork, bell"
     );
 }
 

@@ -1,4 +1,4 @@
-//! Built-in scenes of soft bodies: the lump in the liver is felt, the jelly wobbles at its frequency, the gripper carries the weight.
+//! Built-in scenes of soft bodies: the lump in the liver is felt, the jelly wobbles at its frequency, the gripper carries the weight, the duck stands and is squeezed.
 
 use glam::DVec3;
 use palpate::{DeviceInput, DeviceMode, State, step};
@@ -217,4 +217,54 @@ fn the_gripper_lifts_the_cube_and_sets_it_down_again_and_carries_its_weight() {
     assert!(count[0] >= 4 * 599 && count[1] >= 4 * 199, "{count:?}");
     assert!(deviation < 0.01, "{deviation}");
     assert!(height[0] > 0.075 && height[1] < 0.026, "{height:?}");
+}
+
+/// Width of the duck's neck where the fingers are [m], and how far they go in on each side [m].
+const NECK: f64 = 0.056;
+const SQUEEZE: f64 = 0.006;
+
+#[test]
+fn the_duck_stands_and_takes_the_squeeze_of_two_fingers() {
+    let opened = opened("duck");
+    let scene = &opened.scene;
+    let h = scene.model.parameters().step_s;
+    let mut state = State::new(&scene.model);
+    let pointers: Vec<usize> = (0..scene.devices.len()).filter(|&slot| scene.devices[slot].pointer).collect();
+    let tip = scene.devices[pointers[0]].parameters.tip_radius;
+    let run = |state: &mut State, seconds: f64, apart: &dyn Fn(f64) -> Option<f64>| {
+        let frame = state.output().objects[0].pose;
+        for number in 1..=(seconds / h).round() as u32 {
+            let mut input = scene.input_at(0.0);
+            pointers.iter().for_each(|&slot| input.devices[slot] = DeviceInput::inactive());
+            if let Some(apart) = apart(f64::from(number) * h) {
+                for (slot, side) in pointers.iter().zip([1.0, -1.0]) {
+                    // At the neck, beside the centre of mass.
+                    let position = frame.position
+                        + frame.orientation * DVec3::new(0.016, 0.012, side * (0.5 * NECK + tip + apart));
+                    input.devices[*slot] = DeviceInput { position, mode: DeviceMode::Touch };
+                }
+            }
+            step(&scene.model, state, &input);
+        }
+    };
+    run(&mut state, 3.0, &|_| None);
+    let standing = state.output().objects[0].pose;
+    let up = standing.orientation * DVec3::Y;
+    assert!(up.y > 0.999 && (standing.position.y - 0.046).abs() < 1e-3, "{standing:?}");
+    run(&mut state, 1.0, &|time| Some(0.004 - (0.004 + SQUEEZE) * (time / 0.8).min(1.0)));
+    let forces = [0, 1].map(|at| state.output().devices[pointers[at]].force_on_hand);
+    println!(
+        "squeezed: {:?} N, {:.2} mm",
+        forces.map(|force| force.z),
+        1e3 * state.output().objects[0].pose.position.y
+    );
+    // Each hand is pushed outwards, by as much as the other.
+    assert!(forces[0].z > 0.3 && forces[1].z < -0.3, "{forces:?}");
+    assert!((forces[0].z + forces[1].z).abs() < 0.1 * forces[0].z, "{forces:?}");
+    run(&mut state, 2.0, &|_| None);
+    let rest = state.output().objects[0].pose;
+    assert!(
+        (rest.orientation * DVec3::Y).y > 0.999 && (rest.position - standing.position).length() < 0.01,
+        "{rest:?}"
+    );
 }

@@ -51,7 +51,7 @@ pub use log_frames::{LogFrameBuilder, LogFrames};
 pub use log_player::{FrameSpacing, FrameSteps, LogPlayer};
 pub use protocol::{
     CameraView, CouplingDescription, DeviceDescription, FrameEncoder, FrameFormat, FrameTimes,
-    MaterialDescription, ObjectDescription, ObstacleDescription, PhysicsSettings, RenderRequest,
+    MaterialDescription, ObjectDescription, ObstacleDescription, OwnSettings, PhysicsSettings, RenderRequest,
     SceneDescription, SceneSummary, ShapeDescription, View, decodes,
 };
 #[cfg(feature = "server")]

@@ -1,7 +1,7 @@
 //! Scenes that the server runs, and the interface that makes them.
 
 use crate::error::SceneError;
-use crate::protocol::{MaterialDescription, PhysicsSettings, SceneDescription, SceneSummary};
+use crate::protocol::{MaterialDescription, OwnSettings, PhysicsSettings, SceneDescription, SceneSummary};
 #[cfg(feature = "server")]
 use palpate::State;
 use palpate::{DeviceMode, Model, Pose};
@@ -65,16 +65,17 @@ pub struct ViewerScene {
 }
 
 impl ViewerScene {
-    /// Scene without a log, whose devices `device` finds.
+    /// Scene without a log, with settings of its own, whose devices `device` finds.
     pub fn new(
         scene: &Scene,
-        description: SceneDescription,
+        mut description: SceneDescription,
         device: impl FnMut(&SceneDevice) -> ViewerDevice,
     ) -> Self {
         let movers = scene.obstacles.iter().map(|obstacle| {
             let obstacle = obstacle.clone();
             Arc::new(move |t: f64| obstacle.pose_at(t)) as SharedTrajectory
         });
+        description.own = Some(OwnSettings::of(&description));
         Self {
             description,
             model: scene.model.clone(),
@@ -86,6 +87,13 @@ impl ViewerScene {
             #[cfg(feature = "server")]
             log: None,
         }
+    }
+
+    /// Scene that came of changes to another one, whose own settings it has.
+    #[must_use]
+    pub fn changed_from(mut self, opened: &Self) -> Self {
+        self.description.own.clone_from(&opened.description.own);
+        self
     }
 }
 

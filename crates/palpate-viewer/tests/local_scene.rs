@@ -177,7 +177,10 @@ fn another_scene_goes_on_from_the_state_where_both_allow_it() {
     let Some(LocalRequest::ChangePhysics(settings)) = request else { panic!("{request:?}") };
     assert_eq!(settings.gravity, Some(DVec3::ZERO.to_array()));
     let floating = SCENE.replace("-9.81", "0.0");
-    page.call(|scene, _, send| scene.start(viewer_scene(&floating), true, send)).expect("a scene");
+    page.call(|scene, _, send| scene.start(viewer_scene(&floating).changed_from(scene.scene()), true, send))
+        .expect("a scene");
+    let shown = page.newest("scene");
+    assert_eq!((&shown["gravity"][1], &shown["own"]["gravity"][1]), (&0.0.into(), &(-9.81).into()));
     let after = height(page.frames.last().expect("frames"));
     assert!((after - before).abs() < 0.03 && after < 0.2, "{before} {after}");
     let request = page.receive(r#"{"type":"open_scene","scene":"other"}"#);

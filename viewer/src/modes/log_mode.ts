@@ -19,6 +19,7 @@ import { AccuracyPanel } from "../ui/accuracy_panel";
 import { ComparisonPanels } from "../ui/comparison_panels";
 import { PlotPanels } from "../ui/plot_panels";
 import type { Notifications } from "../ui/notifications";
+import { downOf } from "../rendering/gravity_direction";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import type { SceneView } from "../rendering/scene_view";
 import { PointerEvents } from "../interaction/pointer_events";
@@ -120,7 +121,7 @@ export class LogMode implements PageMode {
       if (this.names.length > 1) this.captions.append(log.caption);
     }
     this.logs[index] = log;
-    if (index === 0) this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
+    if (index === 0) this.sceneView.orbit.setHome(scene.view.center, scene.view.radius, downOf(scene), hasFloor(scene));
     this.sceneView.setScene(index, loaded);
     this.sceneView.fitCamera();
     if (index === 0) this.sceneView.orbit.reset();

@@ -5,6 +5,7 @@ import type { PageMode } from "./page_mode";
 import { fetchFrames } from "../playback/log_requests";
 import { largestOfLog, LogProgress } from "../playback/log_scales";
 import { isColourMode } from "../rendering/colours";
+import { downOf } from "../rendering/gravity_direction";
 import { hasFloor, loadScene } from "../rendering/scene_loader";
 import type { SceneView } from "../rendering/scene_view";
 import type { SceneGraph } from "../rendering/scene_graph";
@@ -55,7 +56,7 @@ export class RenderMode implements PageMode {
     sceneView.showsLogs = true;
     document.body.append(sceneView.canvas, sceneView.overlay);
     const loaded = await loadScene(scene, sceneView.reconstructsOnGpu, new AbortController().signal, () => undefined);
-    sceneView.orbit.setHome(scene.view.center, scene.view.radius, scene.gravity, hasFloor(scene));
+    sceneView.orbit.setHome(scene.view.center, scene.view.radius, downOf(scene), hasFloor(scene));
     const graph = sceneView.setScene(0, loaded);
     sceneView.resize(width, height, 1);
     sceneView.orbit.reset();

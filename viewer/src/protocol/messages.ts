@@ -95,6 +95,14 @@ export interface SceneMessage {
   devices: SceneDevice[];
   warnings: string[];
   view: { center: Vector; radius: number };
+  /** Settings of the scene as it was opened, of a live scene. */
+  own?: OwnSettings;
+}
+
+/** Settings of a scene that pages change. */
+export interface OwnSettings extends Pick<SceneMessage, "step_s" | "gravity" | "obstacles" | "devices"> {
+  /** Material of each object; null for several. */
+  materials: (Material | null)[];
 }
 
 export interface Percentiles {
@@ -193,6 +201,10 @@ function isObject(value: unknown): value is Record<string, unknown> {
   return typeof value === "object" && value !== null && !isList(value);
 }
 
+function isOwn(value: unknown): boolean {
+  return isObject(value) && typeof value.step_s === "number" && isNumbers(value.gravity, 3) && isList(value.obstacles) && isList(value.devices) && isList(value.materials);
+}
+
 function isView(value: unknown): boolean {
   return isObject(value) && isNumbers(value.center, 3) && typeof value.radius === "number" && value.radius > 0;
 }
@@ -215,7 +227,8 @@ const CHECKS: Record<ServerMessage["type"], Check> = {
     isList(m.warnings) &&
     isList(m.devices) &&
     m.devices.every((d) => isObject(d) && typeof d.tip_radius === "number") &&
-    isView(m.view),
+    isView(m.view) &&
+    (m.own === undefined || isOwn(m.own)),
   status: (m) => typeof m.paused === "boolean" && typeof m.slowdown === "number",
   assigned: (m) => typeof m.pointer === "number",
   progress: (m) => typeof m.job === "string",

@@ -17,7 +17,8 @@ export interface Look {
 }
 
 const JELLY: Look = { colour: null, translucency: 1, gloss: 1, metal: 0, grain: 0 };
-const FOAM: Look = { colour: null, translucency: 0.25, gloss: 0.1, metal: 0, grain: 0 };
+/** Household sponges and foam rubber are yellow. */
+const FOAM: Look = { colour: "#f3b91f", translucency: 0.25, gloss: 0.1, metal: 0, grain: 0 };
 const SOFT_TISSUE: Look = { colour: "#a3483f", translucency: 0.35, gloss: 1, metal: 0, grain: 0 };
 const SILICONE: Look = { colour: null, translucency: 0.55, gloss: 0.55, metal: 0, grain: 0 };
 const RUBBER: Look = { colour: "#4b4f55", translucency: 0, gloss: 0.25, metal: 0, grain: 0 };

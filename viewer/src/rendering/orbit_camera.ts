@@ -34,14 +34,12 @@ export class OrbitCamera {
   private minElevation = -MAX_ELEVATION;
   changed = true;
 
-  /** Sets the default view of a scene: bounding sphere, up against gravity, whether a floor limits the elevation. */
-  setHome(center: Vector, radius: number, gravity: Vector, floor: boolean): void {
+  /** Sets the default view of a scene: bounding sphere, direction of gravity, whether a floor limits the elevation. */
+  setHome(center: Vector, radius: number, down: Vector, floor: boolean): void {
     this.center.set(...center);
     this.radius = radius;
     this.minElevation = floor ? MIN_ELEVATION_ABOVE_FLOOR : -MAX_ELEVATION;
-    const up = new Vector3(...gravity).negate();
-    if (up.lengthSq() < 1e-12) up.set(0, 1, 0);
-    this.up.copy(up.normalize());
+    this.up.set(...down).negate().normalize();
     const other = Math.abs(this.up.z) < 0.9 ? new Vector3(0, 0, 1) : new Vector3(0, 1, 0);
     this.sideways.crossVectors(this.up, other).normalize();
     this.forward.crossVectors(this.sideways, this.up).normalize();

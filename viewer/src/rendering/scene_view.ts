@@ -1,6 +1,6 @@
 // Scene view: a WebGL canvas, a 2D overlay canvas, one camera, and one scene graph per viewport.
 
-import { Vector2, Vector3, WebGLRenderer } from "three";
+import { type Camera, Vector2, Vector3, WebGLRenderer } from "three";
 import { prefersVertexStream } from "../protocol/urls";
 import { OrbitCamera } from "./orbit_camera";
 import { DARK, LIGHT, type Palette } from "./colours";
@@ -218,6 +218,23 @@ export class SceneView {
     }
     this.graphs.forEach((graph, i) => this.drawScene(graph, i));
     this.drawn?.();
+    this.updateRange(now);
+  }
+
+  /** Draws the scene for a headset through a camera that the renderer places, without legends and labels; `now` [s]. */
+  drawImmersive(camera: Camera, now: number): void {
+    const [graph] = this.graphs;
+    if (graph === undefined || this.lost) return;
+    const { renderer } = this;
+    const target = renderer.getRenderTarget();
+    // What is drawn into textures is not seen through the headset's eyes.
+    renderer.xr.enabled = false;
+    graph.applyTheme(this.settings, this.colourRange);
+    graph.updateTargets(renderer);
+    renderer.xr.enabled = true;
+    renderer.setRenderTarget(target);
+    renderer.setClearColor(this.palette.background, 1);
+    renderer.render(graph.scene, camera);
     this.updateRange(now);
   }
 

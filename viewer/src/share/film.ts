@@ -1,4 +1,4 @@
-// Film of the scene view: both canvases on a third one, whose stream a MediaRecorder encodes.
+// Film of the scene view: both canvases on a third one, whose stream a MediaRecorder encodes, with the sound of the scene.
 
 import type { SceneView } from "../rendering/scene_view";
 import { withDuration } from "./webm_duration";
@@ -16,7 +16,13 @@ const LONGEST_SIDE = 1920;
 const SLICE_MS = 1000;
 
 /** VP8 first: where the processor encodes, VP9 takes several times as long, and falls behind beside a scene. */
-const TYPES = ["video/webm;codecs=vp8", "video/webm;codecs=vp9", "video/webm", "video/mp4"];
+const TYPES = ["video/webm;codecs=vp8,opus", "video/webm;codecs=vp9,opus", "video/webm", "video/mp4"];
+
+/** Sound for a film, which gives it back at its end. */
+export interface FilmSound {
+  track: MediaStreamTrack;
+  release(): void;
+}
 
 /** Finished film. */
 export interface FilmFile {
@@ -50,10 +56,11 @@ export class Film {
   private drawnAt = Number.NEGATIVE_INFINITY;
   private full = false;
 
-  /** Throws where the browser records no film; `onEnd` gets the film, or why there is none. */
+  /** Throws where the browser records no film; `sound` is null for a silent one; `onEnd` gets the film, or why there is none. */
   constructor(
     private readonly sceneView: SceneView,
     readonly type: string,
+    private readonly sound: FilmSound | null,
     private readonly onEnd: (film: FilmFile | string) => void,
   ) {
     const { width, height } = sceneView.canvas;
@@ -64,7 +71,9 @@ export class Film {
     const context = this.picture.getContext("2d", { alpha: false });
     if (context === null) throw new Error("this browser offers no 2D canvas");
     this.context = context;
-    this.recorder = new MediaRecorder(this.picture.captureStream(FRAME_RATE), { mimeType: type, videoBitsPerSecond: BITS_PER_SECOND });
+    const stream = this.picture.captureStream(FRAME_RATE);
+    if (sound !== null) stream.addTrack(sound.track);
+    this.recorder = new MediaRecorder(stream, { mimeType: type, videoBitsPerSecond: BITS_PER_SECOND });
     this.recorder.ondataavailable = ({ data }) => this.keep(data);
     // Also after an error of the encoder, with what there is.
     this.recorder.onstop = () => void this.finish();
@@ -151,6 +160,7 @@ export class Film {
     this.recorder.onstop = this.recorder.ondataavailable = null;
     if (this.recorder.state !== "inactive") this.recorder.stop();
     for (const track of this.recorder.stream.getTracks()) track.stop();
+    this.sound?.release();
     this.onEnd(film);
   }
 }

@@ -3,7 +3,7 @@
 import type { SceneView } from "../rendering/scene_view";
 import { element } from "../ui/elements";
 import type { Notifications } from "../ui/notifications";
-import { fileEnding, Film, filmType, type FilmFile } from "./film";
+import { fileEnding, Film, filmType, type FilmFile, type FilmSound } from "./film";
 
 /** Time after which the address of a download is given back [ms]. */
 const DOWNLOAD_MS = 60_000;
@@ -29,11 +29,12 @@ export class FilmControl {
   readonly type = filmType();
   private film: Film | null = null;
 
-  /** `scene` names the scene for the file. */
+  /** `scene` names the scene for the file, `sound` gives its sound; null while it is off. */
   constructor(
     private readonly sceneView: SceneView,
     private readonly notifications: Notifications,
     private readonly scene: () => string,
+    private readonly sound: () => FilmSound | null,
   ) {
     this.box.hidden = true;
   }
@@ -45,7 +46,7 @@ export class FilmControl {
   start(): void {
     if (this.type === null || this.film !== null) return;
     try {
-      this.film = new Film(this.sceneView, this.type, (film) => this.ended(film));
+      this.film = new Film(this.sceneView, this.type, this.sound(), (film) => this.ended(film));
     } catch (error) {
       this.ended(error instanceof Error ? error.message : String(error));
       return;

@@ -1,18 +1,27 @@
-// Link to a scene: its id, the settings that were changed, and the viewpoint, as query parameters of the page's address.
+// Link to a scene: its id, the settings and materials that were changed, and the viewpoint, as query parameters of the page's address.
 //
-//   ?scene=stack&gravity=3&step_ms=2&camera=0.3,0.2,0.4,0,0.05,0
+//   ?scene=stack&gravity=3&step_ms=2&material=cube,5000,0.45,1060&camera=0.3,0.2,0.4,0,0.05,0
 //
+// `material` is an object with Young's modulus [Pa], Poisson's ratio and density [kg/m³], once for each object.
 // `camera` is position and target [m], as `palpate render --camera` takes them.
 
 import type { Vector } from "../protocol/frame";
+import type { Material, SceneMessage } from "../protocol/messages";
 import type { Viewpoint } from "../rendering/orbit_camera";
+import { MATERIAL_BOUNDS } from "../ui/material_panel";
 import { complaint } from "../ui/number_field";
-import { differences, SETTING_FIELDS, type SettingName, type SettingValues } from "../ui/physics_settings";
+import { close, differences, ownOf, physicsOf, SETTING_FIELDS, valuesOf, type SettingName, type SettingValues } from "../ui/physics_settings";
+
+/** Material of an object, by name. */
+export interface LinkedMaterial extends Material {
+  object: string;
+}
 
 /** Content of a link; null is what the page shows without it. */
 export interface SceneLink {
   scene: string | null;
   values: SettingValues;
+  materials: LinkedMaterial[];
   viewpoint: Viewpoint | null;
 }
 
@@ -29,18 +38,32 @@ const FARTHEST = 1e6;
 /** Longest text that a message quotes. */
 export const LONGEST_QUOTE = 40;
 
-/** Link to a scene that has these values in place of its own. */
-export function linkTo(scene: string, own: SettingValues, now: SettingValues, viewpoint: Viewpoint | null): SceneLink {
+/** Link to a scene with what differs from its own settings and materials. */
+export function linkTo(scene: SceneMessage, viewpoint: Viewpoint | null): SceneLink {
+  const own = ownOf(scene);
+  const now = valuesOf(physicsOf(scene));
+  const rounded = (value: number) => Number(value.toPrecision(DIGITS));
   const values: SettingValues = {};
-  for (const name of differences(own, now)) values[name] = Number(now[name]?.toPrecision(DIGITS));
-  return { scene, values, viewpoint };
+  for (const name of differences(valuesOf(physicsOf(own)), now)) values[name] = rounded(now[name] ?? 0);
+  const materials = scene.objects.flatMap(({ name, material }, i): LinkedMaterial[] => {
+    const before = own.materials[i] ?? null;
+    if (material === null || before === null || sameMaterial(material, before)) return [];
+    return [{ object: name, young: rounded(material.young), poisson: rounded(material.poisson), density: rounded(material.density) }];
+  });
+  return { scene: scene.id, values, materials, viewpoint };
+}
+
+/** Whether materials agree but for their rounding. */
+export function sameMaterial(a: Material, b: Material): boolean {
+  return close([a.young, a.poisson, a.density], [b.young, b.poisson, b.density]);
 }
 
 /** Query of a link, with its question mark. */
-export function queryOf({ scene, values, viewpoint }: SceneLink): string {
+export function queryOf({ scene, values, materials, viewpoint }: SceneLink): string {
   const parts: string[] = [];
   if (scene !== null) parts.push(`scene=${encodeURIComponent(scene)}`);
   for (const name of NAMES) if (values[name] !== undefined) parts.push(`${PARAMETERS[name]}=${values[name]}`);
+  for (const { object, young, poisson, density } of materials) parts.push(`material=${encodeURIComponent(object)},${young},${poisson},${density}`);
   if (viewpoint !== null) parts.push(`camera=${cameraText(viewpoint)}`);
   return parts.length === 0 ? "" : `?${parts.join("&")}`;
 }
@@ -56,7 +79,7 @@ function cameraText({ from, to }: Viewpoint): string {
 /** Link in a query, and a sentence for each part that is left out. */
 export function readLink(query: string): { link: SceneLink; leftOut: string[] } {
   const parameters = new URLSearchParams(query);
-  const link: SceneLink = { scene: parameters.get("scene") || null, values: {}, viewpoint: null };
+  const link: SceneLink = { scene: parameters.get("scene") || null, values: {}, materials: [], viewpoint: null };
   const leftOut: string[] = [];
   for (const name of NAMES) {
     const text = parameters.get(PARAMETERS[name]);
@@ -66,12 +89,26 @@ export function readLink(query: string): { link: SceneLink; leftOut: string[] } 
     if (found === null) link.values[name] = Number(text);
     else leftOut.push(found);
   }
+  for (const text of parameters.getAll("material")) {
+    const material = readMaterial(text);
+    if (material === null) leftOut.push("Material: object, Young's modulus in Pa, Poisson's ratio from 0 to 0.499 and density in kg/m³.");
+    else link.materials.push(material);
+  }
   const camera = parameters.get("camera");
   if (camera !== null) {
     link.viewpoint = readCamera(camera);
     if (link.viewpoint === null) leftOut.push("Camera: position and target as six numbers of metres.");
   }
   return { link, leftOut };
+}
+
+function readMaterial(text: string): LinkedMaterial | null {
+  const parts = text.split(",");
+  const [young, poisson, density] = parts.slice(-3).map((part) => (part.trim() === "" ? Number.NaN : Number(part)));
+  const object = parts.slice(0, -3).join();
+  const inRange = (value: number, { min, max }: { min: number; max: number }) => value >= min && value <= max;
+  const valid = inRange(young / 1000, MATERIAL_BOUNDS.young) && inRange(poisson, MATERIAL_BOUNDS.poisson) && inRange(density, MATERIAL_BOUNDS.density);
+  return object !== "" && valid ? { object, young, poisson, density } : null;
 }
 
 function readCamera(text: string): Viewpoint | null {
@@ -85,7 +122,7 @@ function readCamera(text: string): Viewpoint | null {
 /** Query without the parameters of a link. */
 export function withoutLink(query: string): string {
   const parameters = new URLSearchParams(query);
-  for (const name of ["scene", "camera", ...Object.values(PARAMETERS)]) parameters.delete(name);
+  for (const name of ["scene", "material", "camera", ...Object.values(PARAMETERS)]) parameters.delete(name);
   const rest = parameters.toString();
   return rest === "" ? "" : `?${rest}`;
 }

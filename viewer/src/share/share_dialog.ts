@@ -59,7 +59,7 @@ export class ShareDialog {
       {},
       title,
       element("div", { class: "copy-row" }, field, this.copyButton("Copy link", field, true)),
-      element("p", { text: "Opens this scene with the changed Physics settings and this view. A changed material is not part of it." }),
+      element("p", { text: "Opens this scene with the changed Physics settings and materials, and this view." }),
       ...link.limits.map((limit) => element("p", { class: "limit", text: limit })),
     );
     if (code === null) text.append(element("p", { text: "The link is too long for a QR code." }));
@@ -83,7 +83,7 @@ export class ShareDialog {
     if (film === "impossible") return [section(title, element("p", { text: "This browser records no film (it has no MediaRecorder for canvases)." }))];
     const button = this.closingButton(film === "running" ? "Stop and save" : "Record", this.film);
     const limit = `${LONGEST_S / 60}\u00a0minutes or ${LARGEST_BYTES / 1e6}\u00a0MB`;
-    return [section(title, element("div", { class: "copy-row" }, element("p", { text: `The scene as you see it, with its forces and without the panels, up to ${limit}.` }), button))];
+    return [section(title, element("div", { class: "copy-row" }, element("p", { text: `The scene as you see it, with its forces and without the panels, and as you hear it if Sound is on at its start, up to ${limit}.` }), button))];
   }
 
   private logParts(log: Offer["log"]): HTMLElement[] {

@@ -19,6 +19,8 @@ export class SoundControl {
   private gain: GainNode | null = null;
   private player: AudioWorkletNode | null = null;
   private on = false;
+  /** Films that record the sound: its clock has to go on until they end. */
+  private films = 0;
 
   constructor(
     private readonly send: (message: ClientMessage) => void,
@@ -47,7 +49,7 @@ export class SoundControl {
     if (this.on) {
       this.set(false);
       this.send({ type: "sound", on: false });
-      void this.context?.suspend();
+      this.rest();
       return;
     }
     this.set(true);
@@ -59,6 +61,26 @@ export class SoundControl {
       return;
     }
     if (this.on) this.send({ type: "sound", on: true });
+  }
+
+  /** Sound as it is heard, for a film; null while it is off. */
+  forFilm(): { track: MediaStreamTrack; release(): void } | null {
+    const { context, gain } = this;
+    if (!this.on || context === null || gain === null) return null;
+    const output = new MediaStreamAudioDestinationNode(context, { channelCount: 1 });
+    gain.connect(output);
+    this.films += 1;
+    const release = () => {
+      gain.disconnect(output);
+      this.films -= 1;
+      this.rest();
+    };
+    return { track: output.stream.getAudioTracks()[0], release };
+  }
+
+  /** Stops the sound device when nobody needs it. */
+  private rest(): void {
+    if (!this.on && this.films === 0) void this.context?.suspend();
   }
 
   private set(on: boolean): void {

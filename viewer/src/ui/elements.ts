@@ -54,6 +54,7 @@ const ICONS = {
   locked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 8 0v3M12 15v2",
   unlocked: "M6 11h12v9H6zM8 11V8a4 4 0 0 1 7.700-1.500M12 15v2",
   share: "M15.500 5.500a2.500 2.500 0 1 0 5 0 2.500 2.500 0 1 0-5 0M3.500 12a2.500 2.500 0 1 0 5 0 2.500 2.500 0 1 0-5 0M15.500 18.500a2.500 2.500 0 1 0 5 0 2.500 2.500 0 1 0-5 0M8.200 10.800l7.600-4.100M8.200 13.200l7.600 4.100",
+  headset: "M4 8h16v8h-5l-2-2h-2l-2 2H4zM8 11.500v.5M16 11.500v.5",
   stepBack: "M18 5v14l-9-7zM6 5v14",
 } as const;
 export type IconName = keyof typeof ICONS;

@@ -2,7 +2,7 @@
 
 import type { Material, SceneMessage, ClientMessage } from "../protocol/messages";
 import { element, section } from "./elements";
-import { numberField } from "./number_field";
+import { numberField, type Bounds } from "./number_field";
 
 export const PRESETS: readonly (Material & { name: string })[] = [
   { name: "Jelly", young: 2e3, poisson: 0.45, density: 110 },
@@ -11,6 +11,13 @@ export const PRESETS: readonly (Material & { name: string })[] = [
   { name: "Soft silicone", young: 1e5, poisson: 0.48, density: 1080 },
   { name: "Rubber", young: 2e6, poisson: 0.49, density: 1100 },
 ];
+
+/** Ranges of a material in the units of its fields. */
+export const MATERIAL_BOUNDS = {
+  young: { min: 1e-3, max: 1e9, step: "any" },
+  poisson: { min: 0, max: 0.499, step: "any" },
+  density: { min: 0.1, max: 1e5, step: "any" },
+} as const satisfies Record<keyof Material, Bounds>;
 
 /** Input fields of a material, with presets. */
 export class MaterialFields {
@@ -26,9 +33,9 @@ export class MaterialFields {
     const clearPreset = () => {
       this.preset.value = "";
     };
-    this.young = numberField("Young's modulus", "kPa", "Elastic stiffness: jelly 2, liver 5, rubber 2000 kPa", { min: 1e-3, max: 1e9, step: "any" }, clearPreset);
-    this.poisson = numberField("Poisson's ratio", "", "Lateral expansion under compression: cork 0, rubber 0.49", { min: 0, max: 0.499, step: "any" }, clearPreset);
-    this.density = numberField("Density", "kg/m³", "Mass per volume; water: 1000", { min: 0.1, max: 1e5, step: "any" }, clearPreset);
+    this.young = numberField("Young's modulus", "kPa", "Elastic stiffness: jelly 2, liver 5, rubber 2000 kPa", MATERIAL_BOUNDS.young, clearPreset);
+    this.poisson = numberField("Poisson's ratio", "", "Lateral expansion under compression: cork 0, rubber 0.49", MATERIAL_BOUNDS.poisson, clearPreset);
+    this.density = numberField("Density", "kg/m³", "Mass per volume; water: 1000", MATERIAL_BOUNDS.density, clearPreset);
     this.preset.append(
       element("option", { text: "custom", attributes: { value: "" } }),
       ...PRESETS.map(({ name }) => element("option", { text: name, attributes: { value: name } })),

@@ -2,7 +2,8 @@
 
 import type { SceneMessage, ClientMessage } from "../protocol/messages";
 import type { Vector } from "../protocol/frame";
-import { directionOf, physicsOf, SETTING_FIELDS, type SettingField } from "./physics_settings";
+import { downOf } from "../rendering/gravity_direction";
+import { physicsOf, SETTING_FIELDS, type SettingField } from "./physics_settings";
 import { section } from "./elements";
 import { numberField, type NumberField } from "./number_field";
 
@@ -55,7 +56,7 @@ export class PhysicsPanel {
   }
 
   private show(scene: SceneMessage): void {
-    this.direction = directionOf(scene.gravity);
+    this.direction = downOf(scene);
     this.gravity.value = Math.hypot(...scene.gravity);
     this.step.value = 1000 * scene.step_s;
     const { friction, coupling } = physicsOf(scene);

@@ -1,7 +1,8 @@
-// Physics settings of a scene, their fields, and those that it came with, to which Reset goes back.
+// Physics settings of a scene, their fields, and the way back to those that it came with.
 
-import type { ClientMessage, Coupling, SceneMessage } from "../protocol/messages";
+import type { ClientMessage, Coupling, OwnSettings, SceneMessage } from "../protocol/messages";
 import type { Vector } from "../protocol/frame";
+import { downOf } from "../rendering/gravity_direction";
 import type { Bounds } from "./number_field";
 
 type SetPhysics = Extract<ClientMessage, { type: "set_physics" }>;
@@ -37,16 +38,15 @@ export interface PhysicsSettings {
 }
 
 /** Settings as the server describes them: friction and coupling of the first pointer. */
-export function physicsOf(scene: SceneMessage): PhysicsSettings {
+export function physicsOf(scene: Omit<OwnSettings, "materials">): PhysicsSettings {
   const pointer = scene.devices.find((device) => device.pointer) ?? scene.devices[0];
   const friction = pointer?.friction ?? scene.obstacles[0]?.friction ?? null;
   return { gravity: scene.gravity, step: scene.step_s, friction, coupling: pointer?.coupling ?? null };
 }
 
-/** Direction of gravity; downwards in a scene without. */
-export function directionOf(gravity: Vector): Vector {
-  const magnitude = Math.hypot(...gravity);
-  return magnitude > 0 ? [gravity[0] / magnitude, gravity[1] / magnitude, gravity[2] / magnitude] : [0, -1, 0];
+/** Settings of a scene as it was opened. */
+export function ownOf(scene: SceneMessage): OwnSettings {
+  return scene.own ?? { ...scene, materials: scene.objects.map(({ material }) => material) };
 }
 
 /** Values of the fields that a scene has. */
@@ -73,9 +73,10 @@ function change(wanted: PhysicsSettings, now: PhysicsSettings): SetPhysics | nul
 }
 
 /** Message that gives a scene the values that differ from its present ones; null if none does. */
-export function changeTo(values: SettingValues, now: PhysicsSettings): SetPhysics | null {
+export function changeTo(values: SettingValues, scene: SceneMessage): SetPhysics | null {
   const { gravity, friction, step } = values;
-  const [x, y, z] = directionOf(now.gravity);
+  const now = physicsOf(scene);
+  const [x, y, z] = downOf(scene);
   const wanted: PhysicsSettings = {
     gravity: gravity === undefined ? now.gravity : [gravity * x, gravity * y, gravity * z],
     step: step === undefined ? now.step : step / 1000,
@@ -85,39 +86,16 @@ export function changeTo(values: SettingValues, now: PhysicsSettings): SetPhysic
   return change(wanted, now);
 }
 
-/** Settings that scenes had when they were opened. */
-export class OwnSettings {
-  private readonly known = new Map<string, PhysicsSettings>();
-  private current: string | null = null;
-
-  /** Notes a scene: one that follows another was opened, one that follows itself was changed. */
-  note(scene: SceneMessage): void {
-    const key = `${scene.id ?? ""} ${scene.title}`;
-    if (key !== this.current || !this.known.has(key)) this.known.set(key, physicsOf(scene));
-    this.current = key;
-  }
-
-  private get own(): PhysicsSettings | undefined {
-    return this.current === null ? undefined : this.known.get(this.current);
-  }
-
-  /** Values of the noted scene's own settings. */
-  get values(): SettingValues {
-    const { own } = this;
-    return own === undefined ? {} : valuesOf(own);
-  }
-
-  /** Message that brings the noted scene back to its own settings; null if it has them. */
-  restoration(scene: SceneMessage): SetPhysics | null {
-    const { own } = this;
-    return own === undefined ? null : change(own, physicsOf(scene));
-  }
+/** Message that brings a scene back to its own settings; null if it has them. */
+export function restoration(scene: SceneMessage): SetPhysics | null {
+  return change(physicsOf(ownOf(scene)), physicsOf(scene));
 }
 
 function numbersOf({ stiffness, damping }: Coupling): number[] {
   return [stiffness, damping];
 }
 
-function close(a: readonly number[], b: readonly number[]): boolean {
+/** Whether numbers agree but for their rounding. */
+export function close(a: readonly number[], b: readonly number[]): boolean {
   return a.every((x, k) => Math.abs(x - b[k]) <= 1e-9 * Math.max(Math.abs(x), Math.abs(b[k])));
 }

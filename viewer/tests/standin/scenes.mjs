@@ -2,10 +2,13 @@
 
 import { Box, TIP } from "./physics.mjs";
 
+const MATERIAL = { young: 2000, poisson: 0.45, density: 110 };
 const FLOOR = { name: "floor", shape: { plane: {} }, pose: [0, 0, 0, 0, 0, 0, 1], friction: 0.5 };
 
 export const SCENES = [
   { id: "bounce", title: "Cube on a floor", about: "A jelly cube of 10 cm falls on a floor. Poke it, push it about, throw it.", box: {}, obstacles: [FLOOR] },
+  // Opened without gravity: its floor tells where down is.
+  { id: "upright", title: "Cube over a floor, z upwards", about: "It has no gravity until you give it some.", box: { floor: false, height: 0 }, gravity: [0, 0, 0], obstacles: [{ ...FLOOR, pose: [0, 0, -0.2, Math.SQRT1_2, 0, 0, Math.SQRT1_2] }] },
   { id: "float", title: "Weightless cube", about: "The same cube without gravity: push it, and it goes away slowly.", box: { floor: false, height: 0 }, gravity: [0, 0, 0], obstacles: [] },
   {
     id: "obstacles",
@@ -51,7 +54,7 @@ export function makeScene(id, generation, options) {
         radius: 0.087,
         mass: 0.11,
         fixed: false,
-        material: { young: 2000, poisson: 0.45, density: 110 },
+        material: MATERIAL,
         recordable: true,
         certificate: [
           "force error 0.23 % at most, 0.12 % in the median (one place pressed in 50 ms, over 500 ms)",
@@ -62,6 +65,7 @@ export function makeScene(id, generation, options) {
     ],
     obstacles: found.obstacles,
     devices,
+    own: { step_s: 0.001, gravity: box.gravity, obstacles: found.obstacles, devices, materials: [MATERIAL] },
     view: { center: box.position, radius: found.obstacles.length > 1 ? 0.17 : 0.087 },
   };
   return { box, message };

@@ -51,10 +51,14 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     generation++;
     const { gravity, friction, coupling } = scene.box;
     const same = id === scene.message.id;
+    const [{ material }] = scene.message.objects;
     scene = makeScene(id, generation, options);
     if (upload !== null) Object.assign(scene.message, { id: null, title: upload, about: "Your own mesh." });
     // A reset keeps changed settings.
-    if (same) Object.assign(scene.box, { gravity, friction, coupling });
+    if (same) {
+      Object.assign(scene.box, { gravity, friction, coupling });
+      scene.message.objects[0].material = material;
+    }
     tell();
   }
 
@@ -98,7 +102,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
     return createReadStream(file).pipe(response);
   });
 
-  function record(job, upload = null) {
+  function record(job, upload = null, material = null) {
     let share = 0;
     const timer = setInterval(() => {
       share += 0.1;
@@ -106,6 +110,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       if (share < 1) return broadcast({ type: "progress", job, phase, fraction: share });
       clearInterval(timer);
       broadcast({ type: "progress", job, phase: "certificate", fraction: 1, done: true });
+      if (material !== null) scene.message.objects[0].material = material;
       return open(scene.message.id, upload);
     }, 300);
     timer.unref();
@@ -169,7 +174,7 @@ export function serve({ port = 0, kind = "live", logs = 1, cells = 12, modes = 6
       generation++;
       return tell();
     },
-    set_material: () => record("cube"),
+    set_material: (_, { young, poisson, density }) => record("cube", null, { young, poisson, density }),
     stream: (viewer, { format, stride }) => Object.assign(viewer, { format, stride }),
     sound: (viewer, { on }) => {
       clearInterval(viewer.tone);

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { SceneMessage } from "../../src/protocol/messages";
 import { complaint } from "../../src/ui/number_field";
-import { OwnSettings, physicsOf } from "../../src/ui/physics_settings";
+import { changeTo, physicsOf, restoration } from "../../src/ui/physics_settings";
 
 const scene = (title: string, change: { gravity?: number; step_s?: number; friction?: number; stiffness?: number } = {}): SceneMessage => {
   const { gravity = 9.81, step_s = 0.001, friction = 0.5, stiffness = 200 } = change;
@@ -14,22 +14,23 @@ test("settings are those of the first pointer", () => {
 });
 
 test("only what was changed goes back to what the scene came with", () => {
-  const own = new OwnSettings();
-  own.note(scene("a"));
-  expect(own.restoration(scene("a"))).toBeNull();
-  const changed = scene("a", { gravity: 1.62, stiffness: 300 });
-  own.note(changed);
-  expect(own.restoration(changed)).toEqual({ type: "set_physics", gravity: [0, -9.81, 0], coupling: { stiffness: 200, damping: 0.5 } });
-  own.note(scene("a", { friction: 0.1, step_s: 0.002 }));
-  expect(own.restoration(scene("a", { friction: 0.1, step_s: 0.002 }))).toEqual({ type: "set_physics", step: 0.001, friction: 0.5 });
+  const own = { ...scene("a"), materials: [] };
+  const back = (change: Parameters<typeof scene>[1]) => restoration({ ...scene("a", change), own });
+  expect(back({})).toBeNull();
+  expect(back({ gravity: 1.62, stiffness: 300 })).toEqual({ type: "set_physics", gravity: [0, -9.81, 0], coupling: { stiffness: 200, damping: 0.5 } });
+  expect(back({ friction: 0.1, step_s: 0.002 })).toEqual({ type: "set_physics", step: 0.001, friction: 0.5 });
 });
 
-test("a scene that is opened again comes with the settings of that start", () => {
-  const own = new OwnSettings();
-  own.note(scene("a", { gravity: 3 }));
-  own.note(scene("b"));
-  own.note(scene("a"));
-  expect(own.restoration(scene("a", { gravity: 3 }))).toEqual({ type: "set_physics", gravity: [0, -9.81, 0] });
+test("gravity that was 0 comes back along the scene's down direction", () => {
+  const floor = (normal: readonly number[]) => ({ name: "floor", shape: { plane: {} }, pose: [0, 0, 0, ...normal], friction: 0.5 });
+  // Turns y to z, and to −x.
+  const [upwards, tilted] = [floor([Math.SQRT1_2, 0, 0, Math.SQRT1_2]), floor([0, 0, Math.SQRT1_2, Math.SQRT1_2])];
+  const raised = (change: Partial<SceneMessage>) => changeTo({ gravity: 2 }, { ...scene("a", { gravity: 0 }), ...change })?.gravity?.map((x) => Math.round(x * 1e9) / 1e9 + 0);
+  expect(raised({})).toEqual([0, -2, 0]);
+  expect(raised({ obstacles: [upwards, tilted] })).toEqual([0, 0, -2]);
+  expect(raised({ obstacles: [tilted] })).toEqual([2, 0, 0]);
+  expect(raised({ obstacles: [tilted], own: { ...scene("a"), gravity: [0, 0, -9.81], materials: [] } })).toEqual([0, 0, -2]);
+  expect(raised({ obstacles: [upwards], gravity: [3, 0, 0] })).toEqual([2, 0, 0]);
 });
 
 test("a field complains in its own unit", () => {

@@ -30,7 +30,7 @@ type Path = fn(f64) -> [f64; 3];
 const ROW_INTERVAL_S: f64 = 0.002;
 
 /// All built-in scenes; the first is the default.
-pub const BUILT_IN_SCENES: [BuiltInScene; 12] = [
+pub const BUILT_IN_SCENES: [BuiltInScene; 13] = [
     BuiltInScene {
         id: "bounce",
         title: "A soft cube falls and bounces",
@@ -287,6 +287,7 @@ path = { file = "back.csv", repeat = true }
     soft_scenes::LIVER,
     soft_scenes::JELLY,
     soft_scenes::GRIPPER,
+    soft_scenes::DUCK,
     instruments::BAR,
     instruments::FORK,
     instruments::BELL,

@@ -1,4 +1,4 @@
-//! Built-in scenes of soft bodies: a liver with a lump to be found, a jelly that wobbles, and a gripper of two soft fingers.
+//! Built-in scenes of soft bodies: a liver with a lump to be found, a jelly that wobbles, a gripper of two soft fingers, and a duck.
 
 use super::built_in::{BuiltInScene, between};
 use crate::recipe::RecordingRecipe;
@@ -125,6 +125,46 @@ fn gripping(side: f64, t: f64) -> [f64; 3] {
     [side * (HALF_CUBE + HALF_FINGER + away), FINGER_HEIGHT + above + lift, 0.0]
 }
 
+pub(super) const DUCK: BuiltInScene = BuiltInScene {
+    id: "duck",
+    title: "A rubber duck",
+    about: "A bath duck of foam rubber. Squeeze it between two fingers, bend its neck, stroke its head, throw it: it slides back.",
+    text: r#"
+gravity = [0.0, -9.81, 0.0]
+[[object]]
+name = "duck"
+recording = "@duck"
+position = [0.0, 0.07, 0.0]
+[[plane]]
+name = "floor"
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+friction = 1.0
+[[plane]]
+name = "left-bank"
+point = [-0.15, 0.0, 0.0]
+normal = [0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "right-bank"
+point = [0.15, 0.0, 0.0]
+normal = [-0.5, 0.866, 0.0]
+friction = 0.2
+[[plane]]
+name = "front-bank"
+point = [0.0, 0.0, 0.15]
+normal = [0.0, 0.866, -0.5]
+friction = 0.2
+[[plane]]
+name = "back-bank"
+point = [0.0, 0.0, -0.15]
+normal = [0.0, 0.866, 0.5]
+friction = 0.2
+"#,
+    paths: &[],
+    period_s: 0.0,
+};
+
 /// Recipe of a soft body by its name in a built-in scene.
 pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
     let of = |source: &str, (young, poisson, density), modes: usize, (alpha, beta)| RecordingRecipe {
@@ -149,6 +189,7 @@ pub(super) fn recipe(name: &str) -> Option<RecordingRecipe> {
             fix: vec!["underside".into()],
             ..of("body:jelly", (4000.0, 0.45, 1010.0), 80, (1.0, 1e-3))
         },
+        "duck" => of("body:duck", (3e4, 0.3, 100.0), 80, (4.0, 5e-4)),
         "morsel" => of("box:0.05x0.05x0.05/8x8x8", (5000.0, 0.4, 200.0), 60, (2.0, 1e-3)),
         "finger" => RecordingRecipe {
             fix: vec!["y>0.0399".into()],

@@ -59,8 +59,9 @@ impl Manager {
                 self.claim_and_spawn_job("scene", viewer, move |provider, job| provider.open(&id, job));
             }
             Command::ChangeMaterial(object, material, viewer) => {
+                let before = self.current_scene();
                 self.claim_and_spawn_job("material", viewer, move |provider, job| {
-                    provider.change_material(object, material, job)
+                    Ok(provider.change_material(object, material, job)?.changed_from(&before))
                 });
             }
             Command::Record(upload, permit) => {
@@ -71,6 +72,7 @@ impl Manager {
             }
             Command::ChangePhysics(settings) => match self.provider.change_physics(&settings) {
                 Ok(scene) => {
+                    let scene = scene.changed_from(&self.current_scene());
                     let resumed = self.stop().filter(|_| is_resumable(&scene));
                     self.start_scene(scene, resumed);
                 }
@@ -78,8 +80,7 @@ impl Manager {
             },
             Command::Reset => {
                 self.stop();
-                let scene = self.channels.current.borrow().scene.clone();
-                self.start_scene(scene, None);
+                self.start_scene(self.current_scene(), None);
             }
             Command::JobDone(result, permit) => {
                 let cancelled = permit.is_cancelled();
@@ -96,6 +97,10 @@ impl Manager {
             Command::SendStatus => self.send_status(),
             Command::End => {}
         }
+    }
+
+    fn current_scene(&self) -> ViewerScene {
+        self.channels.current.borrow().scene.clone()
     }
 
     /// Runs a job of a viewer, unless one runs already.

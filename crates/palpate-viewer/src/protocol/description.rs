@@ -30,9 +30,27 @@ pub struct SceneDescription {
     pub warnings: Vec<String>,
     /// Region that the camera shows at first.
     pub view: View,
+    /// Settings of the scene as it was opened, of a live scene: what a page has changed since then is not among them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<OwnSettings>,
     /// Frames, of a log.
     #[serde(flatten)]
     pub frames: Option<FrameTimes>,
+}
+
+/// Settings of a scene that pages change.
+#[derive(Debug, Clone, Serialize)]
+pub struct OwnSettings {
+    /// Time step [s].
+    pub step_s: f64,
+    /// Gravity [m/s², world].
+    pub gravity: [f64; 3],
+    /// Obstacles, with their friction.
+    pub obstacles: Vec<ObstacleDescription>,
+    /// Devices, with their friction and virtual coupling.
+    pub devices: Vec<DeviceDescription>,
+    /// Material of each object; none for several.
+    pub materials: Vec<Option<MaterialDescription>>,
 }
 
 /// Frames of a log.
@@ -255,7 +273,21 @@ impl SceneDescription {
             devices: devices.iter().zip(parameters).map(device).collect(),
             warnings: Vec::new(),
             view: view(model),
+            own: None,
             frames: None,
+        }
+    }
+}
+
+impl OwnSettings {
+    /// Present settings of a scene.
+    pub fn of(scene: &SceneDescription) -> Self {
+        Self {
+            step_s: scene.step_s,
+            gravity: scene.gravity,
+            obstacles: scene.obstacles.clone(),
+            devices: scene.devices.clone(),
+            materials: scene.objects.iter().map(|object| object.material).collect(),
         }
     }
 }

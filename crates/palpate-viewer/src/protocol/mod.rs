@@ -9,7 +9,7 @@ mod surface;
 
 pub use description::{
     CouplingDescription, DeviceDescription, FrameTimes, MaterialDescription, ObjectDescription,
-    ObstacleDescription, SceneDescription, ShapeDescription, View,
+    ObstacleDescription, OwnSettings, SceneDescription, ShapeDescription, View,
 };
 pub use frame::{FrameEncoder, FrameFormat};
 #[cfg(feature = "logs")]

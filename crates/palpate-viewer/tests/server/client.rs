@@ -5,9 +5,9 @@ use palpate::{Coupling, DeviceParameters, Model, ModelObject, ModelParameters, O
 use palpate_haptics::Scheduling;
 use palpate_testkit::{finger, floor, free_block, start_at};
 use palpate_viewer::{
-    JobControl, Limits, Live, MaterialDescription, ObjectDescription, PhysicsSettings, SceneDescription,
-    SceneError, SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload, ViewerDevice,
-    ViewerScene,
+    JobControl, Limits, Live, MaterialDescription, ObjectDescription, OwnSettings, PhysicsSettings,
+    SceneDescription, SceneError, SceneProvider, SceneSummary, ServedContent, Server, Settings, Upload,
+    ViewerDevice, ViewerScene,
 };
 use serde_json::Value;
 use std::io::{Read, Write};
@@ -39,7 +39,8 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
     let object = ObjectDescription::new("body", &recording, vec!["a line".into()], true);
     let devices = [("left".to_string(), true), ("right".to_string(), true)];
     let titles = (Some("float".into()), "A body".into(), "It floats.".into());
-    let description = SceneDescription::new(titles, &model, vec![object], &["floor".into()], &devices);
+    let mut description = SceneDescription::new(titles, &model, vec![object], &["floor".into()], &devices);
+    description.own = Some(OwnSettings::of(&description));
     ViewerScene {
         description,
         model,

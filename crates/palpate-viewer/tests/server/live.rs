@@ -132,12 +132,22 @@ fn physics_changes_keep_the_state_and_reset_restarts() {
     // Without gravity again, it resumes from there.
     page.send(r#"{"type":"set_physics","gravity":[0,0,0],"step":0.002}"#);
     assert_eq!(page.wait("scene")["step_s"], 0.002);
+    // A viewer that comes now learns the settings that the scene was opened with.
+    let came = served.page().wait("scene");
+    let own = &came["own"];
+    assert_eq!(
+        (&came["step_s"], &own["step_s"], &own["gravity"][1]),
+        (&0.002.into(), &0.001.into(), &0.0.into())
+    );
+    let (materials, devices) = (&own["materials"], &own["devices"]);
+    assert_eq!((&materials[0], devices), (&came["objects"][0]["material"], &came["devices"]));
     let on = page.frame(&shapes, |frame| frame.generation as u64 == first + 2);
     assert!(on.position.y <= fallen.position.y, "{} {}", on.position, fallen.position);
     page.send(r#"{"type":"reset"}"#);
     page.wait("scene");
     let restarted = page.frame(&shapes, |frame| frame.generation as u64 == first + 3);
     assert_eq!(restarted.position, DVec3::ZERO);
+    assert_eq!(served.page().wait("scene")["own"]["step_s"], 0.001);
     // A failed command is reported, and the scene keeps running.
     page.send(r#"{"type":"open_scene","scene":"nowhere"}"#);
     assert_eq!(page.wait("error")["text"], "there is no scene \"nowhere\"");

@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// viewer with the built-in scenes, where you poke, squeeze and throw.
 #[derive(Args)]
 pub struct Arguments {
-    /// Initial scene of the viewer: bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, bar, fork, bell
+    /// Initial scene of the viewer: bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, duck, bar, fork, bell
     #[arg(value_name = "NAME", default_value = BUILT_IN_SCENES[0].id, value_parser = BUILT_IN_SCENES.map(|scene| scene.id))]
     name: String,
     /// Folder for what is written

@@ -44,7 +44,7 @@ In place of young and poisson a table may have name = \"liver\", or for anisotro
   stiffness = [21 numbers]          # upper triangle by rows; xx, yy, zz, yz, xz, xy; Pa
   axes = [[1, 0, 0], [0, 1, 0]]     # the material's first and second axis in the mesh")]
 pub struct Arguments {
-    /// A mesh file (`-` for standard input) of solid elements (Gmsh, VTK, VTU, TetGen, MEDIT, Vega, Abaqus) or of a closed surface (STL, OBJ, PLY, OFF, glTF), see `palpate mesh --help`; box:LXxLYxLZ/NXxNYxNZ (metres / cells; five tetrahedra per cell, or six with /6 after it: for thin plates), sphere:RADIUS/N, instrument:bar, instrument:fork, instrument:bell, body:liver/CELL (metres) or body:jelly/RINGS
+    /// A mesh file (`-` for standard input) of solid elements (Gmsh, VTK, VTU, TetGen, MEDIT, Vega, Abaqus) or of a closed surface (STL, OBJ, PLY, OFF, glTF), see `palpate mesh --help`; box:LXxLYxLZ/NXxNYxNZ (metres / cells; five tetrahedra per cell, or six with /6 after it: for thin plates), sphere:RADIUS/N, instrument:bar, instrument:fork, instrument:bell, body:liver/CELL or body:duck/CELL (metres), body:jelly/RINGS
     pub source: String,
     /// The recording to write, `-` for standard output; may be left out with --dense
     #[arg(short, long, value_name = "OUT.palp", required_unless_present_any = ["dense", "dry_run"])]

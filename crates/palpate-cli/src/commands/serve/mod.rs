@@ -41,7 +41,7 @@ pub struct Arguments {
     /// A scene file, or one or two logs (.mcap); without one, the built-in scenes
     #[arg(value_name = "FILE", num_args = 0..=2)]
     files: Vec<PathBuf>,
-    /// The built-in scene to begin with: bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, bar, fork, bell
+    /// The built-in scene to begin with: bounce, shake, pinch, stack, ball, slab, liver, jelly, gripper, duck, bar, fork, bell
     #[arg(long, value_name = "ID", conflicts_with = "files")]
     scene: Option<String>,
     /// Server options

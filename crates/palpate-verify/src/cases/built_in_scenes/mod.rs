@@ -42,7 +42,7 @@ struct BuiltIn {
     lies_flat: bool,
 }
 
-const SCENES: [BuiltIn; 9] = [
+const SCENES: [BuiltIn; 10] = [
     BuiltIn {
         id: "bounce",
         middle: [0.0, 0.05, 0.0],
@@ -93,6 +93,13 @@ const SCENES: [BuiltIn; 9] = [
         reach: [0.06, 0.07, 0.03],
         is_driven: true,
         lies_flat: true,
+    },
+    BuiltIn {
+        id: "duck",
+        middle: [0.0, 0.05, 0.0],
+        reach: [0.25, 0.03, 0.25],
+        is_driven: false,
+        lies_flat: false,
     },
 ];
 
