@@ -1,6 +1,7 @@
 //! Path of a device or an obstacle: poses over time, linear between rows, constant before the first and after the last; and the
 //! course of a force.
 
+use crate::force_process::PoseTrajectory;
 use glam::{DQuat, DVec3};
 use palpate::Pose;
 use thiserror::Error as ThisError;
@@ -117,6 +118,11 @@ impl MotionPath {
     /// a step later, so that the base is not behind it.
     pub fn of_base(&self, end_s: f64, step_s: f64) -> DVec3 {
         self.at(end_s + 0.5 * step_s).position
+    }
+
+    /// Trajectory along the path.
+    pub fn into_trajectory(self) -> PoseTrajectory {
+        Box::new(move |time_s| self.at(time_s))
     }
 
     /// Pose [m, world] at a time [s]; the orientation is the identity if the rows have none.
