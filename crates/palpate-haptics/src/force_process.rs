@@ -1,16 +1,13 @@
 //! Force process (paper, section 3.2): newest positions in, one step, forces out.
 
 use crate::motion_check::Ball;
-use crate::motion_path::MotionPath;
+use crate::motion_path::{MotionPath, PoseTrajectory};
 use crate::port::{Effort, ForcePort, Motion};
 use crate::ramp::Ramp;
 use crate::safety_limits::RefusedMotions;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
-
-/// Pose of an obstacle or a clamp, asked for at the start and at the end of every step, by its simulated time [s]. It must not allocate.
-pub type PoseTrajectory = Box<dyn FnMut(f64) -> Pose + Send>;
 
 /// Motion of a scene's parts, in the model's order.
 #[derive(Default)]

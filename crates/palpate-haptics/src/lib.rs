@@ -72,10 +72,10 @@ pub use cycle_channel::{CycleReceiver, CycleSender, cycle_channel};
 pub use deformation_process::{DeformationProcess, Frame, FrameObject};
 #[doc(no_inline)]
 pub use error::{Error, LogError};
-pub use force_process::{ForceProcess, PoseTrajectory, SceneMotion, StepListener};
+pub use force_process::{ForceProcess, SceneMotion, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
 pub use input_record::{InputReader, InputRecord};
-pub use motion_path::{Columns, MotionPath, PathError, QuaternionError, unit_quaternion};
+pub use motion_path::{Columns, MotionPath, PathError, PoseTrajectory, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;
 pub use playback::Playback;
 pub use port::{DevicePort, Effort, ForcePort, Motion, port};

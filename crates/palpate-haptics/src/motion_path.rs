@@ -1,7 +1,6 @@
 //! Path of a device or an obstacle: poses over time, linear between rows, constant before the first and after the last; and the
 //! course of a force.
 
-use crate::force_process::PoseTrajectory;
 use glam::{DQuat, DVec3};
 use palpate::Pose;
 use thiserror::Error as ThisError;
@@ -27,6 +26,9 @@ pub struct MotionPath {
     has_orientations: bool,
     repeats: bool,
 }
+
+/// Pose of an obstacle or a clamp, asked for at the start and at the end of every step, by its simulated time [s]. It must not allocate.
+pub type PoseTrajectory = Box<dyn FnMut(f64) -> Pose + Send>;
 
 const POSITION: [&str; 4] = ["t", "x", "y", "z"];
 const FORCE: [&str; 4] = ["t", "fx", "fy", "fz"];

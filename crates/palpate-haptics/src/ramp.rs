@@ -2,7 +2,7 @@
 //!
 //! x ← x + (target − x)/n, n ← n − 1, with n steps left. The last part is the target itself, to the bit.
 
-use crate::force_process::PoseTrajectory;
+use crate::motion_path::PoseTrajectory;
 use glam::DVec3;
 use palpate::Pose;
 use triple_buffer::{Input, triple_buffer};
