@@ -58,6 +58,8 @@ fn python() -> Result<(), String> {
     build()?;
     wheel::install()?;
     let folders = ["python/tests", "bindings/python/tests"];
-    let tests = [&["-m", "pytest", "-q", "-p", "no:cacheprovider"], &folders[..]].concat();
+    // A process for each core: most of the time goes into programs that tests start and wait for.
+    let workers = ["-n", "auto", "--dist", "worksteal"];
+    let tests = [&["-m", "pytest", "-q", "-p", "no:cacheprovider"], &workers[..], &folders[..]].concat();
     run(Command::new(python).args(tests).env("PALPATE", program()).env("PYTHONDONTWRITEBYTECODE", "1"))
 }

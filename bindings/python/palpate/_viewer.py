@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 import webbrowser
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, Any, Union
 
 from palpate._errors import FileError, PalpateError
 from palpate._scene import Scene
@@ -30,6 +30,8 @@ _LINES = 20
 _NOTEBOOKS = ("http://localhost:*", "http://127.0.0.1:*", "https://localhost:*", "vscode-webview:")
 #: Time that a server may take to end in good order, before it is killed [s].
 _PATIENCE = 5
+#: Viewers by the notebook's cell that has opened them, each with the number of that run of the cell.
+_of_cells: dict[str, list[tuple[str, Viewer]]] = {}
 
 
 class Viewer:
@@ -137,9 +139,29 @@ class Viewer:
 
 def _is_notebook() -> bool:
     """Whether this runs in the kernel of a notebook."""
+    return getattr(_shell(), "kernel", None) is not None
+
+
+def _shell() -> Any:
+    """Shell of IPython, if this runs in one."""
     ipython = sys.modules.get("IPython")
-    shell = ipython.get_ipython() if ipython is not None else None
-    return getattr(shell, "kernel", None) is not None
+    return ipython.get_ipython() if ipython is not None else None
+
+
+def _cell_and_run() -> tuple[str, str] | None:
+    """Notebook's cell that runs, and the request that runs it; None where the notebook does not tell."""
+    parent: dict[str, Any] = getattr(_shell(), "get_parent", dict)()
+    cell, run = parent.get("metadata", {}).get("cellId"), parent.get("header", {}).get("msg_id")
+    return (cell, run) if cell and run else None
+
+
+def _close_of_earlier_runs(cell: str, run: str) -> None:
+    """Close what earlier runs of a cell have shown, since its new output takes their place."""
+    viewers = _of_cells.get(cell, [])
+    _of_cells[cell] = [(own, viewer) for own, viewer in viewers if own == run]
+    for own, viewer in viewers:
+        if own != run:
+            viewer.close()
 
 
 def view(
@@ -174,7 +196,7 @@ def view(
     Returns
     -------
     Viewer
-        Keep it: the page ends with :meth:`Viewer.close`, or with Python.
+        Keep it: the page ends with :meth:`Viewer.close`, or with Python. In a notebook it also ends when its cell runs again.
 
     Raises
     ------
@@ -192,7 +214,12 @@ def view(
     found = shutil.which(named)
     if found is None:
         raise FileError(f"the program {named!r} is not found, and palpate.view needs it: `cargo install --path crates/palpate-cli`, or give program=")
+    cell = _cell_and_run()
+    if cell is not None:
+        _close_of_earlier_runs(*cell)
     viewer = Viewer(scene, found, log, listen, height)
+    if cell is not None:
+        _of_cells[cell[0]].append((cell[1], viewer))
     if open_browser or open_browser is None and not viewer._is_framed:
         webbrowser.open_new_tab(viewer.url)
     return viewer

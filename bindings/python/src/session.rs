@@ -3,11 +3,10 @@
 //! The threads are those of `palpate run --realtime`. They never take the interpreter's lock: positions go to them, and outputs come back, through
 //! triple buffers.
 
-use crate::arrays::{Numbers, check_finite};
 use crate::contacts::ContactLayout;
 use crate::device_mode::{ModeChange, mode_name};
 use crate::errors::{Class, catch_panic, exception, input_error, internal_error, scene_error};
-use crate::motion::check_devices;
+use crate::motion::{Arguments, check_devices};
 use crate::output::Output;
 use crate::progress::{SIGNAL_INTERVAL, warn};
 use crate::run_length::count_steps;
@@ -19,9 +18,8 @@ use crate::session_report::{report_by_name, timing_by_name};
 use crate::session_start::{LogFailure, begin_log, check_start, scheduling};
 use crate::session_thread::{End, Running, lock};
 use crate::snapshot::Snapshot;
-use glam::DVec3;
 use palpate::State;
-use palpate_haptics::Snapshot as Newest;
+use palpate_haptics::{Playback, Snapshot as Newest};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex};
@@ -62,8 +60,8 @@ use std::time::{Duration, Instant};
 ///
 /// Notes
 /// -----
-/// A `with` block stops it at its end; so does the end of the interpreter, and when nothing refers to the session any more. Positions are
-/// held from one :meth:`move` to the next. A forked process has none of the threads, and cannot use the session.
+/// A `with` block stops it at its end; so does the end of the interpreter, and when nothing refers to the session any more. A forked process has
+/// none of the threads, and cannot use the session.
 #[pyclass(frozen, module = "palpate")]
 pub struct Session {
     scene: Py<Scene>,
@@ -120,38 +118,12 @@ impl Session {
         lock(&self.hands).change(&self.inner, change).map_err(|text| input_error(py, text))
     }
 
-    /// Write positions into hands.
-    fn place(
-        py: Python<'_>,
-        scene: &palpate_scene::Scene,
-        hands: &mut Hands,
-        given: &Bound<'_, PyAny>,
-        device: Option<usize>,
-    ) -> PyResult<()> {
-        if let Some(device) = device {
-            if !hands.is_moved(device) {
-                let name = &scene.devices[device].name;
-                return Err(input_error(py, format!("device {name:?} follows a path of the scene")));
-            }
-            let numbers = Numbers::read(given, "positions", &[Some(3)])?;
-            check_finite(py, "positions", numbers.as_slice()?, 3)?;
-            hands.place(device, DVec3::from_slice(numbers.as_slice()?));
-            return Ok(());
+    /// Exception of a step that could not be followed, once for all steps until then.
+    fn check_steps(&self, py: Python<'_>) -> PyResult<()> {
+        match self.running.lost_step.take() {
+            Some(text) => Err(exception(py, Class::Step, text)),
+            None => Ok(()),
         }
-        let numbers = Numbers::read(given, "positions", &[Some(scene.devices.len()), Some(3)])?;
-        let numbers = numbers.as_slice()?;
-        let moved: Vec<usize> = (0..scene.devices.len()).filter(|device| hands.is_moved(*device)).collect();
-        for &device in &moved {
-            let row = &numbers[3 * device..][..3];
-            if row.iter().any(|number| !number.is_finite()) {
-                let message = format!("row {device} of positions is {row:?}, expected finite numbers");
-                return Err(input_error(py, message));
-            }
-        }
-        for device in moved {
-            hands.place(device, DVec3::from_slice(&numbers[3 * device..]));
-        }
-        Ok(())
     }
 }
 
@@ -191,9 +163,12 @@ impl Session {
             check_start(&inner, objects).map_err(refused)?;
         }
         let begun = Instant::now();
-        let (mut hands, devices) = Hands::open(&inner, begun);
-        if let Some(positions) = positions {
-            Self::place(py, &inner, &mut hands, positions, None)?;
+        let playback = Arc::new(Playback::default());
+        let (mut hands, devices) = Hands::open(&inner, begun, Arc::clone(&playback));
+        if positions.is_some() {
+            let arguments = Arguments { positions, obstacles: None, clamps: None };
+            let first = hands.read(py, &inner, &arguments, None, None)?;
+            hands.make(&first);
         }
         let state = py.detach(|| {
             catch_panic(|| match &objects {
@@ -202,17 +177,20 @@ impl Session {
             })
         });
         let state = state.map_err(|text| internal_error(py, &text))?;
-        let session = palpate_haptics::Session {
+        let mut session = palpate_haptics::Session {
             steps,
             device_timeout_s: timeout.unwrap_or(f64::INFINITY),
+            playback,
             ..inner.session(devices, begun, scheduling)
         };
+        hands.take_over(&inner, &mut session.motion);
         let log_failure = LogFailure::default();
         let log = log
             .map(|FilePath(path)| begin_log(py, &scene, &inner, &path, (&state, &log_failure)))
             .transpose()?;
         let first = Newest::new(&inner.model, &state, &inner.input_at(0.0));
-        let running = Running::start(session, state, &first, log).map_err(|failure| failure.exception(py))?;
+        let running =
+            Running::start(session, &inner, state, &first, log).map_err(|failure| failure.exception(py))?;
         let layout = Arc::new(ContactLayout::new(&inner));
         Ok(Self { scene, inner, layout, hands: Mutex::new(hands), running, log_failure })
     }
@@ -223,32 +201,47 @@ impl Session {
         self.scene.clone_ref(py)
     }
 
-    /// Move hands; the force process takes the newest positions at its next step.
+    /// Move hands, planes, obstacles and clamps: from where they are in a straight line to what is given, from the next step on.
     ///
     /// Parameters
     /// ----------
-    /// positions : array_like
-    ///     Positions of all hands [m, world], shape (devices, 3); a row of a device with `mode = "force"` is its force on the object [N]. Rows of
-    ///     devices that follow a path of the scene are not used.
+    /// positions : array_like, optional
+    ///     Positions of all hands [m, world], shape (devices, 3); a row of a device with `mode = "force"` is its force on the object [N], which holds
+    ///     from the next step on. Rows of devices that follow a path of the scene are not used, here and below.
     /// device : str or int, optional
     ///     Name or number of one device: `positions` is its own, shape (3,).
+    /// obstacles : array_like, optional
+    ///     Poses of planes and obstacles, shape (obstacles, 7): x, y, z [m], qw, qx, qy, qz.
+    /// clamps : array_like, optional
+    ///     Frames of the clamps, likewise.
+    /// over : float, optional
+    ///     Time to get there [s, by the clock]; 0: within one step. Without it that since the last move, at most 0.1 s, so that moves at 10 Hz
+    ///     and more make an even motion. The first position of a hand is where it begins.
     ///
     /// Raises
     /// ------
     /// InputError
-    ///     If the array has another shape, or numbers that are not finite. Nothing has moved then.
+    ///     If an array has another shape, or numbers that are not finite. Nothing has moved then.
+    /// StepError
+    ///     If a step could not be followed, as in :meth:`Simulation.step`; it is told once, and the session goes on. Nothing has moved then.
     /// PalpateError
     ///     If the session has ended.
-    #[pyo3(signature = (positions, device=None), name = "move")]
+    #[pyo3(signature = (positions=None, device=None, *, obstacles=None, clamps=None, over=None), name = "move")]
     fn move_hands(
         &self,
         py: Python<'_>,
-        positions: &Bound<'_, PyAny>,
+        positions: Option<&Bound<'_, PyAny>>,
         device: Option<&Bound<'_, PyAny>>,
+        obstacles: Option<&Bound<'_, PyAny>>,
+        clamps: Option<&Bound<'_, PyAny>>,
+        over: Option<f64>,
     ) -> PyResult<()> {
         self.live(py)?;
-        let device = device.map(|device| Scene::device(&self.inner, device)).transpose()?;
-        Self::place(py, &self.inner, &mut lock(&self.hands), positions, device)
+        self.check_steps(py)?;
+        let mut hands = lock(&self.hands);
+        let given = hands.read(py, &self.inner, &Arguments { positions, obstacles, clamps }, device, over)?;
+        hands.make(&given);
+        Ok(())
     }
 
     /// Newest output: that of the last step, without waiting for the next.
@@ -260,6 +253,8 @@ impl Session {
     ///
     /// Raises
     /// ------
+    /// StepError
+    ///     If a step could not be followed, as in :meth:`Simulation.step`; it is told once, and the session goes on.
     /// PalpateError
     ///     If the session failed.
     fn newest(&self, py: Python<'_>) -> PyResult<Output> {
@@ -267,6 +262,7 @@ impl Session {
         if let Some(end) = running.end() {
             end.report.as_ref().map_err(|failure| failure.exception(py))?;
         }
+        self.check_steps(py)?;
         let (scene, layout) = (Arc::clone(&self.inner), Arc::clone(&self.layout));
         Ok(Output { scene, layout, snapshot: running.newest() })
     }
@@ -390,6 +386,8 @@ impl Session {
     ///
     /// Raises
     /// ------
+    /// StepError
+    ///     As :meth:`newest`.
     /// PalpateError
     ///     If the session failed; LogError if its log is not whole.
     #[pyo3(signature = (timeout=None))]
@@ -402,7 +400,9 @@ impl Session {
             let running = self.here(py)?;
             let left = timeout.map_or(f64::INFINITY, |timeout| timeout - begun.elapsed().as_secs_f64());
             let patience = left.clamp(0.0, SIGNAL_INTERVAL.as_secs_f64());
-            match py.detach(|| running.wait(Duration::from_secs_f64(patience))) {
+            let ended = py.detach(|| running.wait(Duration::from_secs_f64(patience)));
+            self.check_steps(py)?;
+            match ended {
                 Some(end) => return self.check_end(py, &end).map(|()| true),
                 None if left <= 0.0 => return Ok(false),
                 None => py.check_signals()?,
@@ -421,6 +421,8 @@ impl Session {
     ///
     /// Raises
     /// ------
+    /// StepError
+    ///     As :meth:`newest`; it has ended all the same.
     /// PalpateError
     ///     If the session failed; LogError if its log is not whole.
     fn stop<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -429,6 +431,7 @@ impl Session {
         let end = py.detach(|| running.join());
         let report = end.report.as_ref().map_err(|failure| failure.exception(py))?;
         self.check_end(py, &end)?;
+        self.check_steps(py)?;
         report_by_name(py, &self.inner, report)
     }
 

@@ -1,13 +1,13 @@
 //! Threads of a session: started, watched and stopped without the interpreter's lock.
 
 use crate::errors::{Class, catch_panic, exception, internal_error};
-use palpate::State;
+use palpate::{Input, State};
 use palpate_haptics::log::{LogSender, LogWriter};
 use palpate_haptics::{
     CycleReceiver, Error, Playback, Report, Session, Snapshot, SnapshotReader, Timing, cycle_channel,
     snapshot_buffer,
 };
-use palpate_scene::{GrowingLog, SceneError};
+use palpate_scene::{GrowingLog, Scene, SceneError};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
@@ -32,6 +32,8 @@ pub struct Running {
     pub playback: Arc<Playback>,
     newest: Mutex<SnapshotReader>,
     cycles: Mutex<(CycleReceiver, Timing)>,
+    /// Step that could not be followed.
+    pub lost_step: Arc<LostStep>,
     end: Mutex<Option<Arc<End>>>,
     ended: Condvar,
 }
@@ -61,6 +63,39 @@ impl SessionFailure {
     }
 }
 
+/// Text about a step that could not be followed, until the caller is told.
+#[derive(Default)]
+pub struct LostStep {
+    is_lost: AtomicBool,
+    text: Mutex<Option<String>>,
+}
+
+impl LostStep {
+    /// Check a step, but while the caller has not been told of an earlier one.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call where the step was followed.
+    fn check(&self, scene: &Scene, input: &Input, state: &State) {
+        if self.is_lost.load(Ordering::Acquire) {
+            return;
+        }
+        if let Err(text) = scene.check_step(input, state) {
+            *lock(&self.text) = Some(text);
+            self.is_lost.store(true, Ordering::Release);
+        }
+    }
+
+    /// Text, once.
+    pub fn take(&self) -> Option<String> {
+        if !self.is_lost.load(Ordering::Acquire) {
+            return None;
+        }
+        let text = lock(&self.text).take();
+        self.is_lost.store(false, Ordering::Release);
+        text
+    }
+}
+
 /// Guard of a mutex; what a panic left is whole, since nothing is written in parts.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -70,6 +105,7 @@ impl Running {
     /// Start a session at a state, whose first snapshot is given.
     pub fn start(
         session: Session,
+        scene: &Arc<Scene>,
         state: State,
         first: &Snapshot,
         log: Option<SessionLog>,
@@ -84,13 +120,18 @@ impl Running {
             playback: session.playback.clone(),
             newest: Mutex::new(newest),
             cycles: Mutex::new((cycle_receiver, Timing::default())),
+            lost_step: Arc::default(),
             end: Mutex::new(None),
             ended: Condvar::new(),
         });
+        let (scene, lost_step) = (Arc::clone(scene), Arc::clone(&running.lost_step));
         let session = Session {
             state: Some(state),
             cycles: Some(cycle_sender),
-            listener: Some(Box::new(move |input, state| writer.publish(state.step_count(), input, state))),
+            listener: Some(Box::new(move |input, state| {
+                writer.publish(state.step_count(), input, state);
+                lost_step.check(&scene, input, state);
+            })),
             ..session
         };
         let own = Arc::clone(&running);

@@ -88,7 +88,7 @@ def test_a_hand_that_is_moved_meanwhile_is_in_the_log_and_repeats(touching, pres
         for position in press[::5] + [0, 0, 0.0045]:
             session.move(position)
             steps_of(session, 2)
-        session.move([0, 0, 0.2], device="finger")
+        session.move([0, 0, 0.2], device="finger", over=0)
         assert steps_of(session, 2).positions[0, 2] == 0.2
     log = palpate.Log(tmp_path / "run.mcap")
     positions, forces = log.positions["finger"], log.forces["finger"]
@@ -100,6 +100,90 @@ def test_a_hand_that_is_moved_meanwhile_is_in_the_log_and_repeats(touching, pres
     simulation.run(positions[:begun, None])
     simulation.release("finger")
     assert np.array_equal(simulation.run(positions[begun:, None])["forces"][:, 0], forces[begun:])
+
+
+def test_a_slow_caller_moves_a_hand_evenly(touching, tmp_path, palpate_run):
+    with palpate.Session(touching, positions=[[0, 0, 0.2]], log=tmp_path / "run.mcap") as session:
+        for height in np.arange(0.21, 0.3, 0.01):
+            steps_of(session, 20)
+            session.move([[0, 0, height]])
+        until(lambda: session.newest().positions[0, 2] == height)
+    heights = palpate.Log(tmp_path / "run.mcap").positions["finger"][:, 2]
+    # All steps go up, by about a twentieth of a move, or a tenth where a move began before the last one had ended.
+    assert heights[-1] == height and 0 <= np.diff(heights).min() and np.diff(heights).max() < 0.01 / 5
+    assert "every number came out again, bit for bit" in palpate_run("replay", tmp_path / "run.mcap")
+
+
+def test_a_move_takes_the_time_that_it_is_given(touching, tmp_path):
+    with palpate.Session(touching, positions=[[0, 0, 0.2]], log=tmp_path / "run.mcap") as session:
+        steps_of(session, 1)
+        session.move([0.05, 0, 0.2], "finger", over=0.05)
+        # A change of mode does not begin the way anew.
+        session.deactivate("finger"), session.release("finger")
+        until(lambda: session.newest().positions[0, 0] == 0.05)
+        session.slowdown = 2
+        session.move([[0, 0, 0.2]], over=0.05)
+        until(lambda: session.newest().positions[0, 0] == 0)
+        session.move([0, 0, 0.5], "finger", over=0)
+        assert steps_of(session, 2).positions[0, 2] == 0.5
+        for wrong, text in [({"over": -1}, "over is -1 s"), ({"over": np.nan}, "over is NaN s"), ({}, "positions is missing"), ({"device": 0}, "positions is missing")]:
+            with pytest.raises(palpate.InputError, match=text):
+                session.move(**({"positions": [[0, 0, 1]]} if "over" in wrong else {}), **wrong)
+    moved = np.diff(palpate.Log(tmp_path / "run.mcap").positions["finger"][:, 0])
+    there, back = moved[moved > 0], moved[moved < 0]
+    assert len(back) == 25 and np.allclose(back, -0.05 / 25, rtol=1e-9)
+    assert len(there) == 50 and np.allclose(there, 0.05 / 50, rtol=1e-9)
+
+
+def test_obstacles_and_clamps_are_moved_and_repeat(cube, tmp_path, palpate_run):
+    jaw = palpate.Clamp("jaw", object="cube", face={"point": [0.05, 0, 0]}, max_cells=4)
+    ball = palpate.Obstacle("ball", sphere={"radius": 0.02}, position=[-0.2, 0, 0])
+    rail = palpate.Obstacle("rail", sphere={"radius": 0.02}, path=np.array([[0, 0, 0, 1], [1, 0, 0, 2]]))
+    scene = palpate.Scene([palpate.Object("cube", cube)], clamps=[jaw], obstacles=[ball, rail], **LIMITS)
+    rest = [[0, 0, 0, 1, 0, 0, 0]]
+    moved = np.array([[-0.065, 0, 0, 1, 0, 0, 0], [np.nan] * 7])  # the row of one on a path is not used
+    with palpate.Session(scene, log=tmp_path / "run.mcap") as session:
+        session.move(obstacles=moved, over=0.05)
+        pressed = steps_of(session, 80)
+        assert pressed.obstacle_forces[0, 0] < -0.1 and not pressed.obstacle_forces[1].any()
+        turn = [np.cos(0.05), np.sin(0.05), 0, 0]
+        session.move(clamps=[[0.002, 0, 0, *turn]])
+        turned = steps_of(session, 150)
+        assert np.abs(turned.clamp_loads - pressed.clamp_loads).max() > 0.01
+        session.move(obstacles=[[-0.2, 0, 0, 1, 0, 0, 0]] * 2, clamps=rest)
+        steps_of(session, 150)
+        for wrong, text in [
+            ({"obstacles": rest}, r"obstacles has the shape \(1, 7\), expected \(2, 7\)"),
+            ({"clamps": [[np.inf] * 7]}, "row 0 of clamps"),
+            ({"clamps": [[0, 0, 0, 2, 0, 0, 0]]}, "the quaternion .* has the length 2"),
+        ]:
+            with pytest.raises(palpate.InputError, match=text):
+                session.move(**wrong)
+        assert not session.newest().obstacle_forces.any()
+    assert "every number came out again, bit for bit" in palpate_run("replay", tmp_path / "run.mcap")
+
+
+def test_a_step_that_could_not_be_followed_is_told_once_and_the_session_goes_on(held):
+    start = palpate.Simulation(held).held_points()
+    with palpate.Session(held, positions=start) as session:
+        steps_of(session, 2)
+        session.move(start + [5, 0, 0], over=0)
+        with pytest.raises(palpate.StepError, match="the held points can't be met.* the hand of \"hand\" is"):
+            until(lambda: session.newest() is None)
+        session.deactivate("hand")
+        at = session.steps
+        until(lambda: session.steps > at + 5)
+        for told in range(2):
+            try:
+                session.newest()
+            except palpate.StepError:
+                assert told == 0  # of a step before the hand was gone
+        assert session.newest().step > at and session.is_running
+    with pytest.raises(palpate.StepError), palpate.Session(held, positions=start) as session:
+        session.move(start + [5, 0, 0], over=0)
+        at = session.steps
+        until(lambda: session.steps > at + 2)
+    assert not session.is_running and session.stop()["unsolved_steps"] > 0
 
 
 def test_grasps_and_forces_are_in_the_log_and_repeat(cube, tmp_path, palpate_run):
@@ -209,8 +293,7 @@ def test_a_silent_hand_lets_go_after_its_timeout(touching):
     hand = [[0, 0, 0.055]]
     with palpate.Session(touching, positions=hand, timeout=0.2) as session:
         until(lambda: not session.newest().forces.any() and session.steps > 100)
-        session.move(hand)
-        until(lambda: session.newest().forces.any())
+        until(lambda: session.move(hand) or session.newest().forces.any())
     with palpate.Session(touching, positions=hand, steps=400) as session:
         session.wait()
     assert session.newest().forces.any(), "without one it stays"

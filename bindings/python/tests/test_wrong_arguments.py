@@ -78,7 +78,7 @@ def scene(small):
     return palpate.Scene([palpate.Object("cube", small)], devices=[hand, palpate.Device("tip")], planes=[floor])
 
 
-@pytest.mark.parametrize("given", WRONG, ids=repr)
+@pytest.mark.parametrize("given", WRONG, ids=lambda given: repr(given).split(" at ")[0])
 class TestWrongArguments:
     def test_of_a_recording(self, given, small, tmp_path):
         body = {"young": 2e4, "poisson": 0.3, "density": 1000, "modes": 3, "order": 1}

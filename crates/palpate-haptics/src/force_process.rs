@@ -1,15 +1,26 @@
 //! Force process (paper, section 3.2): newest positions in, one step, forces out.
 
 use crate::motion_check::Ball;
-use crate::motion_path::MotionPath;
+use crate::motion_path::{MotionPath, PoseTrajectory};
 use crate::port::{Effort, ForcePort, Motion};
+use crate::ramp::Ramp;
 use crate::safety_limits::RefusedMotions;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, Input, Model, Output, Pose, State, step};
 use std::sync::Arc;
 
-/// Pose of an obstacle as a function of simulated time [s]. It must not allocate.
-pub type ObstacleTrajectory = Box<dyn Fn(f64) -> Pose + Send>;
+/// Motion of a scene's parts, in the model's order.
+#[derive(Default)]
+pub struct SceneMotion {
+    /// Trajectories, one for each obstacle.
+    pub obstacles: Vec<PoseTrajectory>,
+    /// Trajectories of the clamps' frames; `None` stays. None at all is the same.
+    pub clamps: Vec<Option<PoseTrajectory>>,
+    /// Paths of the bases of the objects with fixed nodes over simulated time, one for each object; `None` stays. None at all is the same.
+    pub bases: Vec<Option<MotionPath>>,
+    /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
+    pub gravity: Option<MotionPath>,
+}
 
 /// Listener to the input of every step and the state after it. It must not allocate, lock or call the system.
 pub type StepListener = Box<dyn FnMut(&Input, &State) + Send>;
@@ -26,6 +37,9 @@ struct DeviceSlot {
     path: Option<MotionPath>,
     /// Motion that was used last.
     motion: Motion,
+    /// Hand on its way to the position of the motion [m, world].
+    position: DVec3,
+    ramp: Ramp,
     /// Work that the proxy has done on the scene since the start [J], see [`Effort::absorbed_j`].
     proxy_work_j: f64,
     /// Proxy at the end of the last step [m, world].
@@ -41,13 +55,7 @@ pub struct ForceProcess {
     state: State,
     input: Input,
     slots: Vec<DeviceSlot>,
-    obstacle_trajectories: Vec<ObstacleTrajectory>,
-    /// Paths of the clamps' frames.
-    clamps: Vec<Option<MotionPath>>,
-    /// Paths of the bases of the objects.
-    bases: Vec<Option<MotionPath>>,
-    /// Gravity over simulated time [m/s²], if it changes.
-    gravity: Option<MotionPath>,
+    motion: SceneMotion,
     steps: u64,
     listener: Option<StepListener>,
     /// Silence of a device [s] after which it is inactive.
@@ -62,19 +70,23 @@ impl ForceProcess {
     pub fn new(
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        obstacle_trajectories: Vec<ObstacleTrajectory>,
+        obstacle_trajectories: Vec<PoseTrajectory>,
         device_timeout_s: f64,
     ) -> Self {
         let state = State::new(&model);
-        Self::from_state(state, model, devices, obstacle_trajectories, device_timeout_s)
+        let motion = SceneMotion { obstacles: obstacle_trajectories, ..SceneMotion::default() };
+        Self::from_state(state, model, devices, motion, device_timeout_s)
     }
 
-    /// Force process at a state of the model, otherwise as [`Self::new`].
+    /// Force process at a state of the model, with the motion of all parts, otherwise as [`Self::new`].
+    ///
+    /// # Panics
+    /// If the parts are not as many as the model's.
     pub fn from_state(
         state: State,
         model: Arc<Model>,
         devices: Vec<(ForcePort, DeviceMode)>,
-        obstacle_trajectories: Vec<ObstacleTrajectory>,
+        mut motion: SceneMotion,
         device_timeout_s: f64,
     ) -> Self {
         let coupling = |at: usize| model.parameters().devices.get(at).and_then(|device| device.coupling);
@@ -83,16 +95,20 @@ impl ForceProcess {
             mode,
             path: None,
             motion: Motion::default(),
+            position: DVec3::ZERO,
+            ramp: Ramp::default(),
             proxy_work_j: 0.0,
             proxy: DVec3::ZERO,
             stiffness: coupling(at).map_or(0.0, |coupling| coupling.stiffness),
             sequence: 0,
         });
         let slots: Vec<DeviceSlot> = slots.collect();
-        let obstacles = obstacle_trajectories.iter().map(|trajectory| trajectory(0.0)).collect();
+        let obstacles = motion.obstacles.iter_mut().map(|trajectory| trajectory(0.0)).collect();
         let clamps: Vec<Pose> = model.parameters().clamps.iter().map(|clamp| clamp.frame).collect();
-        let no_paths = vec![None; clamps.len()];
         let objects = model.recordings().count();
+        let fits = |given: usize, parts: usize| given == 0 || given == parts;
+        assert!(fits(motion.clamps.len(), clamps.len()), "one trajectory for each clamp");
+        assert!(fits(motion.bases.len(), objects), "one path for each object");
         let input = Input {
             devices: vec![DeviceInput::inactive(); slots.len()],
             obstacles,
@@ -107,10 +123,7 @@ impl ForceProcess {
             state,
             input,
             slots,
-            obstacle_trajectories,
-            clamps: no_paths,
-            bases: vec![None; objects],
-            gravity: None,
+            motion,
             steps: 0,
             listener: None,
             device_timeout_s,
@@ -124,29 +137,6 @@ impl ForceProcess {
     /// If the model has no such device.
     pub fn follow(&mut self, device: usize, path: MotionPath) {
         self.slots[device].path = Some(path);
-    }
-
-    /// Lets clamps follow paths in simulated time, in the model's order; those without one stay.
-    ///
-    /// # Panics
-    /// If their number is not the model's.
-    pub fn move_clamps(&mut self, paths: Vec<Option<MotionPath>>) {
-        assert_eq!(paths.len(), self.clamps.len(), "one path for each clamp");
-        self.clamps = paths;
-    }
-
-    /// Lets the bases of objects with fixed nodes follow paths in simulated time, in the order of the objects; those without one stay.
-    ///
-    /// # Panics
-    /// If their number is not that of the objects.
-    pub fn move_bases(&mut self, paths: Vec<Option<MotionPath>>) {
-        assert_eq!(paths.len(), self.bases.len(), "one path for each object");
-        self.bases = paths;
-    }
-
-    /// Lets gravity change in simulated time: rows of t [s] and x, y, z [m/s²].
-    pub fn change_gravity(&mut self, over_time: MotionPath) {
-        self.gravity = Some(over_time);
     }
 
     /// Hands the input of every step and the state after it to a listener.
@@ -216,8 +206,16 @@ impl ForceProcess {
             }
             let usable = slot.port.accepts(&motion, self.objects_at_start);
             if usable {
+                if motion.position != slot.motion.position {
+                    slot.ramp = Ramp::over(motion.over_s, step_s);
+                }
                 slot.motion = motion;
             }
+            // Who took no part begins where the hand is now.
+            if !input.mode.is_active() {
+                slot.ramp = Ramp::default();
+            }
+            slot.position = slot.ramp.advance(slot.position, slot.motion.position);
             // A motion of the future is as bad as an old one: a clock has jumped.
             let silent = !usable || (now_s - motion.time_s).abs() > self.device_timeout_s;
             let mode = match motion.mode.unwrap_or(slot.mode) {
@@ -226,18 +224,19 @@ impl ForceProcess {
                 _ if silent => DeviceMode::Suspended,
                 mode => mode,
             };
-            *input = DeviceInput { position: slot.motion.position, mode };
+            *input = DeviceInput { position: slot.position, mode };
         }
-        for (trajectory, pose) in self.obstacle_trajectories.iter().zip(&mut self.input.obstacles) {
+        let motion = &mut self.motion;
+        for (trajectory, pose) in motion.obstacles.iter_mut().zip(&mut self.input.obstacles) {
             *pose = trajectory(time_s);
         }
-        for (path, frame) in self.clamps.iter().zip(&mut self.input.clamps) {
-            path.iter().for_each(|path| *frame = path.at(time_s));
+        for (trajectory, frame) in motion.clamps.iter_mut().zip(&mut self.input.clamps) {
+            trajectory.iter_mut().for_each(|trajectory| *frame = trajectory(time_s));
         }
-        for (path, base) in self.bases.iter().zip(&mut self.input.bases) {
+        for (path, base) in motion.bases.iter().zip(&mut self.input.bases) {
             *base = path.as_ref().map(|path| path.of_base(time_s, step_s));
         }
-        self.input.gravity = self.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
+        self.input.gravity = motion.gravity.as_ref().map(|gravity| gravity.mid_step(time_s, step_s));
 
         let output = step(&self.model, &mut self.state, &self.input);
 
@@ -245,12 +244,12 @@ impl ForceProcess {
         for ((slot, input), device) in self.slots.iter_mut().zip(&self.input.devices).zip(&output.devices) {
             let force = device.force_on_hand;
             if !input.mode.is_active() {
-                slot.proxy = slot.motion.position;
+                slot.proxy = slot.position;
             } else {
                 slot.proxy_work_j -= force.dot(device.proxy - slot.proxy);
                 slot.proxy = device.proxy;
             }
-            let stretch = slot.motion.position - slot.proxy;
+            let stretch = slot.position - slot.proxy;
             let stored = 0.5 * slot.stiffness * stretch.length_squared();
             slot.sequence += 1;
             slot.port.send(Effort {

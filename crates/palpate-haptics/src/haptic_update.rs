@@ -176,7 +176,7 @@ impl HapticUpdate {
                 position: filtered,
                 orientation: self.mount.world_orientation(orientation),
                 buttons: reading.buttons,
-                mode: None,
+                ..Motion::default()
             });
         }
         if self.arm_by_button && reading.buttons & !self.buttons != 0 {

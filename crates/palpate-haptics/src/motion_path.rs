@@ -27,6 +27,9 @@ pub struct MotionPath {
     repeats: bool,
 }
 
+/// Pose of an obstacle or a clamp, asked for at the start and at the end of every step, by its simulated time [s]. It must not allocate.
+pub type PoseTrajectory = Box<dyn FnMut(f64) -> Pose + Send>;
+
 const POSITION: [&str; 4] = ["t", "x", "y", "z"];
 const FORCE: [&str; 4] = ["t", "fx", "fy", "fz"];
 const POSE: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
@@ -117,6 +120,11 @@ impl MotionPath {
     /// a step later, so that the base is not behind it.
     pub fn of_base(&self, end_s: f64, step_s: f64) -> DVec3 {
         self.at(end_s + 0.5 * step_s).position
+    }
+
+    /// Trajectory along the path.
+    pub fn into_trajectory(self) -> PoseTrajectory {
+        Box::new(move |time_s| self.at(time_s))
     }
 
     /// Pose [m, world] at a time [s]; the orientation is the identity if the rows have none.

@@ -15,6 +15,8 @@ pub struct Motion {
     pub time_s: f64,
     /// Interface point [m, world].
     pub position: DVec3,
+    /// Simulated time in which the interface point gets there in a straight line [s]; 0: in one step. Links do not transmit it.
+    pub over_s: f64,
     /// Orientation of the handle: world from handle.
     pub orientation: DQuat,
     /// Pressed buttons, one bit each.
@@ -46,6 +48,7 @@ impl Default for Motion {
             sequence: 0,
             time_s: 0.0,
             position: DVec3::ZERO,
+            over_s: 0.0,
             orientation: DQuat::IDENTITY,
             buttons: 0,
             mode: None,

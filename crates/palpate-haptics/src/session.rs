@@ -4,7 +4,7 @@ use crate::clock::Clock;
 use crate::cycle_channel::CycleSender;
 use crate::device::{Device, DeviceSpec, Mount};
 use crate::error::{Error, SessionError};
-use crate::force_process::{ForceProcess, ObstacleTrajectory, StepListener};
+use crate::force_process::{ForceProcess, SceneMotion, StepListener};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
 use crate::log::{LogSender, LogSummary, LogWriter, WrittenLog};
 use crate::motion_path::MotionPath;
@@ -67,14 +67,8 @@ pub struct Session {
     pub start: Instant,
     /// Devices, one for each of the model's.
     pub devices: Vec<SessionDevice>,
-    /// Trajectories, one for each obstacle of the model.
-    pub obstacle_trajectories: Vec<ObstacleTrajectory>,
-    /// Paths of the clamps' frames over simulated time, one for each clamp of the model; `None` stays.
-    pub clamp_paths: Vec<Option<MotionPath>>,
-    /// Paths of the bases of the objects with fixed nodes over simulated time, one for each object; `None` stays. None at all is the same.
-    pub base_paths: Vec<Option<MotionPath>>,
-    /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
-    pub gravity: Option<MotionPath>,
+    /// Motion of the scene's parts.
+    pub motion: SceneMotion,
     /// Number of steps; `None` runs until it is stopped.
     pub steps: Option<u64>,
     /// Rate of the deformation process [Hz]; 0 for none.
@@ -179,23 +173,17 @@ impl Session {
         mut show: impl FnMut(&Snapshot) + Send,
     ) -> Result<(Report, Option<WrittenLog<W>>), Error> {
         self.check()?;
-        let Self { model, start, devices, obstacle_trajectories, frame_rate_hz, scheduling, .. } = self;
+        let Self { model, start, devices, motion, frame_rate_hz, scheduling, .. } = self;
         let (step_limit, device_timeout_s) = (self.steps, self.device_timeout_s);
         let (playback, cycles) = (self.playback, self.cycles);
         let step_s = model.parameters().step_s;
         let paths: Vec<Option<MotionPath>> = devices.iter().map(SessionDevice::path).collect();
         let (updates, slots) = connect(devices);
         let state = self.state.unwrap_or_else(|| State::new(&model));
-        let mut process =
-            ForceProcess::from_state(state, model.clone(), slots, obstacle_trajectories, device_timeout_s);
+        let mut process = ForceProcess::from_state(state, model.clone(), slots, motion, device_timeout_s);
         for (device, path) in paths.into_iter().enumerate() {
             path.into_iter().for_each(|path| process.follow(device, path));
         }
-        process.move_clamps(self.clamp_paths);
-        if !self.base_paths.is_empty() {
-            process.move_bases(self.base_paths);
-        }
-        self.gravity.into_iter().for_each(|gravity| process.change_gravity(gravity));
         self.listener.into_iter().for_each(|listener| process.listen(listener));
         let (snapshot_writer, mut snapshots) =
             snapshot_buffer(&Snapshot::new(&model, process.state(), process.input()));

@@ -33,6 +33,7 @@ mod log_maker;
 mod material_choice;
 #[cfg(feature = "native")]
 mod mesh_source;
+mod motion;
 #[cfg(feature = "native")]
 mod node_selection;
 #[cfg(feature = "native")]
@@ -75,6 +76,7 @@ pub use log_maker::LogMaker;
 pub use material_choice::MaterialChoice;
 #[cfg(feature = "native")]
 pub use mesh_source::{read_body, read_surface, source_name};
+pub use motion::MotionSource;
 #[cfg(feature = "native")]
 pub use node_selection::{NodeSelection, select_nodes, union_of_nodes};
 #[cfg(feature = "native")]

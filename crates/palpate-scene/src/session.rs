@@ -1,7 +1,7 @@
 //! Session of a scene: what its parts do in real time.
 
-use crate::scene::{Scene, SceneObstacle};
-use palpate_haptics::{ObstacleTrajectory, Scheduling, Session, SessionDevice};
+use crate::scene::Scene;
+use palpate_haptics::{Scheduling, Session, SessionDevice};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,19 +15,12 @@ impl Scene {
     /// Session with a device for each of the scene's, without an end: planes, obstacles, clamps, bases and gravity follow their paths in simulated
     /// time.
     pub fn session(&self, devices: Vec<SessionDevice>, start: Instant, scheduling: Scheduling) -> Session {
-        let trajectory = |obstacle: &SceneObstacle| -> ObstacleTrajectory {
-            let obstacle = obstacle.clone();
-            Box::new(move |time_s| obstacle.pose_at(time_s))
-        };
         Session {
             model: self.model.clone(),
             state: None,
             start,
             devices,
-            obstacle_trajectories: self.obstacles.iter().map(trajectory).collect(),
-            clamp_paths: self.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
-            base_paths: self.bases.clone(),
-            gravity: self.gravity.clone(),
+            motion: self.motion()(),
             steps: None,
             frame_rate_hz: FRAME_RATE_HZ,
             scheduling,

@@ -56,9 +56,7 @@ pub use protocol::{
 };
 #[cfg(feature = "server")]
 pub use scene_provider::{DeviceOpener, LogFile, LogOpener, OpenLog, PageNotifier};
-pub use scene_provider::{
-    JobControl, JobReport, SceneProvider, SharedTrajectory, Upload, ViewerDevice, ViewerScene,
-};
+pub use scene_provider::{JobControl, JobReport, SceneProvider, Upload, ViewerDevice, ViewerScene};
 #[cfg(feature = "server")]
 pub use server::{
     FrameAncestor, Limits, Live, RenderJob, ServedContent, Server, Settings, TlsIdentity, Token,

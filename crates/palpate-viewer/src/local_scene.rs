@@ -13,12 +13,12 @@ use crate::protocol::{
     SceneSummary, ServerMessage, Status, encode_sound,
 };
 use crate::scene_provider::{ViewerDevice, ViewerScene};
-use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ, is_resumable};
+use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ};
 use crate::static_data::StaticData;
 use palpate::{DeviceMode, Model, State};
 use palpate_haptics::{
-    Cycle, DevicePort, ForcePort, ForceProcess, InputRecord, ObstacleTrajectory, Overrun, Playback, Snapshot,
-    Timing, port, steps_per_frame,
+    Cycle, DevicePort, ForcePort, ForceProcess, InputRecord, Overrun, Playback, Snapshot, Timing, port,
+    steps_per_frame,
 };
 use palpate_sound::{SoundParameters, StepRecord, Synthesiser};
 use std::sync::Mutex;
@@ -152,7 +152,7 @@ impl LocalScene {
         resumes: bool,
         send: &mut dyn FnMut(PageMessage),
     ) -> Result<(), SceneError> {
-        let state = if resumes && is_resumable(&scene) {
+        let state = if resumes && scene.can_resume {
             State::resume(&scene.model, &self.process.state().snapshots())
         } else {
             State::new(&scene.model)
@@ -409,20 +409,13 @@ fn force_process(
         };
         slots.push((force_port, mode));
     }
-    let movers = scene.obstacle_trajectories.iter().map(|pose| {
-        let pose = pose.clone();
-        Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
-    });
-    let mut process =
-        ForceProcess::from_state(state, scene.model.clone(), slots, movers.collect(), DEVICE_TIMEOUT_S);
+    let motion = (scene.motion)();
+    let mut process = ForceProcess::from_state(state, scene.model.clone(), slots, motion, DEVICE_TIMEOUT_S);
     for (index, device) in scene.devices.iter().enumerate() {
         if let ViewerDevice::Path(path, _) = device {
             process.follow(index, path.clone());
         }
     }
-    process.move_clamps(scene.clamp_paths.clone());
-    process.move_bases(scene.base_paths.clone());
-    scene.gravity.iter().for_each(|gravity| process.change_gravity(gravity.clone()));
     process.warm_up();
     Ok((process, ports))
 }

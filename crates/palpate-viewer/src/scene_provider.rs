@@ -4,20 +4,17 @@ use crate::error::SceneError;
 use crate::protocol::{MaterialDescription, OwnSettings, PhysicsSettings, SceneDescription, SceneSummary};
 #[cfg(feature = "server")]
 use palpate::State;
-use palpate::{DeviceMode, Model, Pose};
+use palpate::{DeviceMode, Model};
 #[cfg(feature = "server")]
 use palpate_haptics::AttachedDevice;
 use palpate_haptics::MotionPath;
 #[cfg(feature = "server")]
 use palpate_haptics::log::{LogSender, LogSummary, LogWriter};
-use palpate_scene::{Scene, SceneDevice};
+use palpate_scene::{MotionSource, Scene, SceneDevice};
 #[cfg(feature = "server")]
 use std::io::{Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// Pose of an obstacle as a function of simulation time [s]. Must not allocate.
-pub type SharedTrajectory = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
 
 /// Opens a device; called at each start of the scene.
 #[cfg(feature = "server")]
@@ -51,14 +48,10 @@ pub struct ViewerScene {
     pub model: Arc<Model>,
     /// Input source per device of the model.
     pub devices: Vec<ViewerDevice>,
-    /// Trajectory per obstacle of the model.
-    pub obstacle_trajectories: Vec<SharedTrajectory>,
-    /// Paths of the clamps' frames, one for each clamp of the model; `None` stays.
-    pub clamp_paths: Vec<Option<MotionPath>>,
-    /// Paths of the bases of the objects with fixed nodes, one for each object; `None` stays.
-    pub base_paths: Vec<Option<MotionPath>>,
-    /// Gravity over simulated time, rows of t [s] and x, y, z [m/s²]; `None` is the model's.
-    pub gravity: Option<MotionPath>,
+    /// Motion of planes, obstacles, clamps, bases and gravity.
+    pub motion: MotionSource,
+    /// Whether it may go on from the state of another scene.
+    pub can_resume: bool,
     /// Log opener, if the scene is logged.
     #[cfg(feature = "server")]
     pub log: Option<LogOpener>,
@@ -71,19 +64,13 @@ impl ViewerScene {
         mut description: SceneDescription,
         device: impl FnMut(&SceneDevice) -> ViewerDevice,
     ) -> Self {
-        let movers = scene.obstacles.iter().map(|obstacle| {
-            let obstacle = obstacle.clone();
-            Arc::new(move |t: f64| obstacle.pose_at(t)) as SharedTrajectory
-        });
         description.own = Some(OwnSettings::of(&description));
         Self {
             description,
             model: scene.model.clone(),
             devices: scene.devices.iter().map(device).collect(),
-            obstacle_trajectories: movers.collect(),
-            clamp_paths: scene.clamps.iter().map(|clamp| clamp.path.clone()).collect(),
-            base_paths: scene.bases.clone(),
-            gravity: scene.gravity.clone(),
+            motion: scene.motion(),
+            can_resume: scene.can_resume(),
             #[cfg(feature = "server")]
             log: None,
         }

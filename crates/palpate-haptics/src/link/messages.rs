@@ -70,7 +70,7 @@ pub(super) fn motion(bytes: &[u8], time_s: f64) -> Option<Motion> {
     let buttons = u32::from_le_bytes(bytes[MOTION - 4..].try_into().ok()?);
     let (position, orientation) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
     let good = sequence > 0 && position.is_finite() && orientation.is_finite();
-    good.then_some(Motion { sequence, time_s, position, orientation, buttons, mode: None })
+    good.then_some(Motion { sequence, time_s, position, orientation, buttons, ..Motion::default() })
 }
 
 /// Bytes of an effort. Its time is not sent: the receiver stamps it.
@@ -112,7 +112,7 @@ mod tests {
             position: DVec3::new(0.1, -1e-300, 3.0),
             orientation: DQuat::from_xyzw(0.5, 0.5, -0.5, 0.5),
             buttons: 5,
-            mode: None,
+            ..Motion::default()
         };
         assert_eq!(motion(&motion_bytes(&sent), 2.0), Some(Motion { time_s: 2.0, ..sent }));
         let answer = Effort { sequence: 9, in_reply_to: 7, time_s: 3.0, force: DVec3::Y, absorbed_j: -0.25 };

@@ -9,7 +9,7 @@ use glam::DVec3;
 use palpate::{DeviceMode, Model, Pose};
 use palpate_haptics::device::{Device, DeviceSpec, Driver, Mount, Reading};
 use palpate_haptics::{
-    AttachedDevice, Error, ObstacleTrajectory, SafetyLimits, Scheduling, Session, SessionDevice,
+    AttachedDevice, Error, PoseTrajectory, SafetyLimits, SceneMotion, Scheduling, Session, SessionDevice,
 };
 use palpate_testkit::wait_until;
 use std::io::Cursor;
@@ -21,7 +21,7 @@ use std::time::Instant;
 const PATIENT: SafetyLimits = SafetyLimits { force_n: 3.0, ramp_down_s: 0.02, ..SafetyLimits::NONE };
 
 /// Session with one armed device and a floor.
-fn session(model: Arc<Model>, device: Box<dyn Device>, floor: ObstacleTrajectory) -> Session {
+fn session(model: Arc<Model>, device: Box<dyn Device>, floor: PoseTrajectory) -> Session {
     let attached = AttachedDevice {
         device,
         mode: DeviceMode::Touch,
@@ -35,10 +35,7 @@ fn session(model: Arc<Model>, device: Box<dyn Device>, floor: ObstacleTrajectory
         model,
         start: Instant::now(),
         devices: vec![SessionDevice::Local(attached)],
-        obstacle_trajectories: vec![floor],
-        clamp_paths: Vec::new(),
-        base_paths: Vec::new(),
-        gravity: None,
+        motion: SceneMotion { obstacles: vec![floor], ..SceneMotion::default() },
         steps: None,
         frame_rate_hz: 0.0,
         scheduling: Scheduling { priority: None, core: None },
@@ -99,7 +96,7 @@ fn a_panic_of_a_thread_leaves_the_device_without_force() {
         let in_update = panics == Panics::HapticUpdate;
         let device = Box::new(NotesPushes { device, pushed: pushed.clone(), panics: in_update });
         let floor = model.parameters().obstacles[0].pose;
-        let trajectory: ObstacleTrajectory = Box::new(move |_| {
+        let trajectory: PoseTrajectory = Box::new(move |_| {
             assert!(in_update || !pushed.load(Ordering::Relaxed), "a bug in the force process");
             floor
         });

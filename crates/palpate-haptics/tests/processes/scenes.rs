@@ -4,7 +4,7 @@ use glam::DVec3;
 use palpate::{
     Coupling, DeviceMode, DeviceParameters, Model, ModelObject, ModelParameters, Obstacle, Pose, State,
 };
-use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, ObstacleTrajectory, port};
+use palpate_haptics::{Columns, DevicePort, ForceProcess, MotionPath, PoseTrajectory, SceneMotion, port};
 use palpate_testkit::{finger, floor, free_block, half_extent, start_at};
 use std::sync::Arc;
 
@@ -45,8 +45,17 @@ pub fn process_from(state: State, model: &Arc<Model>) -> (ForceProcess, Vec<Devi
         })
         .unzip();
     let floor = model.parameters().obstacles[0].pose;
-    let trajectory: ObstacleTrajectory = Box::new(move |_| floor);
-    (ForceProcess::from_state(state, model.clone(), slots, vec![trajectory], 0.05), ends)
+    let trajectory: PoseTrajectory = Box::new(move |_| floor);
+    (
+        ForceProcess::from_state(
+            state,
+            model.clone(),
+            slots,
+            SceneMotion { obstacles: vec![trajectory], ..SceneMotion::default() },
+            0.05,
+        ),
+        ends,
+    )
 }
 
 /// A path from text.

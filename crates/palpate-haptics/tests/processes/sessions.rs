@@ -6,7 +6,8 @@ use palpate_haptics::SceneNames;
 use palpate_haptics::device::{DeviceSpec, Hand, Mount, PathDevice, SimulatedDevice};
 use palpate_haptics::log::{LogReader, LogSender, LogSummary, LogWriter};
 use palpate_haptics::{
-    AttachedDevice, DeformationProcess, ForceProcess, SafetyLimits, Scheduling, Session, SessionDevice,
+    AttachedDevice, DeformationProcess, ForceProcess, SafetyLimits, SceneMotion, Scheduling, Session,
+    SessionDevice,
 };
 use std::collections::BTreeMap;
 use std::io::{Cursor, Error, Seek, SeekFrom, Write};
@@ -38,10 +39,10 @@ fn session(steps: Option<u64>) -> Session {
     Session {
         start: Instant::now(),
         devices: vec![attached(1.0), attached(-1.0)],
-        obstacle_trajectories: vec![Box::new(move |_: f64| -> Pose { floor })],
-        clamp_paths: Vec::new(),
-        base_paths: Vec::new(),
-        gravity: None,
+        motion: SceneMotion {
+            obstacles: vec![Box::new(move |_: f64| -> Pose { floor })],
+            ..SceneMotion::default()
+        },
         model,
         steps,
         frame_rate_hz: 60.0,

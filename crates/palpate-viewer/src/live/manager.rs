@@ -9,7 +9,6 @@ use crate::error::SceneError;
 use crate::pointers::{Pointers, lock};
 use crate::protocol::{FrameEncoder, ServerMessage};
 use crate::scene_provider::{JobControl, PageNotifier, SceneProvider, ViewerScene};
-use crate::scene_start::is_resumable;
 use palpate::{ObjectSnapshot, State};
 use palpate_haptics::Scheduling;
 use std::sync::Arc;
@@ -73,7 +72,7 @@ impl Manager {
             Command::ChangePhysics(settings) => match self.provider.change_physics(&settings) {
                 Ok(scene) => {
                     let scene = scene.changed_from(&self.current_scene());
-                    let resumed = self.stop().filter(|_| is_resumable(&scene));
+                    let resumed = self.stop().filter(|_| scene.can_resume);
                     self.start_scene(scene, resumed);
                 }
                 Err(error) => self.send_error(&error),

@@ -9,8 +9,8 @@ use crate::scene_provider::{OpenLog, ViewerDevice, ViewerScene};
 use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ};
 use palpate::{DeviceInput, DeviceMode, Input, ObjectSnapshot, State};
 use palpate_haptics::{
-    Clock, CycleReceiver, DevicePort, ObstacleTrajectory, Playback, Report, Scheduling, Session,
-    SessionDevice, Snapshot, Timing, cycle_channel, port,
+    Clock, CycleReceiver, DevicePort, Playback, Report, Scheduling, Session, SessionDevice, Snapshot, Timing,
+    cycle_channel, port,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -27,7 +27,7 @@ const CYCLES: usize = 16_384;
 pub(super) fn initial_snapshot(scene: &ViewerScene, state: &State) -> Snapshot {
     let input = Input {
         devices: vec![DeviceInput::inactive(); scene.devices.len()],
-        obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
+        obstacles: (scene.motion)().obstacles.iter_mut().map(|pose| pose(0.0)).collect(),
         bases: vec![None; scene.model.recordings().count()],
         clamps: scene.model.parameters().clamps.iter().map(|clamp| clamp.frame).collect(),
         ..Input::default()
@@ -83,10 +83,6 @@ impl RunningScene {
         scheduling: Scheduling,
         channels: &SceneChannels,
     ) -> Result<Self, SceneError> {
-        let movers = scene.obstacle_trajectories.iter().map(|pose| {
-            let pose = pose.clone();
-            Box::new(move |t: f64| pose(t)) as ObstacleTrajectory
-        });
         let (cycle_sender, cycle_receiver) = cycle_channel(CYCLES);
         let (sound, listener) =
             SoundThread::start((&scene.model, &state), generation, &channels.sound, &channels.playback)
@@ -97,10 +93,7 @@ impl RunningScene {
             state: Some(state),
             start,
             devices: inputs.devices,
-            obstacle_trajectories: movers.collect(),
-            clamp_paths: scene.clamp_paths.clone(),
-            base_paths: scene.base_paths.clone(),
-            gravity: scene.gravity.clone(),
+            motion: (scene.motion)(),
             steps: None,
             frame_rate_hz: FRAME_RATE_HZ,
             scheduling,

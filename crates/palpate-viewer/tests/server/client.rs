@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate::{Coupling, DeviceParameters, Model, ModelObject, ModelParameters, Obstacle, Pose};
-use palpate_haptics::Scheduling;
+use palpate_haptics::{SceneMotion, Scheduling};
 use palpate_testkit::{finger, floor, free_block, start_at};
 use palpate_viewer::{
     JobControl, Limits, Live, MaterialDescription, ObjectDescription, OwnSettings, PhysicsSettings,
@@ -45,10 +45,11 @@ pub fn scene(gravity: DVec3, step_s: f64) -> ViewerScene {
         description,
         model,
         devices: vec![ViewerDevice::Pointer; 2],
-        obstacle_trajectories: vec![Arc::new(move |_: f64| below)],
-        clamp_paths: Vec::new(),
-        base_paths: Vec::new(),
-        gravity: None,
+        motion: Arc::new(move || SceneMotion {
+            obstacles: vec![Box::new(move |_| below)],
+            ..SceneMotion::default()
+        }),
+        can_resume: true,
         log: None,
     }
 }

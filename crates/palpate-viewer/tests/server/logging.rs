@@ -76,7 +76,7 @@ impl LoggedProvider {
         let (logs, capacity, model) = (self.0.clone(), self.1, scene.model.clone());
         let input = Input {
             devices: vec![DeviceInput::inactive(); 2],
-            obstacles: scene.obstacle_trajectories.iter().map(|pose| pose(0.0)).collect(),
+            obstacles: (scene.motion)().obstacles.iter_mut().map(|pose| pose(0.0)).collect(),
             ..Input::default()
         };
         let open: LogOpener = Arc::new(move |state, pages| {
