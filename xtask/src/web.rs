@@ -13,14 +13,9 @@ const TARGET: &str = "wasm32-unknown-unknown";
 /// Vector instructions, which every browser has since 2023.
 const FLAGS: &str = "-Ctarget-feature=+simd128";
 
-/// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser, and no names of functions.
-const SMALL_FLAGS: &[&str] = &[
-    FLAGS,
-    "-Zlocation-detail=none",
-    "-Zunstable-options",
-    "-Cpanic=immediate-abort",
-    "-Clink-arg=--strip-all",
-];
+/// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser.
+const SMALL_FLAGS: &[&str] =
+    &[FLAGS, "-Zlocation-detail=none", "-Zunstable-options", "-Cpanic=immediate-abort"];
 
 /// Folder of the npm package.
 pub fn package() -> PathBuf {
@@ -34,7 +29,7 @@ pub fn page() -> PathBuf {
 
 /// Build the module, the npm package and the page; false, with a message, where no toolchain for WebAssembly can be had.
 pub fn build() -> Result<bool, String> {
-    let Some(module) = build_module(&[], "palpate.wasm")? else {
+    let Some(module) = build_module(&["--no-default-features"], "package.wasm")? else {
         println!(
             "skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}"
         );
@@ -48,8 +43,13 @@ pub fn build() -> Result<bool, String> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&root().join(licence), &package.join("dist").join(licence))?;
     }
-    let Some(logs) = build_module(&["--features", "logs"], "palpate-logs.wasm")? else { return Ok(false) };
-    build_page(&[module, logs])?;
+    let page_modules: [(&[&str], _); 2] =
+        [(&[], "palpate.wasm"), (&["--features", "logs"], "palpate-logs.wasm")];
+    let mut modules = Vec::new();
+    for (features, name) in page_modules {
+        modules.extend(build_module(features, name)?);
+    }
+    build_page(&modules)?;
     report(&package)?;
     Ok(true)
 }

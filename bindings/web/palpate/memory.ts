@@ -25,7 +25,6 @@ export interface Exports {
   recording_positions(recording: number): number;
   recording_triangles(recording: number): number;
   recording_rescaled(recording: number, young: number, density: number): number;
-  recording_falling_scene(recording: number, name: number, nameLength: number): void;
   scene_files(address: number, length: number): void;
   parts_new(): number;
   parts_free(parts: number): void;
@@ -44,14 +43,6 @@ export interface Exports {
   simulation_surface_length(simulation: number): number;
   simulation_grasp(simulation: number, device: number, object: number, x: number, y: number, z: number): number;
   simulation_release(simulation: number, device: number): number;
-  live_open(address: number, length: number, parts: number, about: number, aboutLength: number): number;
-  live_replace(live: number, address: number, length: number, parts: number, about: number, aboutLength: number): number;
-  live_greet(live: number, address: number, length: number): void;
-  live_receive(live: number, address: number, length: number): void;
-  live_begin_record(live: number): number;
-  live_end_record(live: number): number;
-  live_advance(live: number): number;
-  live_data(live: number, address: number, length: number): number;
 }
 
 /** Source of the module: an address, its bytes, or a compiled module. */

@@ -1,12 +1,12 @@
 // Web Worker that runs a live scene: the force process in WebAssembly, speaking the protocol of the server.
 
-import { Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
+import { type Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
 import type { ClientMessage, SceneSummary } from "../protocol/messages";
+import { liveExports, loadLiveModule } from "./live_module";
 import { makeLog, type RecordedRun } from "./log_writer";
 import type { ToWorker } from "./messages";
 import { post, reasonOf, tell } from "./posting";
-import { download } from "./download";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
 import { Ticker } from "./ticker";
 
@@ -95,7 +95,7 @@ class SceneRunner {
       const recording = instance.withBytes(bytes, (address, length) => instance.call((exports) => exports.recording_read(address, length)));
       const text = (() => {
         try {
-          return instance.withBytes(DROPPED, (at, length) => instance.described<string>((exports) => exports.recording_falling_scene(recording, at, length)));
+          return instance.withBytes(DROPPED, (at, length) => instance.described<string>(() => liveExports(instance).recording_falling_scene(recording, at, length)));
         } finally {
           instance.exports.recording_free(recording);
         }
@@ -114,7 +114,7 @@ class SceneRunner {
     if (live === 0 || files === null) return;
     this.recorded = { files, startS: Date.now() / 1000 };
     try {
-      instance.call((exports) => exports.live_begin_record(live));
+      instance.call(() => liveExports(instance).live_begin_record(live));
     } catch (error) {
       this.recorded = null;
       tell({ type: "error", text: reasonOf(error) });
@@ -131,7 +131,7 @@ class SceneRunner {
       const inputs: Uint8Array[] = [];
       const record = this.collecting(
         (bytes) => inputs.push(bytes),
-        () => instance.described<Pick<RecordedRun, "text" | "steps" | "rescaled"> | null>((exports) => exports.live_end_record(live)),
+        () => instance.described<Pick<RecordedRun, "text" | "steps" | "rescaled"> | null>(() => liveExports(instance).live_end_record(live)),
       );
       if (record === null || inputs[0] === undefined) throw new Error("none was begun");
       const run = { ...record, inputs: inputs[0], ...recorded };
@@ -157,7 +157,7 @@ class SceneRunner {
     if (message.type === "stream" && message.stride === 0) this.ticker.stop();
     else if (message.type === "stream") this.ticker.start();
     try {
-      instance.withBytes(text, (address, length) => instance.call((exports) => exports.live_receive(live, address, length)));
+      instance.withBytes(text, (address, length) => instance.call(() => liveExports(instance).live_receive(live, address, length)));
     } catch (error) {
       if (instance.stopped === null) tell({ type: "error", text: reasonOf(error) });
       else this.fail(instance.stopped);
@@ -177,7 +177,7 @@ class SceneRunner {
     if (live !== 0) {
       this.collecting(
         (data) => (bytes = data.buffer),
-        () => instance.withBytes(path, (address, length) => instance.call((exports) => exports.live_data(live, address, length))),
+        () => instance.withBytes(path, (address, length) => instance.call(() => liveExports(instance).live_data(live, address, length))),
       );
     }
     post({ kind: "data", request, bytes }, bytes === null ? [] : [bytes]);
@@ -207,10 +207,10 @@ class SceneRunner {
         instance.withBytes(files.text, (address, length) =>
           instance.withBytes(JSON.stringify(files.summary), (about, aboutLength) => {
             if (this.live !== 0) {
-              instance.call(() => exports.live_replace(this.live, address, length, parts, about, aboutLength));
+              instance.call(() => liveExports(instance).live_replace(this.live, address, length, parts, about, aboutLength));
               return;
             }
-            this.live = instance.call(() => exports.live_open(address, length, parts, about, aboutLength));
+            this.live = instance.call(() => liveExports(instance).live_open(address, length, parts, about, aboutLength));
           }),
         ),
       );
@@ -220,14 +220,14 @@ class SceneRunner {
     this.files = files;
     if (this.greeted) return;
     this.greeted = true;
-    instance.withBytes(JSON.stringify(this.scenes), (address, length) => exports.live_greet(this.live, address, length));
+    instance.withBytes(JSON.stringify(this.scenes), (address, length) => liveExports(instance).live_greet(this.live, address, length));
     this.ticker.start();
   }
 
   /** Steps that are due; a trap of the module ends the scene. */
   private advance(): number {
     try {
-      return this.instance.guard(() => this.instance.exports.live_advance(this.live));
+      return this.instance.guard(() => liveExports(this.instance).live_advance(this.live));
     } catch (error) {
       this.fail(reasonOf(error));
       return Number.POSITIVE_INFINITY;
@@ -245,8 +245,7 @@ let runner: SceneRunner | null = null;
 async function start(base: string, scene: string | null): Promise<void> {
   try {
     const progress = (bytes: number, of: number | null) => post({ kind: "loading", what: "the simulation", bytes, of });
-    const module = download(new URL("palpate.wasm", base), progress).then((bytes) => Instance.load(bytes));
-    const [instance, scenes] = await Promise.all([module, fetchScenes(base)]);
+    const [instance, scenes] = await Promise.all([loadLiveModule(base, progress), fetchScenes(base)]);
     runner = new SceneRunner(instance, base, scenes);
     const known = scenes.some(({ id }) => id === scene);
     await runner.open(known ? scene : null);

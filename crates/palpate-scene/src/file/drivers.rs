@@ -1,6 +1,6 @@
 //! Real and simulated devices of a scene: `driver`, `mount` and `simulated`.
 
-use super::keys::{DeviceEntry, DriverEntry, LARGEST, LimitEntries, MountEntry, SimulatedEntry};
+use super::keys::{DeviceEntry, DriverEntry, DriverId, LARGEST, LimitEntries, MountEntry, SimulatedEntry};
 use super::source::{Quantity, Source};
 use crate::devices::{MAX_FORCE_N, RealDevice, find_device_traits, find_driver, find_grip};
 use crate::error::{SceneError, SceneErrorKind};
@@ -68,8 +68,8 @@ fn read_driver(source: &Source, entry: &DriverEntry, mount: Mount) -> Result<Rea
         .or_else(|what| source.fail(entry.kind.span(), SceneErrorKind::UnknownValue, "kind", what))?;
     let id = match entry.id.as_ref().map(|id| (id.get_ref(), id.span())) {
         None => "0".to_string(),
-        Some((toml::Value::Integer(number), _)) if *number >= 0 => number.to_string(),
-        Some((toml::Value::String(name), _)) => name.clone(),
+        Some((DriverId::Number(number), _)) if *number >= 0 => number.to_string(),
+        Some((DriverId::Name(name), _)) => name.clone(),
         Some((_, span)) => {
             let message = "id is neither a number from 0 nor a name in quotes";
             return source.fail(span, SceneErrorKind::UnknownValue, "id", message);
@@ -83,7 +83,8 @@ fn read_driver(source: &Source, entry: &DriverEntry, mount: Mount) -> Result<Rea
 }
 
 fn read_mount(source: &Source, entry: &MountEntry) -> Result<Mount, SceneError> {
-    let mut pose = Pose { position: DVec3::from_array(entry.position.0), ..Pose::IDENTITY };
+    let position = entry.position.map_or(DVec3::ZERO, |given| DVec3::from_array(given.0));
+    let mut pose = Pose { position, ..Pose::IDENTITY };
     if let Some(given) = &entry.orientation {
         let [w, x, y, z] = given.get_ref().0;
         pose.orientation = unit_quaternion(w, x, y, z)

@@ -5,6 +5,7 @@ mod coupling;
 mod devices;
 mod drivers;
 mod edited_text;
+mod entries;
 mod keys;
 mod objects;
 mod obstacles;
@@ -17,8 +18,9 @@ use crate::files::read_regular_file;
 use crate::initial_checks::check_start;
 use crate::scene::Scene;
 pub(crate) use edited_text::EditedText;
+use entries::{ReadError, read_file_text};
 use glam::DVec3;
-use keys::{Gravity, RETIRED_KEYS, SceneFile};
+use keys::{Gravity, SceneFile};
 use palpate::{Model, ModelObject, ModelParameters, ResponseForm, RigidCompliance, RigidIntegrator, Support};
 use palpate_haptics::{Columns, MotionPath};
 use source::{DeviceMover, Source};
@@ -155,7 +157,7 @@ pub(crate) fn read_edited_scene(
 }
 
 fn parse(source: &Source) -> Result<SceneFile, SceneError> {
-    let file: SceneFile = toml::from_str(source.text).map_err(|error| syntax_error(source, &error))?;
+    let file: SceneFile = read_file_text(source.text).map_err(|error| syntax_error(source, *error))?;
     if file.object.is_empty() {
         return source.fail(0..0, SceneErrorKind::Missing, "object", "the scene has no [[object]]");
     }
@@ -163,21 +165,14 @@ fn parse(source: &Source) -> Result<SceneFile, SceneError> {
     Ok(file)
 }
 
-/// Error of the parser, with types in the user's words.
-fn syntax_error(source: &Source, error: &toml::de::Error) -> SceneError {
-    // The keys that are known stand after commas.
-    let listed = |text: String, key: &&str| text.replace(&format!(", `{key}`"), "");
-    let text = RETIRED_KEYS.iter().fold(error.to_string(), listed);
-    let text =
-        text.replace("expected f64", "expected a number").replace("expected i64", "expected a whole number");
-    // As in: unknown field `colour`, expected one of …
-    let key = error.message().split_once(" field `").and_then(|(_, rest)| rest.split_once('`'));
-    let line = error.span().map(|span| source.line_of(&span));
-    SceneError {
-        line,
-        key: key.map(|(key, _)| key.to_string()),
-        ..SceneError::of_file(SceneErrorKind::Syntax, source.path, text.trim_end())
-    }
+/// Error of the parser, which shows the place.
+fn syntax_error(source: &Source, ReadError { message, span, key }: ReadError) -> SceneError {
+    let line = span.as_ref().map(|span| source.line_of(span));
+    let text = match span {
+        Some(span) => format!("{}{message}", source.marked_line(&span)),
+        None => message,
+    };
+    SceneError { line, key, ..SceneError::of_file(SceneErrorKind::Syntax, source.path, text) }
 }
 
 fn read_objects(source: &Source, file: &SceneFile) -> Result<Vec<ModelObject>, SceneError> {
@@ -369,11 +364,12 @@ fn read_gravity(
     parameters: &mut ModelParameters,
 ) -> Result<Option<MotionPath>, SceneError> {
     let entry = match &file.gravity {
-        Gravity::Constant(gravity) => {
+        None => return Ok(None),
+        Some(Gravity::Constant(gravity)) => {
             parameters.gravity = DVec3::from_array(gravity.0);
             return Ok(None);
         }
-        Gravity::Changing(entry) => entry,
+        Some(Gravity::Changing(entry)) => entry,
     };
     let gravity = source.motion_path(entry, Columns::Position)?;
     parameters.gravity = gravity.at(0.0).position;
@@ -441,8 +437,8 @@ fn inputs(source: &Source, file: &SceneFile) -> Vec<PathBuf> {
     let clamps = file.clamp.iter().filter_map(|clamp| Some(&clamp.path.as_ref()?.file));
     let bases = file.object.iter().filter_map(|object| Some(&object.path.as_ref()?.file));
     let gravity = match &file.gravity {
-        Gravity::Changing(entry) => Some(&entry.file),
-        Gravity::Constant(_) => None,
+        Some(Gravity::Changing(entry)) => Some(&entry.file),
+        Some(Gravity::Constant(_)) | None => None,
     };
     let files = recordings
         .chain(paths)

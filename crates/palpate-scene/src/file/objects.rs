@@ -1,6 +1,6 @@
 //! `[[object]]`: elastic bodies.
 
-use super::keys::ObjectEntry;
+use super::keys::{Numbers, ObjectEntry};
 use super::source::Source;
 use super::tables;
 use crate::error::{SceneError, SceneErrorKind};
@@ -19,13 +19,11 @@ pub(super) fn read_object(source: &Source, object: &ObjectEntry) -> Result<Model
     let given =
         object.position.as_ref().map_or(DVec3::ZERO, |position| DVec3::from_array(position.get_ref().0));
     let position = path.map_or(given, |path| path.at(0.0).position);
-    let [w, x, y, z] = object.orientation.0;
+    let [w, x, y, z] = object.orientation.map_or([1.0, 0.0, 0.0, 0.0], |given| given.0);
+    let vector = |given: Option<Numbers<3>>| given.map_or(DVec3::ZERO, |given| DVec3::from_array(given.0));
     let start = ObjectStart {
         pose: Pose { position, orientation: DQuat::from_xyzw(x, y, z, w) },
-        twist: Twist {
-            linear: DVec3::from_array(object.velocity.0),
-            angular: DVec3::from_array(object.angular_velocity.0),
-        },
+        twist: Twist { linear: vector(object.velocity), angular: vector(object.angular_velocity) },
     };
     let deformations =
         [("undeformed", InitialDeformation::Undeformed), ("equilibrium", InitialDeformation::Equilibrium)];

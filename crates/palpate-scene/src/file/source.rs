@@ -72,6 +72,26 @@ impl Source<'_> {
         1 + self.text[..span.start.min(self.text.len())].matches('\n').count()
     }
 
+    /// Line with a place marked below it, as `TOML parse error at line 2, column 1`, the line, and `^^^^`.
+    pub fn marked_line(&self, span: &Range<usize>) -> String {
+        // Behind the end there is no line.
+        let start = self.text.floor_char_boundary(span.start.min(self.text.len().saturating_sub(1)));
+        let (before, behind) = self.text.split_at(start);
+        let line = 1 + before.matches('\n').count();
+        let of_line = before.rfind('\n').map_or(0, |at| at + 1);
+        let column = self.text[of_line..start].chars().count() + (span.start - start);
+        let content = &self.text[of_line..start + behind.find('\n').unwrap_or(behind.len())];
+        let marks = span.len().min(content.len().saturating_sub(column)).max(1);
+        let (gutter, column_number) = (line.to_string().len() + 1, column + 1);
+        format!(
+            "TOML parse error at line {line}, column {column_number}\n{:gutter$}|\n{line} | {content}\n{:gutter$}| {:column$}{}\n",
+            "",
+            "",
+            "",
+            "^".repeat(marks)
+        )
+    }
+
     /// Error of a key, with its line.
     pub fn fail<T>(
         &self,
@@ -104,7 +124,7 @@ impl Source<'_> {
             None => read_path(&self.stored_path(file.get_ref()), columns),
         };
         let path = path.or_else(|error| self.fail(file.span(), SceneErrorKind::Path, "path", error))?;
-        Ok(if *repeat { path.repeating() } else { path })
+        Ok(if *repeat == Some(true) { path.repeating() } else { path })
     }
 
     /// Value of a word; the first of two by default.

@@ -2,9 +2,9 @@
 
 use crate::file::EditedText;
 use palpate::{ModelObject, Recording, Support};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
-use toml::{Spanned, Table, Value};
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
 
 /// Number of added pointers.
 const POINTERS: usize = 4;
@@ -43,8 +43,7 @@ pub(super) fn with_pointers(text: &str, objects: &[ModelObject]) -> Option<WithP
     let written = EditedText::same_lines(appended, &longer);
     // An inline array of devices cannot be continued further down, but where it ends.
     let inline = || {
-        let places: Places<Spanned<IgnoredAny>> = toml::from_str(text).ok()?;
-        let end = places.device.span().end.checked_sub(1)?;
+        let end = DeTable::parse(text).ok()?.get_ref().get("device")?.span().end.checked_sub(1)?;
         let fingers: Vec<String> = fingers.iter().map(Value::to_string).collect();
         let continued = |comma: &str| {
             let text = format!("{}{comma}{}{}", &text[..end], fingers.join(", "), &text[end..]);
@@ -70,15 +69,15 @@ fn with_tips_as_pointers(text: &str, scene: &Table) -> Option<EditedText> {
             tip.insert("pointer".into(), Value::Boolean(true));
         }
     }
-    let places: Option<Places<Vec<DevicePlace>>> = toml::from_str(text).ok();
+    let places = device_places(text);
     let edit = || {
         let mut edited = EditedText { text: text.to_string(), added_lines: Vec::new() };
         // From the last, so that the places of the others stay.
         for &tip in tips.iter().rev() {
-            let DevicePlace { mode, pointer } = places.as_ref()?.device.get(tip)?;
+            let DevicePlace { mode, pointer } = places.as_ref()?.get(tip)?;
             match pointer {
-                Some(pointer) => edited.text.replace_range(pointer.span(), "true"),
-                None => edited.insert_after_line(mode.as_ref()?.span().end, "pointer = true"),
+                Some(pointer) => edited.text.replace_range(pointer.clone(), "true"),
+                None => edited.insert_after_line(mode.as_ref()?.end, "pointer = true"),
             }
         }
         edited.is(&expected).then_some(edited)
@@ -86,10 +85,10 @@ fn with_tips_as_pointers(text: &str, scene: &Table) -> Option<EditedText> {
     let edit_inline = || {
         let mut edited = text.to_string();
         for &tip in tips.iter().rev() {
-            let DevicePlace { mode, pointer } = places.as_ref()?.device.get(tip)?;
+            let DevicePlace { mode, pointer } = places.as_ref()?.get(tip)?;
             match pointer {
-                Some(pointer) => edited.replace_range(pointer.span(), "true"),
-                None => edited.insert_str(mode.as_ref()?.span().end, ", pointer = true"),
+                Some(pointer) => edited.replace_range(pointer.clone(), "true"),
+                None => edited.insert_str(mode.as_ref()?.end, ", pointer = true"),
             }
         }
         EditedText::same_lines(edited, &expected)
@@ -97,16 +96,21 @@ fn with_tips_as_pointers(text: &str, scene: &Table) -> Option<EditedText> {
     Some(edit().or_else(edit_inline).unwrap_or_else(|| EditedText::rewritten(&expected)))
 }
 
-/// Places of the devices in a text, or of their array.
-#[derive(Deserialize)]
-struct Places<D> {
-    device: D,
+/// Places of two values of a device in a text.
+struct DevicePlace {
+    mode: Option<Range<usize>>,
+    pointer: Option<Range<usize>>,
 }
 
-#[derive(Deserialize)]
-struct DevicePlace {
-    mode: Option<Spanned<String>>,
-    pointer: Option<Spanned<bool>>,
+/// Places of the devices.
+fn device_places(text: &str) -> Option<Vec<DevicePlace>> {
+    let scene = DeTable::parse(text).ok()?;
+    let DeValue::Array(devices) = scene.get_ref().get("device")?.get_ref() else { return None };
+    let place = |device: &DeValue| {
+        let of = |key: &str| device.get(key).map(|value| value.span());
+        DevicePlace { mode: of("mode"), pointer: of("pointer") }
+    };
+    Some(devices.iter().map(|device| place(device.get_ref())).collect())
 }
 
 /// Whether a device is a tip that a program would move.
