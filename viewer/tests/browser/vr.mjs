@@ -7,7 +7,8 @@ import { start } from "./servers.mjs";
 const EMULATOR = readFileSync(new URL("../../node_modules/iwer/build/iwer.min.js", import.meta.url), "utf8");
 
 async function pageWithHeadset(browser, server) {
-  const page = await browser.page("about:blank");
+  // A small window: the emulator draws into it, on the processor.
+  const page = await browser.page("about:blank", { width: 720, height: 420 });
   await page.addInitScript({ content: `${EMULATOR}
     window.headset = new IWER.XRDevice(IWER.metaQuest3);
     window.headset.installRuntime({ forceInstall: true });` });
@@ -21,15 +22,32 @@ async function pageWithHeadset(browser, server) {
 /** Forces on the devices of the newest frame [N], upwards. */
 const lifts = (page) => page.evaluate(() => window.palpate.sceneView.graphs[0].frame.devices.map(({ force }) => force[1]));
 
+/** Place of the right tip beside its controller or hand, in the room [m]. */
+function tipOffset(page, which) {
+  return page.evaluate((kind) => {
+    const { xr } = window.palpate.sceneView.renderer;
+    const held = window.headset[kind].right;
+    held.position.set(0.3, 1.5, -0.5);
+    held.quaternion.set(0, 0, 0, 1);
+    return new Promise((done) => {
+      const read = (_, frame) => {
+        const source = [...frame.session.inputSources].find(({ handedness }) => handedness === "right");
+        const joint = source?.hand?.get("index-finger-tip");
+        const pose = joint === undefined ? frame.getPose(source.targetRaySpace, xr.getReferenceSpace()) : frame.getJointPose(joint, xr.getReferenceSpace());
+        const { x, y, z } = pose.transform.position;
+        done([x - held.position.x, y - held.position.y, z - held.position.z]);
+      };
+      // The frame after the next has the new place.
+      xr.getSession().requestAnimationFrame(() => xr.getSession().requestAnimationFrame(read));
+    });
+  }, which);
+}
+
 /** Moves the tip of a controller or hand down through the middle of the scene until it feels an upward force. */
 async function pressDown(page, which) {
-  for (let y = 1.55; y > 1.1; y -= 0.015) {
-    await page.evaluate(([kind, height]) => {
-      const held = window.headset[kind].right;
-      // The tip lies before the grip, or the wrist.
-      held.position.set(0, height, kind === "controllers" ? -0.5 : -0.33);
-      held.quaternion.set(0, 0, 0, 1);
-    }, [which, y]);
+  const offset = await tipOffset(page, which);
+  for (let y = 1.5; y > 1; y -= 0.03) {
+    await page.evaluate(([kind, [dx, dy, dz], height]) => window.headset[kind].right.position.set(-dx, height - dy, -0.5 - dz), [which, offset, y]);
     await page.waitForTimeout(60);
     if (Math.max(...(await lifts(page))) > 0.02) return;
   }

@@ -38,7 +38,7 @@ function start(query: string, ...scenes: SceneMessage[]) {
   return startWith(true, query, ...scenes);
 }
 
-/** The same, of a page whose materials are recorded or not. */
+/** Messages and sentences of a page that records materials, or rescales them. */
 function startWith(records: boolean, query: string, ...scenes: SceneMessage[]): { sent: ClientMessage[]; told: string[]; ends: number; linked: LinkedStart } {
   const result = { sent: [] as ClientMessage[], told: [] as string[], ends: 0 };
   const linked = new LinkedStart(
