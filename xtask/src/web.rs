@@ -76,7 +76,9 @@ fn build_module(features: &[&str], name: &str) -> Result<Option<PathBuf>, String
     cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
     cargo.args(features);
     if build_std(&mut cargo, "std,panic_abort")? {
-        cargo.args(["-Z", "build-std-features=optimize_for_size"]).env("RUSTFLAGS", SMALL_FLAGS.join(" "));
+        // Its instructions are reached by a feature of unreleased compilers, as its build is.
+        cargo.args(["-Z", "build-std-features=optimize_for_size", "--features", "instructions"]);
+        cargo.env("RUSTFLAGS", SMALL_FLAGS.join(" "));
     } else if is_installed(TARGET)? {
         cargo.env("RUSTFLAGS", FLAGS);
     } else {

@@ -118,10 +118,10 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// Structs of tables. A field has the key of its name, or another one after `=`; after `|` stands its spelling in earlier versions.
+/// Structs of tables. A field has the key of its name, or another one after `=`; an alias is its spelling in earlier versions.
 macro_rules! entries {
     ($($(#[$about:meta])* $entry:ident {
-        $($field:ident $(= $key:literal)? $(| $retired:literal)?: $type:ty,)*
+        $($field:ident $(= $key:literal)? $((alias = $retired:literal))?: $type:ty,)*
     })*) => {$(
         $(#[$about])*
         pub(super) struct $entry {

@@ -1,4 +1,4 @@
-//! Keys of a scene file. Keys of earlier versions stand after `|`.
+//! Keys of a scene file. Keys of earlier versions are aliases.
 
 use super::entries::{
     Entry, FromValue, Key, ReadResult, TomlValue, entries, refuse, whole_number, wrong_type,
@@ -15,10 +15,10 @@ entries! {
     SceneFile {
         step: Option<Spanned<f64>>,
         gravity: Option<Gravity>,
-        integrator | "motion": Option<Spanned<String>>,
+        integrator (alias = "motion"): Option<Spanned<String>>,
         rigid_compliance: Option<bool>,
-        max_contact_points | "most_contact_points": Option<Spanned<i64>>,
-        max_contact_samples | "most_places": Option<Spanned<i64>>,
+        max_contact_points (alias = "most_contact_points"): Option<Spanned<i64>>,
+        max_contact_samples (alias = "most_places"): Option<Spanned<i64>>,
         solver_budget: Option<Spanned<i64>>,
         sleep_after: Option<Spanned<f64>>,
         object: Vec<ObjectEntry>,
@@ -125,8 +125,8 @@ entries! {
 
     DriverEntry {
         kind: Spanned<String>,
-        id | "which": Option<Spanned<DriverId>>,
-        max_force | "force": Option<Spanned<f64>>,
+        id (alias = "which"): Option<Spanned<DriverId>>,
+        max_force (alias = "force"): Option<Spanned<f64>>,
         armed: Option<bool>,
     }
 
