@@ -15,11 +15,6 @@ impl<T> BoundedVec<T> {
         Self { list: Vec::with_capacity(bound), bound }
     }
 
-    /// Upper limit of elements.
-    pub(crate) fn bound(&self) -> usize {
-        self.bound
-    }
-
     /// Whether it has no room left.
     pub(crate) fn is_full(&self) -> bool {
         self.list.len() >= self.bound

@@ -4,9 +4,8 @@
 
 use super::candidate::{CandidateList, CandidateSide, ContactCandidate};
 use super::contact::{Collider, Contact, ContactLaw, OtherSide};
-use crate::bounded_vec::BoundedVec;
 use crate::object::{Object, ObjectState};
-use crate::response::{ContactLocation, Footprint, LocatedLoad, ResidualMemory};
+use crate::response::ContactLocation;
 use alloc::vec::Vec;
 use glam::DVec3;
 
@@ -18,12 +17,17 @@ struct Bodies<'a> {
 }
 
 impl Bodies<'_> {
-    /// Move loads of an object to other locations; the state of its contact points is read again afterwards.
-    fn transfer_loads(&mut self, object: usize, from: &[LocatedLoad], to: &mut [LocatedLoad]) {
+    /// Move spring forces of an object between locations; the state of its contact points is read again afterwards.
+    fn move_spring_forces(
+        &mut self,
+        object: usize,
+        from: impl Iterator<Item = ContactLocation>,
+        to: impl Iterator<Item = ContactLocation> + Clone,
+    ) {
         let own = &mut self.states[object];
         let view =
             &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
-        own.ledger.dissipated += view.transfer_loads(from, to);
+        own.ledger.dissipated += view.move_spring_forces(from, to);
     }
 
     /// Read the state of an object's contact points again.
@@ -39,15 +43,8 @@ impl Bodies<'_> {
         self.states[object].points.remove(slot);
     }
 
-    /// Put a contact point at a location against a side: the known one, or a new one, which takes over its load after a change of level; none when the
-    /// object has no room.
-    fn settle(
-        &mut self,
-        level_changes: &LevelChanges,
-        (object, against): (usize, Collider),
-        known: Option<usize>,
-        location: ContactLocation,
-    ) -> Option<usize> {
+    /// Put a contact point at a location: the known one, or a new one; none when the object has no room.
+    fn settle(&mut self, object: usize, known: Option<usize>, location: ContactLocation) -> Option<usize> {
         let own = &mut self.states[object];
         let view =
             &mut self.objects[object].view(own.felt_gravity(self.gravity), &own.rigid, &mut own.response);
@@ -58,11 +55,7 @@ impl Bodies<'_> {
                 }
                 Some(slot)
             }
-            None => {
-                let slot = own.points.add(view, location)?;
-                own.points.set_load(slot, level_changes.load_of((object, against), &location));
-                Some(slot)
-            }
+            None => own.points.add(view, location),
         }
     }
 }
@@ -73,93 +66,47 @@ struct Place {
     object: usize,
     /// The other side.
     against: Collider,
-    located: LocatedLoad,
+    location: ContactLocation,
     /// Number among those of the step.
     order: usize,
-}
-
-impl Place {
-    fn footprint(&self) -> Footprint {
-        self.located.location.footprint
-    }
-
-    fn sides(&self) -> (usize, Collider) {
-        (self.object, self.against)
-    }
 }
 
 /// Contact points that a step releases and needs, for changes of the level of detail; the buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelChanges {
-    released: BoundedVec<Place>,
-    needed: BoundedVec<Place>,
-    /// Whether loads have moved in this step.
-    have_moved: bool,
-    /// Loads of one transfer.
-    from: BoundedVec<LocatedLoad>,
-    to: BoundedVec<LocatedLoad>,
+    released: Vec<Place>,
+    needed: Vec<Place>,
 }
 
 impl LevelChanges {
     pub(crate) fn new(contacts: usize) -> Self {
-        let places = || BoundedVec::new(2 * contacts);
-        let loads = || BoundedVec::new(2 * contacts);
-        Self { released: places(), needed: places(), have_moved: false, from: loads(), to: loads() }
+        let places = || Vec::with_capacity(2 * contacts);
+        Self { released: places(), needed: places() }
     }
 
-    /// Forget those of the last step.
-    fn clear(&mut self) {
-        self.released.clear();
-        self.needed.clear();
-        self.have_moved = false;
-    }
-
-    fn release(&mut self, object: usize, against: Collider, located: LocatedLoad) {
-        let order = self.released.len();
-        self.released.push(Place { object, against, located, order });
-    }
-
-    fn need(&mut self, object: usize, against: Collider, location: ContactLocation) {
-        let order = self.needed.len();
-        let located = LocatedLoad { location, load: ResidualMemory::default() };
-        self.needed.push(Place { object, against, located, order });
-    }
-
-    /// Move loads from points that are released to those of another level of detail, against the same side.
-    fn apply(&mut self, bodies: &mut Bodies) {
-        let Self { released, needed, have_moved, from, to } = self;
-        released.sort_unstable_by_key(|place| (place.sides(), place.order));
-        for of_object in released.chunk_by(|a, b| a.object == b.object) {
-            let mut has_moved = false;
-            for group in of_object.chunk_by(|a, b| a.against == b.against) {
-                let (sides, footprint) = (group[0].sides(), group[0].footprint());
-                let is_taker = |place: &Place| place.sides() == sides && place.footprint() != footprint;
-                from.clear();
-                to.clear();
-                to.extend(needed.iter().filter(|place| is_taker(place)).map(|place| place.located));
-                if !to.is_empty() {
-                    from.extend(group.iter().map(|place| place.located));
-                    bodies.transfer_loads(sides.0, from, to);
-                    let takers = needed.iter_mut().filter(|place| is_taker(place));
-                    takers.zip(to.iter()).for_each(|(place, taken)| place.located = *taken);
-                    has_moved = true;
-                }
+    /// Move spring forces from points that are released to those of another level of detail, against the same side.
+    fn apply(&self, bodies: &mut Bodies) {
+        let same_sides = |a: &Place, b: &Place| (a.object, a.against) == (b.object, b.against);
+        let mut rest = &*self.released;
+        let mut has_moved = false;
+        while let Some((first, others)) = rest.split_first() {
+            // Places with the same sides lie together.
+            let count = others.iter().take_while(|place| same_sides(place, first)).count();
+            let (group, next) = rest.split_at(count + 1);
+            rest = next;
+            let is_other_level = |place: &&Place| {
+                same_sides(place, first) && place.location.footprint != first.location.footprint
+            };
+            let needed = self.needed.iter().filter(is_other_level).map(|place| place.location);
+            if needed.clone().next().is_some() {
+                bodies.move_spring_forces(first.object, group.iter().map(|place| place.location), needed);
+                has_moved = true;
             }
-            if has_moved {
-                *have_moved = true;
-                bodies.read_state(of_object[0].object);
+            if has_moved && next.first().is_none_or(|place| place.object != first.object) {
+                bodies.read_state(first.object);
+                has_moved = false;
             }
         }
-    }
-
-    /// Load that a new contact point takes over.
-    fn load_of(&self, (object, against): (usize, Collider), location: &ContactLocation) -> ResidualMemory {
-        if !self.have_moved {
-            return ResidualMemory::default();
-        }
-        let is_it =
-            |place: &&Place| place.sides() == (object, against) && place.located.location == *location;
-        self.needed.iter().find(is_it).map_or(ResidualMemory::default(), |place| place.located.load)
     }
 }
 
@@ -180,7 +127,8 @@ pub(crate) fn match_contacts(
     let mut dropped = candidates.dropped;
     let candidates = &mut candidates.list;
     candidates.sort_unstable_by_key(|candidate| candidate.id);
-    level_changes.clear();
+    level_changes.released.clear();
+    level_changes.needed.clear();
     // Points that are no longer in contact go first, so that new ones do not couple to them.
     let mut next = 0;
     contacts.retain(|contact| {
@@ -190,9 +138,9 @@ pub(crate) fn match_contacts(
         let persists = candidates.get(next).is_some_and(|candidate| candidate.id == contact.id);
         if !persists {
             let mut release = |object: usize, against: Collider, slot: usize| {
-                let point = bodies.states[object].points.of(slot);
-                let located = LocatedLoad { location: point.location, load: point.load };
-                level_changes.release(object, against, located);
+                let location = bodies.states[object].points.of(slot).location;
+                let order = level_changes.released.len();
+                level_changes.released.push(Place { object, against, location, order });
                 bodies.release(object, slot);
             };
             release(contact.object(), contact.id.collider, contact.slot);
@@ -209,18 +157,22 @@ pub(crate) fn match_contacts(
                 continue;
             }
             let (object, against) = (candidate.id.object, candidate.id.collider);
-            level_changes.need(object, against, candidate.location);
+            let order = level_changes.needed.len();
+            level_changes.needed.push(Place { object, against, location: candidate.location, order });
             if let CandidateSide::Object { number, location } = candidate.other {
-                level_changes.need(number, Collider::Object(object), location);
+                let against = Collider::Object(object);
+                let order = level_changes.needed.len();
+                level_changes.needed.push(Place { object: number, against, location, order });
             }
         }
+        level_changes.released.sort_unstable_by_key(|place| (place.object, place.against, place.order));
         level_changes.apply(&mut bodies);
     }
     spare.clear();
     let mut known = contacts.iter().peekable();
     for candidate in candidates.iter() {
         let before = known.next_if(|contact| contact.id == candidate.id);
-        match instantiate(&mut bodies, level_changes, candidate, before) {
+        match instantiate(&mut bodies, candidate, before) {
             Some(contact) => spare.push(contact),
             None => dropped += 1,
         }
@@ -232,7 +184,6 @@ pub(crate) fn match_contacts(
 /// Contact of a candidate with its points in place; none when an object has no room for another point.
 fn instantiate(
     bodies: &mut Bodies,
-    level_changes: &LevelChanges,
     candidate: &ContactCandidate,
     before: Option<&Contact>,
 ) -> Option<Contact> {
@@ -240,12 +191,7 @@ fn instantiate(
     let stays =
         |contact: &&Contact| bodies.states[object].points.of(contact.slot).location == candidate.location;
     let is_new = before.filter(stays).is_none();
-    let slot = bodies.settle(
-        level_changes,
-        (object, candidate.id.collider),
-        before.map(|contact| contact.slot),
-        candidate.location,
-    )?;
+    let slot = bodies.settle(object, before.map(|contact| contact.slot), candidate.location)?;
     let other = match candidate.other {
         CandidateSide::Device(device) => OtherSide::Device(device),
         CandidateSide::Obstacle { number, start, end } => OtherSide::Obstacle { number, start, end },
@@ -255,7 +201,7 @@ fn instantiate(
                 OtherSide::Object { slot, .. } => Some(slot),
                 _ => None,
             });
-            match bodies.settle(level_changes, (number, Collider::Object(object)), known, location) {
+            match bodies.settle(number, known, location) {
                 Some(slot) => OtherSide::Object { number, slot },
                 None => {
                     bodies.release(object, slot);

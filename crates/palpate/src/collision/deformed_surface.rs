@@ -9,7 +9,7 @@
 
 use super::node_cache::NodePositionCache;
 use crate::response::{
-    Body, ContactLocation, ContactPoint, ContactPoints, Footprint, ResidualLoads, ResponseState, TipSprings,
+    Body, ContactLocation, ContactPoints, Footprint, NodalForces, ResponseState, SpringForce,
 };
 use crate::surface::{
     Centre, DeformationBound, DeformingNodes, Surface, Traversal, area_normal, at_weights,
@@ -69,10 +69,10 @@ pub(crate) struct DeformedSurface<'a> {
     pub(super) q: &'a [f64],
     /// Modal coordinates at the end of the step without contact force.
     free: &'a [f64],
-    /// Loads of the residual compliance at vertices, and its forces on patches of tips.
-    loads: &'a ResidualLoads,
-    tip_springs: &'a TipSprings,
-    points: &'a ContactPoints,
+    /// Spring forces of the residual compliance, and those of them that act at points, by nodes.
+    spring_forces: &'a [SpringForce],
+    tip_springs: &'a [u32],
+    nodal: &'a NodalForces,
     /// Excluded contacts, and the distance from them up to which the surface moves as their location does [m].
     own: OwnContacts,
     flat_radius: f64,
@@ -85,7 +85,7 @@ impl<'a> DeformedSurface<'a> {
         body: &'a Body,
         footprint: Footprint,
         state: &'a ResponseState,
-        points: &'a ContactPoints,
+        points: &ContactPoints,
         cache: &'a mut NodePositionCache,
         moment: SurfaceTime<'a>,
     ) -> Self {
@@ -108,9 +108,9 @@ impl<'a> DeformedSurface<'a> {
             footprint,
             q,
             free,
-            loads: state.loads(),
+            spring_forces: state.spring_forces(),
             tip_springs: state.tip_springs(),
-            points,
+            nodal: state.nodal(),
             own: [None; MAX_TIP_CONTACTS],
             flat_radius: 0.0,
             cache,
@@ -127,9 +127,11 @@ impl<'a> DeformedSurface<'a> {
     ) {
         if own.iter().any(Option::is_some) {
             let own_displacement = |location: ContactLocation| {
-                let displacement = self
-                    .point_at(&location)
-                    .map_or(DVec3::ZERO, |point| self.body.residual(&location, &location) * point.load_force);
+                let is_its =
+                    |force: &&SpringForce| self.footprint == Footprint::Point && force.location == location;
+                let force = self.spring_forces.iter().find(is_its);
+                let displacement =
+                    force.map_or(DVec3::ZERO, |f| self.body.residual(&location, &location) * f.force);
                 (location, displacement)
             };
             (self.own, self.flat_radius) = (own.map(|location| location.map(own_displacement)), flat_radius);
@@ -226,30 +228,29 @@ impl<'a> DeformedSurface<'a> {
     fn add_residual(&self, node: usize, modal: DVec3) -> DVec3 {
         let own = || self.own.iter().flatten();
         if self.body.is_tip(self.footprint) {
-            let coupled = self.tip_springs.iter().filter(|force| force.location.footprint == self.footprint);
+            let of_tips = self.tip_springs.iter().map(|&at| &self.spring_forces[at as usize]);
+            let coupled = of_tips.filter(|force| force.location.footprint == self.footprint);
             let forces = coupled.map(|force| {
                 let is_own = own().any(|(own, _)| *own == force.location);
                 (force, if is_own { self.flat_radius } else { 0.0 })
             });
             return modal + self.body.tip_displacement(self.footprint, node, forces);
         }
-        let mut position = modal + self.loads.displacement(self.body, self.footprint, node);
+        let displacement = |force: &SpringForce| self.body.residual_displacement(self.footprint, node, force);
+        if self.footprint != Footprint::Point {
+            return modal + self.spring_forces.iter().map(displacement).sum::<DVec3>();
+        }
+        let mut position = modal + self.nodal.residual_displacement(self.body, self.spring_forces, node);
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
         for (own, own_displacement) in own() {
-            let is_beside =
-                |point: &&ContactPoint| (self.rest(node) - point.rest).length() < self.flat_radius;
-            if let Some(point) = self.point_at(own).filter(is_beside) {
-                let by_own = self.body.residual_at(self.footprint, node, own) * point.load_force;
-                position += *own_displacement - by_own;
+            let is_beside = |force: &&SpringForce| {
+                force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
+            };
+            if let Some(force) = self.spring_forces.iter().find(is_beside) {
+                position += *own_displacement - displacement(force);
             }
         }
         position
-    }
-
-    /// Contact point without patch at a location.
-    fn point_at(&self, location: &ContactLocation) -> Option<&'a ContactPoint> {
-        let at_point = self.footprint == Footprint::Point;
-        self.points.points.iter().find(|point| at_point && point.location == *location)
     }
 
     /// Corner positions of a triangle [m].

@@ -33,6 +33,7 @@ pub(crate) struct ObjectState {
 impl ObjectState {
     /// Object at its start, with room for contact points.
     pub(crate) fn new(object: &Object, gravity: DVec3, capacity: usize) -> Self {
+        let nodes = object.body.recording.surface.positions.len();
         let twist = object.start.twist;
         let pose = object.start.pose;
         let angular_momentum = object
@@ -42,7 +43,7 @@ impl ObjectState {
         let still = RigidStep { end: rigid, turn: DVec3::ZERO, residual: 0.0 };
         let mut state = Self {
             rigid,
-            response: object.response.at_rest(&object.body, capacity),
+            response: object.response.at_rest(nodes, capacity),
             points: ContactPoints::new(capacity),
             free: still,
             end: still,

@@ -2,12 +2,12 @@
 //!
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
-use super::level_residual::LevelResidual;
+use super::level_residual::{LevelPair, LevelResidual};
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
 use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
-use super::sampled_residual::ResidualMemory;
+use super::sampled_residual::{ResidualMemory, SampledResidual};
 use crate::dot_products::{dot3, dot3_single};
 use crate::recording::Recording;
 use crate::surface::{
@@ -16,7 +16,7 @@ use crate::surface::{
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Contact footprint: average of displacement and distribution of force about a contact location.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,6 +48,43 @@ pub(crate) struct LocationState {
     pub(crate) memory: ResidualMemory,
 }
 
+/// Force of the residual compliance at a location.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SpringForce {
+    pub(crate) location: ContactLocation,
+    /// Memory of the forces there, and the force whose static displacement they have [N, body].
+    pub(super) memory: ResidualMemory,
+    pub(crate) force: DVec3,
+    /// Rest position [m, body].
+    pub(crate) rest: DVec3,
+    /// Factor Aᵀ of a patch that is no contact sample [√(m/N)], and Aᵀ·force [√J].
+    factor: DMat3,
+    factored: DVec3,
+}
+
+impl SpringForce {
+    /// Multiply the memory.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.memory.scale(factor);
+        self.force *= factor;
+        self.factored *= factor;
+    }
+
+    /// Add another memory at the same location.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.memory.add(&other.memory);
+        self.force += other.force;
+        self.factored += other.factored;
+    }
+
+    /// Let the memory pass over a step without force.
+    pub(super) fn relax(&mut self, residual: &SampledResidual) {
+        residual.relax(&mut self.memory);
+        self.force = residual.effective(&self.memory);
+        self.factored = self.factor * self.force;
+    }
+}
+
 /// Elastic body of one object; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
@@ -58,7 +95,7 @@ pub(crate) struct Body {
     device_patches: usize,
     levels: usize,
     /// Residual compliance between the contact samples of two levels, level by level.
-    pub(super) between_levels: Vec<LevelResidual>,
+    between_levels: Vec<LevelResidual>,
     tree: SphereTree,
     bounds: Bounds,
     /// Mean edge length of the triangles at rest [m].
@@ -300,7 +337,7 @@ impl Body {
         }
     }
 
-    pub(super) fn samples(&self, footprint: Footprint) -> Option<&SampleSurface> {
+    fn samples(&self, footprint: Footprint) -> Option<&SampleSurface> {
         self.patch(footprint).and_then(PatchField::samples)
     }
 
@@ -362,25 +399,55 @@ impl Body {
         sum
     }
 
-    /// Number of surfaces whose vertices carry loads: the nodes', those of contact samples, level by level, and the cells of clamps.
-    pub(super) fn vertex_surfaces(&self) -> usize {
-        1 + self.patches.len() - self.device_patches
+    /// Residual compliance between two locations [m/N]; zero between patches of tips and other footprints, which couple by the
+    /// modes alone.
+    ///
+    /// # Real time
+    pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
+        match self.kernel(a.footprint) {
+            Some(kernel) if a.footprint == b.footprint => kernel.between(&self.recording, &a.point, &b.point),
+            _ => used(self.corners(a))
+                .map(|(node, weight)| self.residual_at(a.footprint, node, b) * weight)
+                .sum(),
+        }
     }
 
-    /// Footprint of such a surface.
-    pub(super) fn footprint_of_surface(&self, surface: usize) -> Footprint {
-        let patch = |after: usize| Footprint::Patch((self.device_patches + after) as u32);
-        surface.checked_sub(1).map_or(Footprint::Point, patch)
-    }
-
-    /// Surface whose vertices carry the loads of a footprint; none for patches of tips.
-    pub(super) fn vertex_surface(&self, footprint: Footprint) -> Option<usize> {
-        match footprint {
-            Footprint::Point => Some(0),
-            Footprint::Patch(index) => {
-                (index as usize + 1).checked_sub(self.device_patches).filter(|at| *at > 0)
+    /// Residual compliance [m/N] of a surface node or a contact sample: its displacement per force at a location.
+    ///
+    /// # Real time
+    /// Costs a few blocks; between samples of different levels a patch.
+    pub(super) fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
+        if self.is_tip(footprint) || self.is_tip(location.footprint) {
+            return DMat3::ZERO;
+        }
+        match (self.samples(footprint), self.samples(location.footprint)) {
+            (None, None) => self.residual_of_node(node, location),
+            (Some(own), _) if footprint == location.footprint => own.residual_at(node, &location.point),
+            (Some(own), _) => {
+                if let Some(known) = self.between_levels(footprint, location.footprint) {
+                    let of = |(sample, weight): (usize, f64)| known.between(node, sample) * weight;
+                    return used(self.corners(location)).map(of).sum();
+                }
+                let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
+                    None => own.to_nodes.between(node, corner) * weight,
+                    Some(patch) => {
+                        let nodes = patch.weights.of(corner);
+                        own.to_nodes.averaged(node, nodes) * weight
+                    }
+                };
+                used(self.corners(location)).map(sum).sum()
+            }
+            (None, Some(other)) => {
+                let of = |sample: usize| other.to_nodes.between(sample, node).transpose();
+                used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
             }
         }
+    }
+
+    /// Residual compliance between the contact samples of two levels, if it is precomputed.
+    fn between_levels(&self, a: Footprint, b: Footprint) -> Option<LevelPair<'_>> {
+        let (a, b) = (self.level_of(a)?.checked_sub(1)?, self.level_of(b)?.checked_sub(1)?);
+        LevelPair::find(&self.between_levels, [a, b])
     }
 
     /// Whether a footprint is a patch of tips.
@@ -388,37 +455,78 @@ impl Body {
         matches!(footprint, Footprint::Patch(index) if (index as usize) < self.device_patches)
     }
 
-    pub(super) fn kernel(&self, footprint: Footprint) -> Option<&ResidualKernel> {
+    fn kernel(&self, footprint: Footprint) -> Option<&ResidualKernel> {
         match &self.patch(footprint)?.centres {
             PatchCentres::Nodes(kernel) => Some(kernel),
             PatchCentres::Samples(_) => None,
         }
     }
 
+    /// Spring force at a location with the memory of its forces [N, body].
+    ///
+    /// # Real time
+    pub(super) fn spring_force(
+        &self,
+        location: ContactLocation,
+        memory: ResidualMemory,
+        residual: &SampledResidual,
+    ) -> SpringForce {
+        let rest = self.rest_position(&location);
+        let factor = self
+            .kernel(location.footprint)
+            .map_or(DMat3::ZERO, |kernel| kernel.factor_at(&self.recording, &location.point).transpose());
+        let force = residual.effective(&memory);
+        SpringForce { location, memory, force, rest, factor, factored: factor * force }
+    }
+
+    /// Residual displacement of a node or contact sample under a force [m, body].
+    ///
+    /// # Real time
+    pub(crate) fn residual_displacement(
+        &self,
+        footprint: Footprint,
+        node: usize,
+        applied: &SpringForce,
+    ) -> DVec3 {
+        self.residual_at(footprint, node, &applied.location) * applied.force
+    }
+
+    /// Residual displacement of the patch of a tip about a node [m, body] under forces on patches of the same radius, each constant up to a
+    /// distance [m] from it.
+    ///
+    /// # Real time
+    pub(crate) fn tip_displacement<'s>(
+        &self,
+        footprint: Footprint,
+        node: usize,
+        forces: impl Iterator<Item = (&'s SpringForce, f64)>,
+    ) -> DVec3 {
+        let Some(kernel) = self.kernel(footprint) else { return DVec3::ZERO };
+        let forces = forces.map(|(force, flat_radius)| (force.rest, force.factored, flat_radius));
+        kernel.displacement(&self.recording, node, forces)
+    }
+
     /// Distribution of a force at a location to nodes, with weights; a node may come more than once. Corners that have no weight but for
     /// round-off get none.
     pub(super) fn distribute(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
-        let corners = self.corners(location).into_iter().filter(|(_, weight)| weight.abs() > f64::EPSILON);
-        for (corner, weight) in corners {
-            self.distribute_vertex((location.footprint, corner), weight, &mut give);
+        for (corner, weight) in self.corners(location) {
+            match self.patch(location.footprint) {
+                _ if weight.abs() <= f64::EPSILON => {}
+                None => give(corner, weight),
+                Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
+            }
         }
     }
 
-    /// Distribution of a force with a weight on a vertex of a footprint's surface to nodes.
-    pub(super) fn distribute_vertex(
-        &self,
-        (footprint, vertex): (Footprint, usize),
-        weight: f64,
-        mut give: impl FnMut(usize, f64),
-    ) {
-        match self.patch(footprint) {
-            None => give(vertex, weight),
-            Some(patch) => patch.weights.of(vertex).for_each(|(node, w)| give(node, w * weight)),
-        }
+    /// Residual compliance of a surface node [m/N]: its displacement per force at a location.
+    pub(super) fn residual_of_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
+        let mut sum = DMat3::ZERO;
+        self.distribute(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
+        sum
     }
 }
 
 /// Corners that carry weight.
-pub(super) fn used(corners: [(usize, f64); 3]) -> impl Iterator<Item = (usize, f64)> {
+fn used(corners: [(usize, f64); 3]) -> impl Iterator<Item = (usize, f64)> {
     corners.into_iter().filter(|(_, weight)| *weight != 0.0)
 }

@@ -5,7 +5,7 @@
 //!
 //! Equations: docs/theory.md (C31), (C32), (C34).
 
-use super::{ContactLocation, LocationState, ResidualMemory, ResponseView};
+use super::{ContactLocation, Footprint, LocationState, ResponseView};
 use crate::dot_products::dot;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -17,7 +17,7 @@ pub(crate) struct ContactPoint {
     pub(crate) location: ContactLocation,
     /// Slot of its rows in the response; constant while the point lasts.
     pub(crate) slot: usize,
-    /// Vertex of the footprint's surface at the location, if it is one.
+    /// Surface node at the location, if it is one.
     pub(crate) node: Option<usize>,
     /// Whether its location is new in this step.
     pub(crate) is_new: bool,
@@ -25,10 +25,6 @@ pub(crate) struct ContactPoint {
     pub(crate) rest: DVec3,
     /// State of the location at the start of the step.
     pub(crate) state: LocationState,
-    /// Load of the residual compliance: memory of the forces on it since it is at its location [N, body].
-    pub(crate) load: ResidualMemory,
-    /// Force whose static displacement the load has [N, body].
-    pub(crate) load_force: DVec3,
     /// Displacement at the end of the step without contact force [m, body].
     pub(crate) free: DVec3,
     /// Displacement at the end of the step [m, body].
@@ -41,6 +37,13 @@ pub(crate) struct ContactPoint {
     /// Arm from the centre of mass at the start and at the end of the step [m, world].
     pub(crate) start_arm: DVec3,
     pub(crate) end_arm: DVec3,
+}
+
+impl ContactPoint {
+    /// Surface node of a point without patch, if the location is a node.
+    pub(crate) fn single_node(&self) -> Option<usize> {
+        self.node.filter(|_| self.location.footprint == Footprint::Point)
+    }
 }
 
 /// Contact points of one object; buffers are made once.
@@ -94,11 +97,6 @@ impl ContactPoints {
         self.points[self.at[slot]].prescribed = Some(force);
     }
 
-    /// Set the load of a slot's point.
-    pub(crate) fn set_load(&mut self, slot: usize, load: ResidualMemory) {
-        self.points[self.at[slot]].load = load;
-    }
-
     /// Add a point at a location. Gives its slot, or none at capacity.
     ///
     /// # Real time
@@ -116,8 +114,6 @@ impl ContactPoints {
             is_new: true,
             rest: DVec3::ZERO,
             state: LocationState::default(),
-            load: ResidualMemory::default(),
-            load_force: DVec3::ZERO,
             free: DVec3::ZERO,
             displacement: DVec3::ZERO,
             prescribed: None,
@@ -141,7 +137,6 @@ impl ContactPoints {
         let rest = view.body.rest_position(&location);
         let point = &mut self.points[at];
         (point.location, point.rest, point.state, point.is_new) = (location, rest, start, true);
-        (point.load, point.load_force) = (ResidualMemory::default(), DVec3::ZERO);
         let corners = view.body.corners(&location);
         point.node = corners.into_iter().find(|(_, weight)| *weight == 1.0).map(|(node, _)| node);
         let Self { points, compliance, stride, .. } = self;

@@ -44,11 +44,10 @@ enum StepEnd {
 }
 
 impl FirState {
-    pub(crate) fn new((fir, body): (&Fir, &Body), slots: usize) -> Self {
-        let nodes = body.recording.surface.positions.len();
+    pub(crate) fn new(fir: &Fir, nodes: usize, slots: usize) -> Self {
         let history = ForceHistory::new(fir.samples(), fir.touchable_nodes());
         Self {
-            surface: ModalState::new(body, slots),
+            surface: ModalState::new(fir.modes.len(), nodes, slots),
             surface_error: 0.0,
             blocks: BlockedConvolution::new(nodes),
             displacements: [(); 2].map(|()| vec![None; nodes]),

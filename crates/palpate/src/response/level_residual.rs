@@ -36,7 +36,6 @@ impl LevelResidual {
 }
 
 /// Residual compliance between the samples of two levels in either order.
-#[derive(Clone, Copy)]
 pub(super) struct LevelPair<'a> {
     known: &'a LevelResidual,
     is_reversed: bool,

@@ -3,36 +3,31 @@
 
 mod blocked_convolution;
 mod body;
-mod body_residual;
 mod contact_points;
 mod convolution;
 mod fir;
 mod force_history;
 mod level_residual;
-mod load_transfer;
 mod modal;
-mod modal_deformation;
 mod modal_distances;
 mod nodal_compliance;
+mod nodal_forces;
 mod oscillator;
 mod patch_field;
 mod point_displacement;
 mod residual_fields;
 mod residual_kernel;
-mod residual_loads;
 mod sample_surface;
 mod sampled_residual;
-mod tip_springs;
+mod spring_forces;
 
-pub(crate) use body::{Body, ContactLocation, Footprint, LocationState};
+pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
-pub(crate) use load_transfer::LocatedLoad;
+
+pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
 pub(crate) use residual_fields::ResidualFields;
-pub(crate) use residual_loads::ResidualLoads;
-pub(crate) use sampled_residual::ResidualMemory;
 pub use sampled_residual::SampledResidual;
-pub(crate) use tip_springs::TipSprings;
 
 use crate::error::ModelError;
 use crate::recording::{ImpulseResponse, Recording};
@@ -43,8 +38,7 @@ use convolution::FirState;
 use fir::Fir;
 use force_history::ForceHistory;
 use glam::{DMat3, DVec3};
-use modal::{ModalState, SampledModes};
-use modal_deformation::ModalDeformation;
+use modal::{ModalDeformation, ModalState, SampledModes};
 use nodal_compliance::NodalCompliance;
 
 /// Form of an object's response.
@@ -161,11 +155,13 @@ impl Response {
         modes.nodal_compliance = Some(known.unwrap_or_else(|| Arc::new(NodalCompliance::new(body, modes))));
     }
 
-    /// State of a body at rest, for a capacity of contact points.
-    pub(crate) fn at_rest(&self, body: &Body, capacity: usize) -> ResponseState {
+    /// State at rest, for the body's number of surface nodes and a capacity of contact points.
+    pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(_) => ResponseState::Modal(Box::new(ModalState::new(body, capacity))),
-            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new((fir, body), capacity))),
+            Self::Modal(modes) => {
+                ResponseState::Modal(Box::new(ModalState::new(modes.len(), nodes, capacity)))
+            }
+            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, nodes, capacity))),
         }
     }
 }
@@ -196,18 +192,22 @@ impl ResponseView<'_> {
         }
     }
 
-    /// Move loads to other locations, where contacts take their place; the others' loads become their shares. Gives the energy [J] that is
-    /// dissipated; with a table none, since its forces stay where they were.
+    /// Move the spring forces of locations to others, where contacts take their place. Gives the energy [J] that is dissipated; with a table
+    /// none, since its forces stay where they were.
     ///
     /// # Real time
-    /// Costs loaded vertices × locations, and the squares of the numbers of locations.
-    pub(crate) fn transfer_loads(&mut self, from: &[LocatedLoad], to: &mut [LocatedLoad]) -> f64 {
+    /// Costs the square of the number of spring forces.
+    pub(crate) fn move_spring_forces(
+        &mut self,
+        from: impl Iterator<Item = ContactLocation>,
+        to: impl Iterator<Item = ContactLocation> + Clone,
+    ) -> f64 {
         match (self.response, &mut *self.state) {
             (Response::Modal(modes), ResponseState::Modal(state)) => {
-                state.transfer_loads(self.body, &modes.residual, from, to)
+                state.move_spring_forces(self.body, &modes.residual, from, to)
             }
             (Response::Fir(fir), ResponseState::Fir(state)) => {
-                state.surface.transfer_loads(self.body, &fir.modes.residual, from, to);
+                state.surface.move_spring_forces(self.body, &fir.modes.residual, from, to);
                 0.0
             }
             _ => 0.0,
@@ -314,14 +314,19 @@ impl ResponseState {
         &self.modal().free
     }
 
-    /// Loads of the residual compliance at vertices.
-    pub(crate) fn loads(&self) -> &ResidualLoads {
-        &self.modal().loads
+    /// Spring forces of the residual compliance with their locations.
+    pub(crate) fn spring_forces(&self) -> &[SpringForce] {
+        &self.modal().spring_forces
     }
 
-    /// Forces of the residual compliance on patches of tips.
-    pub(crate) fn tip_springs(&self) -> &TipSprings {
+    /// Indices of the spring forces on patches of tips.
+    pub(crate) fn tip_springs(&self) -> &[u32] {
         &self.modal().tip_springs
+    }
+
+    /// Spring forces at points, distributed to nodes.
+    pub(crate) fn nodal(&self) -> &NodalForces {
+        &self.modal().nodal
     }
 
     /// √(dᵀ·S·d) of the forces d whose static displacement the residual one is [√J].

@@ -6,14 +6,15 @@
 //! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
 
 use super::ContactPoint;
-use super::body::used;
 use super::nodal_compliance::NodalCompliance;
+use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
-use super::residual_loads::ResidualLoads;
-use super::sampled_residual::{Products, ResidualMemory, SampledResidual};
-use super::tip_springs::{TipSpring, TipSprings};
-use super::{Body, ContactLocation, LocationState};
-use crate::dot_products::{dot3, dot9, dots};
+use super::residual_fields::ResidualFields;
+use super::sampled_residual::{Products, SampledResidual};
+use super::spring_forces::RELAXING;
+use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
+use crate::bounded_vec::BoundedVec;
+use crate::dot_products::{dot, dot3, dot9, dots};
 use crate::recording::Recording;
 use alloc::sync::Arc;
 use alloc::vec;
@@ -49,9 +50,12 @@ pub(crate) struct ModalState {
     rows: Vec<f64>,
     /// Three rows J·Φ·B.
     weighted: Vec<f64>,
-    /// Loads of the residual compliance at vertices, and its forces on patches of tips, which displace nothing else.
-    pub(super) loads: ResidualLoads,
-    pub(super) tip_springs: TipSprings,
+    /// Forces of the residual compliance with their locations.
+    pub(super) spring_forces: BoundedVec<SpringForce>,
+    /// Indices of those on patches of tips, which displace nothing else.
+    pub(super) tip_springs: BoundedVec<u32>,
+    /// Spring forces at points, distributed to nodes.
+    pub(super) nodal: NodalForces,
     /// Products of the parts of the residual compliance's state, over all locations.
     pub(super) products: Products,
     /// Elastic energy of the residual compliance [J], and √(dᵀ·S·d) of the forces d whose static displacement it has [√J].
@@ -82,9 +86,8 @@ impl ResidualBound {
 }
 
 impl ModalState {
-    /// State of a body at rest, for a capacity of contact points.
-    pub(crate) fn new(body: &Body, capacity: usize) -> Self {
-        let modes = body.recording.modes.len();
+    /// State at rest for numbers of modes and surface nodes, and a capacity of contact points.
+    pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
         Self {
             modes: vec![OscillatorState::default(); modes],
             q: vec![0.0; modes],
@@ -94,8 +97,9 @@ impl ModalState {
             held_forces: vec![0.0; modes],
             rows: vec![0.0; 3 * modes * capacity],
             weighted: vec![0.0; 3 * modes],
-            loads: ResidualLoads::new(body),
-            tip_springs: TipSprings::new(capacity),
+            spring_forces: BoundedVec::new(capacity + RELAXING),
+            tip_springs: BoundedVec::new(capacity + RELAXING),
+            nodal: NodalForces::new(nodes),
             products: Products::default(),
             residual_energy: 0.0,
             residual_norm: 0.0,
@@ -130,35 +134,6 @@ impl ModalState {
         self.products = products;
         self.residual_energy = residual.energy(&products);
         self.residual_norm = libm::sqrt(residual.effective_square(&products).max(0.0));
-    }
-
-    /// Displacements of a location by every part of the residual compliance's state at the start of the step [m, body].
-    pub(super) fn displacements_by_memory(&self, body: &Body, location: &ContactLocation) -> ResidualMemory {
-        let mut sum = ResidualMemory::default();
-        if body.is_tip(location.footprint) {
-            for spring in self.tip_springs.iter() {
-                sum.add_displacements(&body.residual(location, &spring.location), &spring.memory);
-            }
-            return sum;
-        }
-        for (vertex, weight) in used(body.corners(location)) {
-            let mut own = self.loads.displacements_by_memory(body, location.footprint, vertex);
-            own.scale(weight);
-            sum.add(&own);
-        }
-        sum
-    }
-
-    /// Let all memories pass over a step without force, and forget those that are small.
-    fn relax(&mut self, residual: &SampledResidual) {
-        let largest = self.largest_force();
-        self.loads.relax(residual, largest);
-        self.tip_springs.relax(residual, largest);
-    }
-
-    /// Size of the largest force of the residual compliance [N].
-    fn largest_force(&self) -> f64 {
-        self.loads.largest().max(self.tip_springs.largest())
     }
 
     fn rows(&self, slot: usize) -> &[f64] {
@@ -212,7 +187,7 @@ impl SampledModes {
         // J·Φ: the weighted rows of the triangle's corners.
         let rows = &mut state.rows[3 * m * slot..3 * m * (slot + 1)];
         rows.fill(0.0);
-        for (node, weight) in used(corners) {
+        for (node, weight) in corners.into_iter().filter(|(_, w)| *w != 0.0) {
             body.add_rows(location.footprint, node, weight, rows);
         }
         let sag = body.sag(location, gravity);
@@ -406,24 +381,18 @@ impl SampledModes {
             *of_held = of_held.max(held.length());
             *start = residual;
             let sag = *sag;
-            self.residual.relax(&mut point.load);
+            if let Some(node) = point.single_node() {
+                state.nodal.store(node, residual - sag);
+            }
             if force != DVec3::ZERO {
                 let memory = self.residual.of_force(force);
-                point.load.add(&memory);
-                match TipSpring::new(body, point.location, memory, &self.residual) {
-                    Some(spring) => state.tip_springs.add(spring),
-                    None => state.loads.add(body, &point.location, &memory, &self.residual),
-                }
-            }
-            point.load_force = self.residual.effective(&point.load);
-            state.loads.add_present(body, &point.location, point.load_force);
-            if let (Some(vertex), Some(surface)) = (point.node, body.vertex_surface(point.location.footprint))
-            {
-                state.loads.store(surface, vertex, residual - sag);
+                state.add_spring_force(body.spring_force(point.location, memory, &self.residual));
+                state.add_at_nodes(body, &point.location, &memory, &self.residual);
             }
         }
-        let has_left = [state.loads.has_left(state.largest_force()), state.tip_springs.has_left()];
-        for ((bound, largest), has_left) in state.residual_bounds.iter_mut().zip(largest).zip(has_left) {
+        state.index_tip_springs(body);
+        let has_left = state.spring_forces.iter().any(|spring| spring.memory.held == DVec3::ZERO);
+        for (bound, largest) in state.residual_bounds.iter_mut().zip(largest) {
             bound.advance(largest, has_left, &self.residual);
         }
         let products = self.residual.advance(&state.products, products);
@@ -443,5 +412,109 @@ impl SampledModes {
             sum[1] += elastic;
         }
         sum
+    }
+
+    /// Displacement of every surface node [m, body], u = Φ·q + S·d.
+    pub(crate) fn surface_displacement(
+        &self,
+        body: &Body,
+        deformed: &ModalDeformation,
+        gravity: DVec3,
+        residual_fields: &mut ResidualFields,
+        out: &mut [DVec3],
+    ) {
+        let modes = &body.recording.modes;
+        self.residual_displacements(body, deformed, gravity, residual_fields, out);
+        for (node, u) in out.iter_mut().enumerate() {
+            let row = |axis: usize| modes.row(node, axis);
+            *u += DVec3::new(dot(row(0), &deformed.q), dot(row(1), &deformed.q), dot(row(2), &deformed.q));
+        }
+    }
+
+    /// Displacement of every surface node beyond the modes [m, body]: S·d, and the sag of a fixed body.
+    pub(crate) fn residual_displacements(
+        &self,
+        body: &Body,
+        deformed: &ModalDeformation,
+        gravity: DVec3,
+        residual_fields: &mut ResidualFields,
+        out: &mut [DVec3],
+    ) {
+        let recording = &body.recording;
+        match &recording.gravity {
+            Some(response) => {
+                let sag = |node: usize| response.residual_displacement(node, gravity);
+                out.iter_mut().enumerate().for_each(|(node, u)| *u = sag(node));
+            }
+            None => out.fill(DVec3::ZERO),
+        }
+        let mut loads = deformed.loaded.clone();
+        if !residual_fields.add(body, &deformed.patches, out) {
+            // All forces as nodal forces, since patches overlap.
+            for SpringForce { location, force, .. } in &deformed.patches {
+                body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
+            }
+            // Stable: the order of a node's forces is that of their sum.
+            loads.sort_by_key(|(node, _)| *node);
+            loads.dedup_by(|next, kept| {
+                let same = next.0 == kept.0;
+                if same {
+                    kept.1 += next.1;
+                }
+                same
+            });
+        }
+        add_residual_displacements(&recording.residual, &loads, out);
+    }
+}
+
+/// Data that determine the displacement of an object in modal form; buffers are made once.
+#[derive(Debug)]
+pub(crate) struct ModalDeformation {
+    q: Vec<f64>,
+    /// Forces on nodes [N, body].
+    loaded: Vec<(u32, DVec3)>,
+    /// Forces on patches.
+    patches: Vec<SpringForce>,
+}
+
+impl Clone for ModalDeformation {
+    /// Clone of equal capacity: later copies into it do not allocate.
+    fn clone(&self) -> Self {
+        let mut loaded = Vec::with_capacity(self.loaded.capacity());
+        loaded.extend_from_slice(&self.loaded);
+        let mut patches = Vec::with_capacity(self.patches.capacity());
+        patches.extend_from_slice(&self.patches);
+        Self { q: self.q.clone(), loaded, patches }
+    }
+}
+
+impl ModalDeformation {
+    pub(super) fn new(state: &ModalState) -> Self {
+        let mut new = Self {
+            q: state.q.clone(),
+            loaded: Vec::with_capacity(state.nodal.capacity()),
+            patches: Vec::with_capacity(state.spring_forces.capacity()),
+        };
+        new.copy_from(state);
+        new
+    }
+
+    /// Modal coordinates q [m·√kg].
+    pub(super) fn coordinates(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// Copy the present data of the same object.
+    ///
+    /// # Real time
+    pub(super) fn copy_from(&mut self, state: &ModalState) {
+        self.q.copy_from_slice(&state.q);
+        self.loaded.clear();
+        self.loaded.extend_from_slice(state.nodal.loaded());
+        self.patches.clear();
+        let patches =
+            state.spring_forces.iter().filter(|applied| applied.location.footprint != Footprint::Point);
+        self.patches.extend(patches.copied());
     }
 }

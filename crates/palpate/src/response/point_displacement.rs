@@ -6,7 +6,6 @@
 //!
 //! Equations: docs/theory.md (C3), (C8).
 
-use super::body::used;
 use super::convolution::FirState;
 use super::fir::Fir;
 use super::modal::ModalState;
@@ -20,7 +19,7 @@ impl ResponseState {
     /// Elastic displacement of a surface point at the end of the last step [m, body], under a gravity [m/s², body].
     ///
     /// # Real time
-    /// Costs modes and loaded vertices; with a table the forces of the last T steps.
+    /// Costs modes and spring forces; with a table the forces of the last T steps.
     pub(crate) fn displacement_at(
         &self,
         (response, body): (&Response, &Body),
@@ -41,11 +40,15 @@ fn modal_displacement(body: &Body, state: &ModalState, point: &SurfacePoint, gra
     let recording = &*body.recording;
     let location = ContactLocation { point: *point, footprint: Footprint::Point };
     let mut displacement = body.sag(&location, gravity);
-    for (node, weight) in used(recording.surface.corners(point)) {
+    for (node, weight) in recording.surface.corners(point).into_iter().filter(|(_, weight)| *weight != 0.0) {
         let m = recording.modes.len();
         let mut own = dot3(&recording.modes.mode_shapes[3 * m * node..3 * m * (node + 1)], &state.q);
-        own += state.loads.displacement(body, Footprint::Point, node);
-        for spring in state.tip_springs.iter() {
+        for &(other, force) in state.nodal.loaded() {
+            own += recording.residual.block(node, other as usize) * force;
+        }
+        let patches =
+            state.spring_forces.iter().filter(|spring| spring.location.footprint != Footprint::Point);
+        for spring in patches {
             own += body.residual_of_node(node, &spring.location) * spring.force;
         }
         displacement += own * weight;

@@ -7,8 +7,7 @@
 //! w are the weights of the patch about node c, S [m/N] the residual compliance. The patches of a resting face press in every
 //! rendered frame, and each loads dozens of nodes of a whole S.
 
-use super::body::{Body, Footprint};
-use super::residual_loads::VertexLoad;
+use super::body::{Body, Footprint, SpringForce};
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
@@ -27,23 +26,25 @@ pub(crate) struct ResidualFields {
 
 impl ResidualFields {
     /// Add the residual displacements under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
-    pub(super) fn add(&mut self, body: &Body, loads: &[VertexLoad], out: &mut [DVec3]) -> bool {
+    pub(super) fn add(&mut self, body: &Body, patches: &[SpringForce], out: &mut [DVec3]) -> bool {
         if !body.recording.residual.is_whole() {
             return false;
         }
         self.frame += 1;
-        for VertexLoad { footprint, vertex, force } in loads {
-            let Footprint::Patch(index) = *footprint else { continue };
-            let entry = self.fields.entry((index, *vertex));
-            let (field, used) =
-                entry.or_insert_with(|| (compliance_field(body, *footprint, *vertex as usize), 0));
-            *used = self.frame;
-            let force = force.as_vec3();
-            let (blocks, _) = field.as_chunks::<9>();
-            for (u, [a, b, c, d, e, f, g, h, i]) in out.iter_mut().zip(blocks) {
-                u.x += f64::from(a * force.x + d * force.y + g * force.z);
-                u.y += f64::from(b * force.x + e * force.y + h * force.z);
-                u.z += f64::from(c * force.x + f * force.y + i * force.z);
+        for SpringForce { location, force, .. } in patches {
+            let Footprint::Patch(index) = location.footprint else { continue };
+            for (corner, weight) in body.corners(location).into_iter().filter(|(_, weight)| *weight != 0.0) {
+                let entry = self.fields.entry((index, corner as u32));
+                let (field, used) =
+                    entry.or_insert_with(|| (compliance_field(body, location.footprint, corner), 0));
+                *used = self.frame;
+                let force = (*force * weight).as_vec3();
+                let (blocks, _) = field.as_chunks::<9>();
+                for (u, [a, b, c, d, e, f, g, h, i]) in out.iter_mut().zip(blocks) {
+                    u.x += f64::from(a * force.x + d * force.y + g * force.z);
+                    u.y += f64::from(b * force.x + e * force.y + h * force.z);
+                    u.z += f64::from(c * force.x + f * force.y + i * force.z);
+                }
             }
         }
         if self.fields.len() > MAX_CACHED {
@@ -70,7 +71,6 @@ fn compliance_field(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32
 
 #[cfg(test)]
 mod tests {
-    use super::super::tip_springs::TipSpring;
     use super::*;
     use crate::recording::Recording;
     use crate::spatial::{Pose, Twist};
@@ -94,29 +94,19 @@ mod tests {
             let tip = |side: f64| DeviceInput::touching(DVec3::new(side * (0.111 - inwards), 0.01, 0.01));
             let input = Input { devices: vec![tip(-1.0), tip(1.0)], ..Input::default() };
             crate::step::step(&model, &mut state, &input);
-            let body = &model.objects[0].body;
-            let tip_springs: Vec<&TipSpring> = state.objects[0].response.tip_springs().iter().collect();
-            let loads = tip_springs.iter().flat_map(|spring| {
-                let TipSpring { location, force, .. } = spring;
-                let corners = body.corners(location).into_iter();
-                corners.map(|(vertex, weight)| VertexLoad {
-                    footprint: location.footprint,
-                    vertex: vertex as u32,
-                    force: *force * weight,
-                })
-            });
+            let (body, spring_forces) = (&model.objects[0].body, state.objects[0].response.spring_forces());
             let mut displacements = vec![DVec3::ZERO; body.recording.surface.positions.len()];
-            assert!(residual_fields.add(body, &loads.collect::<Vec<_>>(), &mut displacements));
+            assert!(residual_fields.add(body, spring_forces, &mut displacements));
             for (node, displacement) in displacements.into_iter().enumerate() {
                 let by_nodes =
-                    |applied: &&TipSpring| body.residual_of_node(node, &applied.location) * applied.force;
-                let expected: DVec3 = tip_springs.iter().map(by_nodes).sum();
+                    |applied: &SpringForce| body.residual_of_node(node, &applied.location) * applied.force;
+                let expected: DVec3 = spring_forces.iter().map(by_nodes).sum();
                 assert!(
                     (displacement - expected).length() <= 1e-6 * expected.length() + 1e-12,
                     "{number}, {node}"
                 );
             }
         }
-        assert!(state.objects[0].response.tip_springs().iter().count() > 1, "they press");
+        assert!(state.objects[0].response.spring_forces().len() > 1, "they press");
     }
 }

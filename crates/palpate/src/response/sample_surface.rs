@@ -153,6 +153,14 @@ impl SampleSurface {
         SurfacePoint { triangle, weights: [0, 1, 2].map(|k| if Some(k) == first { 1.0 } else { 0.0 }) }
     }
 
+    /// Residual compliance [m/N] of a vertex: its displacement per force at a point of the decimated surface.
+    ///
+    /// # Real time
+    pub(super) fn residual_at(&self, vertex: usize, point: &SurfacePoint) -> DMat3 {
+        let between = |other: usize| self.residual.block(vertex, other);
+        self.used_corners(point).map(|(other, weight)| between(other) * weight).sum()
+    }
+
     /// Residual compliance of a vertex per force that nodes share by weights [m/N].
     pub(super) fn averaged_residual(
         &self,
@@ -160,6 +168,10 @@ impl SampleSurface {
         nodes: impl Iterator<Item = (usize, f64)>,
     ) -> DMat3 {
         self.to_nodes.averaged(vertex, nodes)
+    }
+
+    fn used_corners(&self, point: &SurfacePoint) -> impl Iterator<Item = (usize, f64)> {
+        self.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0)
     }
 }
 

@@ -1,0 +1,186 @@
+//! Spring forces of the residual compliance on nodes, and their displacements.
+
+use super::sampled_residual::{ResidualMemory, SampledResidual};
+use super::{Body, Footprint, SpringForce};
+use crate::recording::ResidualCompliance;
+use alloc::vec;
+use alloc::vec::Vec;
+use glam::DVec3;
+
+/// Forces at points [N, body], distributed to the nodes of their triangles and summed.
+#[derive(Debug, Clone)]
+pub(crate) struct NodalForces {
+    /// Loaded nodes and the forces whose static displacement they have.
+    loaded: Vec<(u32, DVec3)>,
+    /// Memory of the forces on each.
+    memories: Vec<ResidualMemory>,
+    /// Index of each surface node in `loaded`, from 1; 0 for unloaded nodes.
+    at: Vec<u32>,
+    /// Cached residual displacements of surface nodes [m, body], and the nodes that have one.
+    displacements: Vec<Option<DVec3>>,
+    cached: Vec<u32>,
+}
+
+impl NodalForces {
+    pub(super) fn new(nodes: usize) -> Self {
+        Self {
+            loaded: Vec::with_capacity(nodes),
+            memories: Vec::with_capacity(nodes),
+            at: vec![0; nodes],
+            displacements: vec![None; nodes],
+            cached: Vec::with_capacity(nodes),
+        }
+    }
+
+    /// Loaded nodes with their forces [N, body].
+    pub(super) fn loaded(&self) -> &[(u32, DVec3)] {
+        &self.loaded
+    }
+
+    /// Upper limit of loaded nodes.
+    pub(super) fn capacity(&self) -> usize {
+        self.loaded.capacity()
+    }
+
+    /// Forget the cached displacements.
+    pub(super) fn clear_cache(&mut self) {
+        let Self { displacements, cached, .. } = self;
+        cached.drain(..).for_each(|node| displacements[node as usize] = None);
+    }
+
+    /// Let all memories pass over a step without force, and forget those below a limit [N].
+    pub(super) fn relax(&mut self, residual: &SampledResidual, least: f64) {
+        self.clear_cache();
+        let Self { loaded, memories, at, .. } = self;
+        let mut kept = 0;
+        for index in 0..loaded.len() {
+            let node = loaded[index].0;
+            let mut memory = memories[index];
+            residual.relax(&mut memory);
+            let is_kept = memory.size() > least;
+            at[node as usize] = if is_kept { kept as u32 + 1 } else { 0 };
+            if is_kept {
+                (loaded[kept], memories[kept]) = ((node, residual.effective(&memory)), memory);
+                kept += 1;
+            }
+        }
+        loaded.truncate(kept);
+        memories.truncate(kept);
+    }
+
+    pub(super) fn add(
+        &mut self,
+        corners: [(usize, f64); 3],
+        memory: &ResidualMemory,
+        residual: &SampledResidual,
+    ) {
+        for (node, weight) in corners.into_iter().filter(|(_, weight)| *weight != 0.0) {
+            if self.at[node] == 0 {
+                self.loaded.push((node as u32, DVec3::ZERO));
+                self.memories.push(ResidualMemory::default());
+                self.at[node] = self.loaded.len() as u32;
+            }
+            let index = self.at[node] as usize - 1;
+            self.memories[index].add(&memory.map(|force| force * weight));
+            self.loaded[index].1 = residual.effective(&self.memories[index]);
+        }
+    }
+
+    /// Displacements of a node by every part of the memories, and by those of contact samples [m, body].
+    ///
+    /// # Real time
+    /// Costs the loaded nodes and the springs.
+    pub(super) fn displacements_by_memory(
+        &self,
+        body: &Body,
+        springs: &[SpringForce],
+        node: usize,
+    ) -> ResidualMemory {
+        let mut sum = ResidualMemory::default();
+        for ((other, _), memory) in self.loaded.iter().zip(&self.memories) {
+            let block = body.recording.residual.block(node, *other as usize);
+            sum.add_displacements(&block, memory);
+        }
+        for spring in springs.iter().filter(|spring| spring.location.footprint != Footprint::Point) {
+            let block = body.residual_at(Footprint::Point, node, &spring.location);
+            sum.add_displacements(&block, &spring.memory);
+        }
+        sum
+    }
+
+    /// Residual displacement of a node under these forces and the springs of contact samples [m, body].
+    ///
+    /// # Real time
+    /// Costs the loaded nodes and the springs, unless it is cached.
+    pub(crate) fn residual_displacement(&self, body: &Body, springs: &[SpringForce], node: usize) -> DVec3 {
+        let sum = || {
+            let residual = &body.recording.residual;
+            let at_nodes = self.loaded.iter();
+            let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
+            let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
+            let by_sample = |spring| body.residual_displacement(Footprint::Point, node, spring);
+            at_nodes.chain(of_samples.map(by_sample)).sum()
+        };
+        self.displacements[node].unwrap_or_else(sum)
+    }
+
+    /// Cache the residual displacement of a node [m, body].
+    pub(super) fn store(&mut self, node: usize, displacement: DVec3) {
+        if self.displacements[node].replace(displacement).is_none() {
+            self.cached.push(node as u32);
+        }
+    }
+}
+
+/// Add the residual displacements of all nodes under nodal forces [N] to `out` [m]. Costs nodes × forces, or for a near field
+/// the blocks of the loaded nodes.
+pub(super) fn add_residual_displacements(
+    residual: &ResidualCompliance,
+    loads: &[(u32, DVec3)],
+    out: &mut [DVec3],
+) {
+    for &(node, force) in loads {
+        let node = node as usize;
+        match residual {
+            // S is symmetric: the blocks of a column are those of the row, transposed.
+            ResidualCompliance::NearField(near) => {
+                near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
+            }
+            _ => out.iter_mut().enumerate().for_each(|(i, u)| *u += residual.block(i, node) * force),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{NearField, Recording};
+
+    #[test]
+    fn residual_displacements_are_the_sums_of_blocks() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Recording::from_bytes(bytes).expect("a released recording");
+        let (whole, n) = (recording.residual, recording.surface.positions.len());
+        // A near field of rows of blocks without every third one.
+        let kept = |i: usize, j: usize| (i + j) % 3 != 1;
+        let mut near = NearField { radius: 1.0, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
+        for i in 0..n {
+            for j in (0..n).filter(|&j| kept(i, j)) {
+                near.nodes.push(j as u32);
+                let block = whole.block(i, j);
+                near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
+            }
+            near.offsets.push(near.nodes.len() as u32);
+        }
+        let loads =
+            [(0, DVec3::X), (5, DVec3::new(0.3, -1.0, 2.0)), (n as u32 - 1, DVec3::new(-1.0, 0.5, 0.1))];
+        for residual in [whole, ResidualCompliance::NearField(near), ResidualCompliance::None] {
+            let mut out = vec![DVec3::Y; n];
+            add_residual_displacements(&residual, &loads, &mut out);
+            for (i, u) in out.into_iter().enumerate() {
+                let sum: DVec3 = loads.iter().map(|&(j, f)| residual.block(i, j as usize) * f).sum();
+                assert!((u - DVec3::Y - sum).length() < 1e-14 * (1.0 + sum.length()), "{i}: {u} {sum}");
+            }
+        }
+    }
+}
