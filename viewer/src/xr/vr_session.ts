@@ -11,6 +11,12 @@ import { sceneFromRoom } from "./vr_stage";
 const CLIP = { near: 0.02, far: 50 };
 const HANDS = ["left", "right"] as const;
 
+/** Whether the page may ask for a headset: in a frame of another origin it may not, and Chromium reports an error when it does. */
+function mayAskForHeadset(): boolean {
+  const { featurePolicy } = document as { featurePolicy?: { allowsFeature(name: string): boolean } };
+  return featurePolicy?.allowsFeature("xr-spatial-tracking") ?? true;
+}
+
 export class VrSession {
   readonly button = iconButton("headset", "Enter VR", () => void this.toggle(), "VR");
   private session: XRSession | null = null;
@@ -29,11 +35,11 @@ export class VrSession {
     this.stage.matrixAutoUpdate = false;
     this.stage.add(this.camera);
     this.button.hidden = true;
+    if (!mayAskForHeadset()) return;
     navigator.xr?.isSessionSupported("immersive-vr").then(
       (supported) => {
         this.button.hidden = !supported;
       },
-      // A page in a frame may not ask.
       () => undefined,
     );
   }
