@@ -48,7 +48,13 @@ async function pressDown(page, which) {
   const offset = await tipOffset(page, which);
   for (let y = 1.5; y > 1; y -= 0.03) {
     await page.evaluate(([kind, [dx, dy, dz], height]) => window.headset[kind].right.position.set(-dx, height - dy, -0.5 - dz), [which, offset, y]);
-    await page.waitForTimeout(60);
+    // On a slow page, too, the headset's frame has the place, and a later frame of the scene its force.
+    await page.evaluate(() => {
+      const session = window.palpate.sceneView.renderer.xr.getSession();
+      return new Promise((done) => session.requestAnimationFrame(() => session.requestAnimationFrame(done)));
+    });
+    const step = await page.evaluate(() => window.palpate.sceneView.graphs[0].frame.step);
+    await page.waitForFunction((sent) => window.palpate.sceneView.graphs[0].frame.step > sent + 60, step);
     if (Math.max(...(await lifts(page))) > 0.02) return;
   }
   throw new Error(`no force is felt by ${which}: ${await lifts(page)}`);
