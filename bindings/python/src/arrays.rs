@@ -101,12 +101,16 @@ pub fn read_integers(given: &Bound<'_, PyAny>, name: &str, columns: usize) -> Py
 pub fn check_finite(py: Python<'_>, name: &str, numbers: &[f64], width: usize) -> PyResult<()> {
     match numbers.iter().position(|number| !number.is_finite()) {
         None => Ok(()),
-        Some(at) => {
-            let row = at / width;
-            let found = &numbers[row * width..][..width];
-            Err(input_error(py, format!("row {row} of {name} is {found:?}, expected finite numbers")))
-        }
+        Some(at) => check_finite_row(py, name, at / width, &numbers[at / width * width..][..width]),
     }
+}
+
+/// Check that the numbers of a row are finite.
+pub fn check_finite_row(py: Python<'_>, name: &str, row: usize, numbers: &[f64]) -> PyResult<()> {
+    if numbers.iter().all(|number| number.is_finite()) {
+        return Ok(());
+    }
+    Err(input_error(py, format!("row {row} of {name} is {numbers:?}, expected finite numbers")))
 }
 
 /// Shape as Python shows it.

@@ -119,7 +119,9 @@ fn read_numbers<'py>(
     let checked = numbers.as_slice()?;
     check_finite(py, kind.name(), checked, kind.columns())?;
     if kind != Kind::Devices {
-        check_poses(py, kind.name(), checked)?;
+        for (row, pose) in checked.chunks_exact(kind.columns()).enumerate() {
+            pose_of_row(kind, row, pose).map_err(|error| input_error(py, error))?;
+        }
     }
     Ok(numbers)
 }
@@ -172,18 +174,16 @@ pub fn copy(name: &str, numbers: &[f64], into: &mut Vec<f64>) -> PyResult<()> {
     Ok(())
 }
 
-fn check_poses(py: Python<'_>, name: &str, numbers: &[f64]) -> PyResult<()> {
-    for (row, pose) in numbers.chunks_exact(7).enumerate() {
-        pose_of(pose).map_err(|error| input_error(py, format!("row {row} of {name}: {error}")))?;
-    }
-    Ok(())
+/// Pose of a row of a kind of parts; the error names the row.
+pub fn pose_of_row(kind: Kind, row: usize, numbers: &[f64]) -> Result<Pose, String> {
+    pose_of(numbers).map_err(|error| format!("row {row} of {}: {error}", kind.name()))
 }
 
 /// Write rows of numbers of a kind of parts into an input.
 pub fn write(kind: Kind, numbers: &[f64], input: &mut Input) -> Result<(), String> {
     let poses = |into: &mut Vec<Pose>| {
         for (row, (pose, numbers)) in into.iter_mut().zip(numbers.chunks_exact(7)).enumerate() {
-            *pose = pose_of(numbers).map_err(|error| format!("row {row} of {}: {error}", kind.name()))?;
+            *pose = pose_of_row(kind, row, numbers)?;
         }
         Ok(())
     };

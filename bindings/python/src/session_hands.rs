@@ -3,10 +3,10 @@
 //! A move is reached in a straight line in the time since the move before it: a hand that is moved at some hertz, by a loop of control or by
 //! pictures of a camera, goes evenly from each position to the next, one interval late (delayed first-order hold).
 
-use crate::arrays::{Numbers, check_finite, pose_of};
+use crate::arrays::{Numbers, check_finite, check_finite_row};
 use crate::device_mode::ModeChange;
 use crate::errors::input_error;
-use crate::motion::{Arguments, Kind};
+use crate::motion::{Arguments, Kind, pose_of_row};
 use crate::scene::Scene as PythonScene;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceMode, Pose};
@@ -243,11 +243,9 @@ impl Frames {
     /// Poses of the parts without a path.
     fn read(&self, py: Python<'_>, kind: Kind, given: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, Pose)>> {
         let rows = read_rows(py, kind, given, |row| self.senders[row].is_some(), self.senders.len())?;
-        let pose = |(row, numbers): (usize, Vec<f64>)| match pose_of(&numbers) {
-            Ok(pose) => Ok((row, pose)),
-            Err(error) => Err(input_error(py, format!("row {row} of {}: {error}", kind.name()))),
-        };
-        rows.into_iter().map(pose).collect()
+        let pose = |(row, numbers): (usize, Vec<f64>)| Ok((row, pose_of_row(kind, row, &numbers)?));
+        let poses: Result<_, String> = rows.into_iter().map(pose).collect();
+        poses.map_err(|error| input_error(py, error))
     }
 }
 
@@ -265,12 +263,7 @@ fn read_rows(
     for (row, numbers) in
         numbers.as_slice()?.chunks_exact(columns).enumerate().filter(|(row, _)| is_moved(*row))
     {
-        if numbers.iter().any(|number| !number.is_finite()) {
-            return Err(input_error(
-                py,
-                format!("row {row} of {name} is {numbers:?}, expected finite numbers"),
-            ));
-        }
+        check_finite_row(py, name, row, numbers)?;
         moved.push((row, numbers.to_vec()));
     }
     Ok(moved)

@@ -211,7 +211,7 @@ impl ForceProcess {
                 }
                 slot.motion = motion;
             }
-            // Who took no part begins where the hand is now.
+            // A hand that took no part begins where it is now.
             if !input.mode.is_active() {
                 slot.ramp = Ramp::default();
             }

@@ -86,7 +86,7 @@ impl Duck {
         }
         let meshing = MeshingParameters { cell_size: Some(self.cell_size) };
         let (mut mesh, _) = tetrahedralise(&surface, &meshing, &mut |_| ControlFlow::Continue(()))?;
-        // That parts overlap is meant.
+        // Warnings of parts that overlap: they are meant to.
         mesh.warnings.clear();
         mesh.checked()
     }

@@ -227,7 +227,7 @@ export class SceneView {
     if (graph === undefined || this.lost) return;
     const { renderer } = this;
     const target = renderer.getRenderTarget();
-    // What is drawn into textures is not seen through the headset's eyes.
+    // Textures are drawn without the headset's cameras.
     renderer.xr.enabled = false;
     graph.applyTheme(this.settings, this.colourRange);
     graph.updateTargets(renderer);

@@ -46,7 +46,7 @@ export const sharedMaterialCases = [
       await page.waitForFunction((g) => window.palpate.sceneView.graphs[0]?.frame?.generation > g, generation);
       await send(page, { type: "set_material", object: 0, young: 25000, poisson, density: 400 });
       await waitForMaterial(page, 25000, 400);
-      // Where there is a server, a viewer that comes now.
+      // A viewer that comes now, where there is a server.
       const later = serverless ? page : await browser.page(server.url);
       await waitForScene(later);
       const link = await linkOf(later);

@@ -46,16 +46,8 @@ pub fn process_from(state: State, model: &Arc<Model>) -> (ForceProcess, Vec<Devi
         .unzip();
     let floor = model.parameters().obstacles[0].pose;
     let trajectory: PoseTrajectory = Box::new(move |_| floor);
-    (
-        ForceProcess::from_state(
-            state,
-            model.clone(),
-            slots,
-            SceneMotion { obstacles: vec![trajectory], ..SceneMotion::default() },
-            0.05,
-        ),
-        ends,
-    )
+    let motion = SceneMotion { obstacles: vec![trajectory], ..SceneMotion::default() };
+    (ForceProcess::from_state(state, model.clone(), slots, motion, 0.05), ends)
 }
 
 /// A path from text.
