@@ -5,7 +5,7 @@
 use crate::arrays::array;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::{BatchOutputs, Part};
-use crate::batch_rows::{Row, Rows, chosen_rows, failure_of, fill_rows, make_rows};
+use crate::batch_rows::{Row, Rows, Workspaces, chosen_rows, failure_of, fill_rows, make_rows};
 use crate::batch_series::BatchSeries;
 use crate::contacts::ContactLayout;
 use crate::device_mode::ModeChange;
@@ -127,7 +127,8 @@ impl Batch {
         fill_rows(&rows, &mut numbers, outputs.row_length());
         outputs.write(py, &numbers)?;
         let motion = BatchMotion::new(&inner, len);
-        let rows = Rows { rows, outputs: numbers, motion, workers, is_backward: false };
+        let workspaces = Workspaces::new(&inner, threads);
+        let rows = Rows { rows, outputs: numbers, motion, workers, workspaces, is_backward: false };
         let layout = ContactLayout::new(&inner);
         Ok(Self { scene, inner, layout, outputs, len, threads, rows: Mutex::new(rows) })
     }
@@ -226,13 +227,13 @@ impl Batch {
         let count =
             motion.count_steps(steps.map(|Whole(steps)| steps)).map_err(|text| input_error(py, text))?;
         let mut guard = self.lock(py)?;
-        let Rows { rows, outputs, workers, .. } = &mut *guard;
+        let Rows { rows, outputs, workers, workspaces, .. } = &mut *guard;
         let mut series = BatchSeries::new(self.len, count, self.outputs.row_length())
             .map_err(|error| PyMemoryError::new_err(format!("the series of {count} steps: {error}")))?;
         let mut failed = Vec::new();
         let mut interrupt = None;
         while series.done() < count && interrupt.is_none() {
-            let part = py.detach(|| workers.run(|| series.run_part(&self.inner, &motion, rows)));
+            let part = py.detach(|| workers.run(|| series.run_part(&self.inner, workspaces, &motion, rows)));
             failed.append(&mut part.map_err(|error| no_threads(py, &error))?);
             interrupt = py.check_signals().err();
         }

@@ -6,11 +6,13 @@ use crate::batch_outputs::fill_row;
 use crate::errors::{catch_panic, input_error};
 use crate::run_state::{RunState, StepFailure};
 use crate::workers::Workers;
+use palpate::Workspace;
 use palpate_fem::check_memory;
 use palpate_scene::Scene;
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuildError;
 use rayon::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Number of rows by whose memory that of all is estimated.
 const FIRST_ROWS: usize = 64;
@@ -22,6 +24,7 @@ pub struct Rows {
     pub outputs: Vec<f64>,
     pub motion: BatchMotion,
     pub workers: Workers,
+    pub workspaces: Workspaces,
     /// Whether the next step goes from the last row to the first.
     pub is_backward: bool,
 }
@@ -33,10 +36,11 @@ impl Rows {
     /// # Errors
     /// If the system gives no threads.
     pub fn step(&mut self, scene: &Scene, length: usize) -> Result<Vec<usize>, ThreadPoolBuildError> {
-        let Self { rows, outputs, motion, workers, is_backward } = self;
-        let (motion, backward) = (&*motion, std::mem::replace(is_backward, !*is_backward));
+        let Self { rows, outputs, motion, workers, workspaces, is_backward } = self;
+        let (motion, workspaces) = (&*motion, &*workspaces);
+        let backward = std::mem::replace(is_backward, !*is_backward);
         let step_row = |(at, (row, outputs)): (usize, (&mut Row, &mut [f64]))| {
-            let has_failed = row.step(scene, motion, (0, at));
+            let has_failed = row.step(scene, &mut workspaces.own(), motion, (0, at));
             row.fill(outputs);
             has_failed.then_some(at)
         };
@@ -63,6 +67,22 @@ impl Rows {
     }
 }
 
+/// Buffers of steps, for each thread: those of a thousand rows would not stay in a core's cache.
+pub struct Workspaces(Vec<Mutex<Workspace>>);
+
+impl Workspaces {
+    /// Buffers for a number of threads.
+    pub fn new(scene: &Scene, threads: usize) -> Self {
+        Self((0..threads).map(|_| Mutex::new(Workspace::new(&scene.model))).collect())
+    }
+
+    /// Those of the thread that asks, which no other one uses.
+    pub fn own(&self) -> MutexGuard<'_, Workspace> {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        self.0[thread].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// State of a row.
 pub struct Row {
     pub run: RunState,
@@ -71,19 +91,26 @@ pub struct Row {
 }
 
 impl Row {
-    pub fn new(run: RunState) -> Self {
+    pub fn new(mut run: RunState) -> Self {
+        run.state.release_workspace();
         Self { run, failure: None }
     }
 
     /// Step with the motion of the row `at` in a step of the series; gives whether it failed now. A row that has failed before stays.
-    pub fn step(&mut self, scene: &Scene, motion: &BatchMotion, (step, at): (usize, usize)) -> bool {
+    pub fn step(
+        &mut self,
+        scene: &Scene,
+        workspace: &mut Workspace,
+        motion: &BatchMotion,
+        (step, at): (usize, usize),
+    ) -> bool {
         if self.failure.is_some() {
             return false;
         }
         let stepped = catch_panic(|| {
             self.run.follow_paths(scene);
             motion.write(step, at, &mut self.run.input).map_err(StepFailure::Motion)?;
-            self.run.step(scene)
+            self.run.step_in(scene, workspace)
         });
         self.failure = stepped.unwrap_or_else(|text| Err(StepFailure::Panic(text))).err();
         self.failure.is_some()

@@ -1,7 +1,7 @@
 //! Series of a run of a batch. Each row makes some steps while its state is in the cache.
 
 use crate::batch_motion::BatchMotion;
-use crate::batch_rows::Row;
+use crate::batch_rows::{Row, Workspaces};
 use palpate_fem::check_memory;
 use palpate_scene::Scene;
 use rayon::prelude::*;
@@ -39,14 +39,20 @@ impl BatchSeries {
     }
 
     /// Let all rows make the next steps, on the threads that it is called on; gives the rows that failed, in their order.
-    pub fn run_part(&mut self, scene: &Scene, motion: &BatchMotion, rows: &mut [Row]) -> Vec<usize> {
+    pub fn run_part(
+        &mut self,
+        scene: &Scene,
+        workspaces: &Workspaces,
+        motion: &BatchMotion,
+        rows: &mut [Row],
+    ) -> Vec<usize> {
         let (length, from) = (self.length, self.done);
         let to = self.steps.min(from + STEPS_AT_ONCE);
         self.done = to;
         let run_row = |at: usize, row: &mut Row, numbers: &mut [f64]| {
-            let mut has_failed = false;
+            let (mut has_failed, mut workspace) = (false, workspaces.own());
             for step in from..to {
-                has_failed |= row.step(scene, motion, (step, at));
+                has_failed |= row.step(scene, &mut workspace, motion, (step, at));
                 row.fill(&mut numbers[step * length..][..length]);
             }
             has_failed.then_some(at)

@@ -5,7 +5,7 @@ use crate::errors::{Class, catch_panic, exception, internal_error};
 use crate::motion::SeriesMotion;
 use crate::progress::SIGNAL_INTERVAL;
 use glam::DVec3;
-use palpate::{DeviceMode, Grasp, Input, ObjectSnapshot, State, Support, Twist, step};
+use palpate::{DeviceMode, Grasp, Input, ObjectSnapshot, State, Support, Twist, Workspace, step, step_in};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use std::collections::TryReserveError;
@@ -119,11 +119,35 @@ impl RunState {
     /// # Errors
     /// When the motion cannot be followed; when a step panics, and from then on.
     pub fn step(&mut self, scene: &palpate_scene::Scene) -> Result<(), StepFailure> {
+        self.step_by(scene, |state, input| _ = step(&scene.model, state, input))
+    }
+
+    /// Step with the input in the buffers of a thread; after a panic they are made again.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_in(
+        &mut self,
+        scene: &palpate_scene::Scene,
+        workspace: &mut Workspace,
+    ) -> Result<(), StepFailure> {
+        let stepped = self.step_by(scene, |state, input| _ = step_in(&scene.model, state, workspace, input));
+        if let Err(StepFailure::Panic(_)) = stepped {
+            *workspace = Workspace::new(&scene.model);
+        }
+        stepped
+    }
+
+    fn step_by(
+        &mut self,
+        scene: &palpate_scene::Scene,
+        step: impl FnOnce(&mut State, &Input),
+    ) -> Result<(), StepFailure> {
         if let Some(failure) = self.has_panicked() {
             return Err(failure);
         }
         let stepped = catch_panic(|| {
-            step(&scene.model, &mut self.state, &self.input);
+            step(&mut self.state, &self.input);
             scene.check_step(&self.input, &self.state)
         });
         match stepped {

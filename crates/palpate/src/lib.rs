@@ -97,6 +97,6 @@ pub use response::{OscillatorState, ResponseForm, SampledOscillator, SampledResi
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};
 pub use snapshot::{DeformationSnapshot, ResidualFieldCache};
 pub use spatial::{Pose, Twist, cayley, inertia_in_world};
-pub use state::{ObjectSnapshot, State};
-pub use step::step;
+pub use state::{ObjectSnapshot, State, Workspace};
+pub use step::{step, step_in};
 pub use surface::{MIN_CONTACT_SAMPLES, SampleLevel, Surface, SurfacePoint};

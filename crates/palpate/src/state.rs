@@ -2,7 +2,7 @@
 
 use crate::bounded_vec::BoundedVec;
 use crate::clamp::ClampState;
-use crate::collision::{CollisionScene, CollisionWorkspace, Contact, Levels};
+use crate::collision::{CollisionCaches, CollisionScene, CollisionWorkspace, Contact, Levels};
 use crate::contact::{Constraint, RecoveryBudget, Solver};
 use crate::device::DeviceState;
 use crate::energy::EnergyLedger;
@@ -13,6 +13,7 @@ use crate::response::OscillatorState;
 use crate::scene::Model;
 use crate::sleep::Sleepers;
 use crate::spatial::{Pose, Twist};
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -52,7 +53,9 @@ pub struct State {
     /// Energy of the virtual couplings.
     pub(crate) couplings: EnergyLedger,
     pub(crate) recovery: RecoveryBudget,
-    pub(crate) workspace: Workspace,
+    pub(crate) caches: CollisionCaches,
+    /// Buffers of its steps; none where those of others are used.
+    pub(crate) workspace: Option<Box<Workspace>>,
     pub(crate) output: Output,
 }
 
@@ -93,9 +96,10 @@ impl Resting {
     }
 }
 
-/// Buffers of a step, made once.
+/// Buffers of a step, made once. Nothing in them lasts longer: states of one model can share them, as rows of a batch share those of a thread
+/// ([`step_in`](crate::step_in)).
 #[derive(Debug, Clone)]
-pub(crate) struct Workspace {
+pub struct Workspace {
     pub(crate) collision: CollisionWorkspace,
     pub(crate) solver: Solver,
     /// Contacts of the next step, while they are matched.
@@ -103,6 +107,27 @@ pub(crate) struct Workspace {
     /// Constraints of the contacts.
     pub(crate) constraints: BoundedVec<Constraint>,
     pub(crate) next_obstacles: Vec<Pose>,
+}
+
+impl Workspace {
+    /// Buffers for the states of a model.
+    pub fn new(model: &Model) -> Self {
+        let parameters = &model.parameters;
+        let count = model.objects.len();
+        let contacts = (0..count).map(|at| parameters.point_capacity(&model.objects[at], count)).sum();
+        Self {
+            collision: CollisionWorkspace::new(model.collision_scene(), contacts),
+            solver: Solver::new(
+                count,
+                parameters.devices.len() + model.all_clamp_cells(),
+                contacts,
+                parameters.uses_samples(count),
+            ),
+            spare: BoundedVec::new(contacts),
+            constraints: BoundedVec::new(contacts),
+            next_obstacles: parameters.obstacles.iter().map(|obstacle| obstacle.pose).collect(),
+        }
+    }
 }
 
 impl State {
@@ -153,22 +178,18 @@ impl State {
             },
             couplings: EnergyLedger::default(),
             recovery: RecoveryBudget::default(),
-            workspace: Workspace {
-                collision: CollisionWorkspace::new(model.collision_scene(), contacts),
-                solver: Solver::new(
-                    count,
-                    devices + model.all_clamp_cells(),
-                    contacts,
-                    parameters.uses_samples(count),
-                ),
-                spare: BoundedVec::new(contacts),
-                constraints: BoundedVec::new(contacts),
-                next_obstacles: obstacles.clone(),
-            },
+            caches: CollisionCaches::new(model.collision_scene()),
+            workspace: Some(Box::new(Workspace::new(model))),
             obstacles,
             objects,
             output,
         }
+    }
+
+    /// Free the buffers of its steps: for a state that is stepped with those of others ([`step_in`](crate::step_in)). Without them
+    /// [`step`](crate::step()) makes new ones.
+    pub fn release_workspace(&mut self) {
+        self.workspace = None;
     }
 
     /// State that resumes from snapshots of another one: placed, moving and deformed alike, without contacts, at time 0 with a

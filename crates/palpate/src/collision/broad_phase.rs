@@ -6,7 +6,7 @@
 //!
 //! Equations: docs/theory.md (C19).
 
-use super::context::{CollisionContext, CollisionScene, CollisionWorkspace};
+use super::context::{CollisionContext, CollisionScene};
 use super::deformed_surface::{DeformedSurface, SurfaceTime, deformation_bound};
 use super::level_of_detail::ObjectPair;
 use super::parameters::COLLISION;
@@ -116,9 +116,9 @@ impl CollisionContext<'_> {
     /// # Real time
     /// Costs the objects, times the logarithm of their number where they change places.
     pub(crate) fn begin_broad_phase(&mut self) {
-        let mut sweep = core::mem::take(&mut self.workspace.sweep);
+        let mut sweep = core::mem::take(&mut self.caches.sweep);
         sweep.set(self.sleepers, |at| self.bounding_sphere(at));
-        self.workspace.sweep = sweep;
+        self.caches.sweep = sweep;
     }
 
     /// Mark the objects that could be moved by what comes near: devices that touch, obstacles that move, and, where they are asleep,
@@ -137,14 +137,14 @@ impl CollisionContext<'_> {
             let motion = if radius.is_finite() { before.motion_bound(after, radius) } else { 0.0 };
             (before.position, radius + motion)
         });
-        let CollisionWorkspace { sweep, disturbed, .. } = &mut *self.workspace;
+        let disturbed = &mut self.workspace.disturbed;
         for near in tips.chain(obstacles).map(box_about) {
-            sweep.overlapping(near).for_each(|at| disturbed[at as usize] = true);
+            self.caches.sweep.overlapping(near).for_each(|at| disturbed[at as usize] = true);
         }
         if !self.sleepers.any() {
             return;
         }
-        let sweep = core::mem::take(&mut self.workspace.sweep);
+        let sweep = core::mem::take(&mut self.caches.sweep);
         for awake in sweep.order.iter().map(|&at| at as usize).filter(|&at| self.sleepers.is_awake(at)) {
             for asleep in sweep.sleeping_neighbours(self.sleepers, awake) {
                 let pair = self.levels.of_pair([awake.min(asleep), awake.max(asleep)], self.step);
@@ -153,7 +153,7 @@ impl CollisionContext<'_> {
                 }
             }
         }
-        self.workspace.sweep = sweep;
+        self.caches.sweep = sweep;
     }
 
     /// Find the contacts of all pairs of objects.
@@ -161,18 +161,19 @@ impl CollisionContext<'_> {
     /// # Real time
     /// Costs the objects, the pairs whose boxes overlap along an axis, and the nodes that are near another object.
     pub(crate) fn find_pair_contacts(&mut self) {
-        let sweep = core::mem::take(&mut self.workspace.sweep);
+        let sweep = core::mem::take(&mut self.caches.sweep);
         sweep.overlaps(self.sleepers, |objects| self.find_contacts_of_pair(objects));
-        self.workspace.sweep = sweep;
+        self.caches.sweep = sweep;
         self.levels.forget_pairs(self.step, self.sleepers);
     }
 
     /// Objects that a device's tip can meet in the step, ascending; they stay in `near_objects` of the workspace.
     pub(crate) fn find_near_objects(&mut self, number: usize, device: &DeviceState) {
         let own = box_about(tip_sphere(&self.scene.devices[number], device));
-        let CollisionWorkspace { sweep, near_objects, .. } = &mut *self.workspace;
+        let near_objects = &mut self.workspace.near_objects;
         near_objects.clear();
-        near_objects.extend(sweep.overlapping(own).filter(|&at| self.sleepers.is_awake(at as usize)));
+        near_objects
+            .extend(self.caches.sweep.overlapping(own).filter(|&at| self.sleepers.is_awake(at as usize)));
         near_objects.sort_unstable();
     }
 

@@ -25,15 +25,34 @@ pub(crate) struct CollisionScene<'a> {
     pub(crate) max_contact_samples: usize,
 }
 
-/// Buffers and caches of collision detection.
+/// What collision detection keeps from step to step; buffers are made once.
+#[derive(Debug, Clone)]
+pub(crate) struct CollisionCaches {
+    /// Triangles near each device.
+    pub(crate) triangles: Vec<TriangleCaches>,
+    pub(crate) sweep: SweepAndPrune,
+}
+
+impl CollisionCaches {
+    /// Caches for a scene.
+    pub(crate) fn new(scene: CollisionScene) -> Self {
+        let CollisionScene { objects, devices, .. } = scene;
+        Self {
+            triangles: devices
+                .iter()
+                .map(|_| TriangleCaches::new(objects.len(), max_modes(objects)))
+                .collect(),
+            sweep: SweepAndPrune::new(objects),
+        }
+    }
+}
+
+/// Buffers of collision detection, whose content lasts for a step.
 #[derive(Debug, Clone)]
 pub(crate) struct CollisionWorkspace {
     pub(crate) query: ProximityQuery,
     /// Node positions, per object.
     pub(crate) positions: Vec<NodePositionCache>,
-    /// Triangles near each device.
-    pub(crate) triangles: Vec<TriangleCaches>,
-    pub(crate) sweep: SweepAndPrune,
     /// Objects near a device.
     pub(crate) near_objects: BoundedVec<u32>,
     /// Whether something has come near each object that could move it.
@@ -49,23 +68,29 @@ pub(crate) struct CollisionWorkspace {
 impl CollisionWorkspace {
     /// Buffers for a scene with room for so many contacts.
     pub(crate) fn new(scene: CollisionScene, contacts: usize) -> Self {
-        let CollisionScene { objects, devices, .. } = scene;
-        let modes = |object: &Object| object.response.modes();
+        let objects = scene.objects;
         let nodes = |object: &Object| object.body.recording.surface.positions.len();
-        let max_modes = objects.iter().map(modes).max().unwrap_or(0);
         Self {
             query: ProximityQuery::new(),
             positions: objects.iter().map(|o| NodePositionCache::new(&o.body)).collect(),
-            triangles: devices.iter().map(|_| TriangleCaches::new(objects.len(), max_modes)).collect(),
-            sweep: SweepAndPrune::new(objects),
             near_objects: BoundedVec::new(objects.len()),
             disturbed: vec![false; objects.len()],
             near_nodes: BoundedVec::new(objects.iter().map(nodes).max().unwrap_or(0)),
-            coordinates: vec![0.0; max_modes],
+            coordinates: vec![0.0; max_modes(objects)],
             candidates: CandidateList::new(contacts),
             level_changes: LevelChanges::new(contacts),
         }
     }
+
+    /// Forget the node positions of another state's step.
+    pub(crate) fn forget_positions(&mut self) {
+        self.positions.iter_mut().for_each(NodePositionCache::forget);
+    }
+}
+
+/// Number of modes of the object that has most.
+fn max_modes(objects: &[Object]) -> usize {
+    objects.iter().map(|object| object.response.modes()).max().unwrap_or(0)
 }
 
 /// One step's collision detection.
@@ -76,6 +101,7 @@ pub(crate) struct CollisionContext<'a> {
     pub(crate) contacts: &'a [Contact],
     pub(crate) sleepers: &'a Sleepers,
     pub(crate) levels: &'a mut Levels,
+    pub(crate) caches: &'a mut CollisionCaches,
     pub(crate) workspace: &'a mut CollisionWorkspace,
     /// Number of the step.
     pub(crate) step: u64,

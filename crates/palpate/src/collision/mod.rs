@@ -20,7 +20,7 @@ pub(crate) use candidate::{CandidateSide, ContactCandidate};
 pub use contact::{Collider, Grasp};
 pub(crate) use contact::{Contact, ContactId, ContactLaw, FeatureId, OtherSide};
 pub(crate) use contact_cache::match_contacts;
-pub(crate) use context::{CollisionContext, CollisionScene, CollisionWorkspace};
+pub(crate) use context::{CollisionCaches, CollisionContext, CollisionScene, CollisionWorkspace};
 pub(crate) use deformed_surface::MAX_TIP_CONTACTS;
 pub(crate) use level_of_detail::Levels;
 pub(crate) use narrow_phase::TipPair;

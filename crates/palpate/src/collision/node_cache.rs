@@ -83,6 +83,11 @@ impl NodePositionCache {
         !same
     }
 
+    /// Forget the positions of the step.
+    pub(super) fn forget(&mut self) {
+        self.key = None;
+    }
+
     /// Leave out the residual displacement of some contacts from now on.
     pub(super) fn exclude_own(&mut self) {
         self.total.clear();

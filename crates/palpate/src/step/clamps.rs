@@ -6,7 +6,7 @@ use super::moved;
 use crate::collision::{CandidateSide, Collider, ContactCandidate, ContactId, ContactLaw, FeatureId};
 use crate::io::Input;
 use crate::scene::Model;
-use crate::state::State;
+use crate::state::{State, Workspace};
 use glam::DVec3;
 
 /// Frames at the end of the step; unusable ones stay.
@@ -19,9 +19,8 @@ pub(super) fn move_frames(state: &mut State, input: &Input) {
 }
 
 /// Candidates of all cells: each is held at its point of the frame.
-pub(super) fn find_contacts(model: &Model, state: &mut State) {
-    let State { clamps, workspace, .. } = state;
-    for (number, (placed, clamp)) in model.clamps.iter().zip(&*clamps).enumerate() {
+pub(super) fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace) {
+    for (number, (placed, clamp)) in model.clamps.iter().zip(&state.clamps).enumerate() {
         let object = placed.object;
         for (at, point) in placed.points.iter().enumerate() {
             let cell = placed.first_cell + at;

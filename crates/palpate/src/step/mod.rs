@@ -41,6 +41,7 @@ use crate::response::{ContactLocation, Footprint};
 use crate::scene::{Model, RigidCompliance};
 use crate::spatial::Pose;
 use crate::state::{State, Workspace};
+use alloc::boxed::Box;
 use glam::DVec3;
 
 impl Model {
@@ -61,26 +62,49 @@ impl Model {
 /// # Real time
 /// No allocation, lock or system call. The cost grows with modes × contacts, not with the mesh.
 pub fn step<'s>(model: &Model, state: &'s mut State, input: &Input) -> &'s Output {
+    let mut workspace = state.workspace.take().unwrap_or_else(|| Box::new(Workspace::new(model)));
+    advance(model, state, &mut workspace, input);
+    state.workspace = Some(workspace);
+    &state.output
+}
+
+/// Advance a scene by one step in buffers that its model has made, as [`step`] does in those of the state. Many states of one model that share
+/// the buffers of a thread need less memory, and less of it passes through the caches.
+///
+/// # Real time
+/// As [`step`].
+pub fn step_in<'s>(
+    model: &Model,
+    state: &'s mut State,
+    workspace: &mut Workspace,
+    input: &Input,
+) -> &'s Output {
+    workspace.collision.forget_positions();
+    advance(model, state, workspace, input);
+    &state.output
+}
+
+/// The stages of a step.
+fn advance(model: &Model, state: &mut State, workspace: &mut Workspace, input: &Input) {
     state.output.status = StepStatus::default();
     sleep::wake_by_input(model, state, input);
     change_gravity(model, state, input);
     move_bases(model, state, input);
     prescribed_forces::place(model, state, input);
     predict(model, state);
-    move_obstacles(state, input);
+    move_obstacles(state, workspace, input);
     clamps::move_frames(state, input);
     begin_devices(model, state, input);
-    collision_context(model, state).0.begin_broad_phase();
-    sleep::wake_near(model, state);
-    find_contacts(model, state, input);
-    set_up_constraints(model, state);
-    prescribed_forces::predict(model, state);
-    solve(model, state);
-    integrate(model, state);
+    collision_context(model, state, workspace).0.begin_broad_phase();
+    sleep::wake_near(model, state, workspace);
+    find_contacts(model, state, workspace, input);
+    set_up_constraints(model, state, workspace);
+    prescribed_forces::predict(model, state, workspace);
+    solve(model, state, workspace);
+    integrate(model, state, workspace);
     state.steps += 1;
-    output::write(model, state, input);
+    output::write(model, state, workspace, input);
     sleep::fall_asleep(model, state);
-    &state.output
 }
 
 /// Change gravity between two steps. What this adds to the potential energy of an object is input; the sag of bodies with fixed nodes
@@ -156,8 +180,8 @@ fn predict_object(object: &Object, own: &mut ObjectState, rules: &StepRules) {
 }
 
 /// Obstacle poses at the end of the step; unusable ones stay.
-fn move_obstacles(state: &mut State, input: &Input) {
-    let State { obstacles, workspace, output, .. } = state;
+fn move_obstacles(state: &mut State, workspace: &mut Workspace, input: &Input) {
+    let State { obstacles, output, .. } = state;
     for (number, next) in workspace.next_obstacles.iter_mut().enumerate() {
         *next = moved(obstacles[number], input.obstacles.get(number), &mut output.status);
     }
@@ -190,8 +214,9 @@ fn usable<'i>(model: &Model, input: &'i Input, device: usize) -> Option<&'i Devi
 fn collision_context<'a>(
     model: &'a Model,
     state: &'a mut State,
+    workspace: &'a mut Workspace,
 ) -> (CollisionContext<'a>, &'a mut [DeviceState], [&'a [Pose]; 2]) {
-    let State { steps, objects, devices, obstacles, contacts, levels, sleepers, workspace, .. } = state;
+    let State { steps, objects, devices, obstacles, contacts, levels, sleepers, caches, .. } = state;
     let Workspace { collision, next_obstacles, .. } = workspace;
     let scene = model.collision_scene();
     let context = CollisionContext {
@@ -200,6 +225,7 @@ fn collision_context<'a>(
         contacts,
         sleepers,
         levels,
+        caches,
         workspace: collision,
         step: *steps,
     };
@@ -236,11 +262,11 @@ fn begin_devices(model: &Model, state: &mut State, input: &Input) {
 }
 
 /// Collision detection: all contacts of the step between objects that are awake.
-fn find_contacts(model: &Model, state: &mut State, input: &Input) {
-    state.workspace.collision.candidates.clear();
+fn find_contacts(model: &Model, state: &mut State, workspace: &mut Workspace, input: &Input) {
+    workspace.collision.candidates.clear();
     // First, so that they find room.
-    clamps::find_contacts(model, state);
-    let (mut context, devices, [before, after]) = collision_context(model, state);
+    clamps::find_contacts(model, state, workspace);
+    let (mut context, devices, [before, after]) = collision_context(model, state, workspace);
     for (number, device) in devices.iter_mut().enumerate().filter(|(_, device)| device.active) {
         if let DeviceMode::Held(grasp) = input.devices[number].mode {
             let collider = Collider::Device(number);
@@ -281,7 +307,7 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
     context.find_pair_contacts();
     // Last, since it looks at the surface of another moment.
     (0..devices.len()).for_each(|number| context.rebuild_ahead(number));
-    let State { gravity, objects, contacts, workspace, output, .. } = state;
+    let State { gravity, objects, contacts, output, .. } = state;
     let Workspace { collision, spare, .. } = workspace;
     output.status.dropped_contacts += match_contacts(
         (&*model.objects, *gravity),
@@ -294,9 +320,9 @@ fn find_contacts(model: &Model, state: &mut State, input: &Input) {
 }
 
 /// Set up the constraints: where the sides of each contact start, and which penetration may remain.
-fn set_up_constraints(model: &Model, state: &mut State) {
+fn set_up_constraints(model: &Model, state: &mut State, workspace: &mut Workspace) {
     let gravity = state.gravity;
-    let State { steps, objects, devices, contacts, recovery, sleepers, workspace, output, .. } = state;
+    let State { steps, objects, devices, contacts, recovery, sleepers, output, .. } = state;
     for at in sleepers.awake_indices() {
         let (object, own) = (&model.objects[at], &mut objects[at]);
         let orientation = own.rigid.pose.orientation;
@@ -349,9 +375,9 @@ fn set_up_constraints(model: &Model, state: &mut State) {
 
 /// Solve for the contact forces. Losses of earlier steps must pay for pushing out tips: if they do not, penetrations stay as
 /// they are, and in the last resort contacts carry no force.
-fn solve(model: &Model, state: &mut State) {
+fn solve(model: &Model, state: &mut State, workspace: &mut Workspace) {
     let rules = model.step_rules(state.gravity);
-    let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
+    let State { objects, devices, contacts, sleepers, output, .. } = state;
     let paid = output.energy.lost().max(0.0);
     let Workspace { solver, constraints, .. } = workspace;
     let budget = model.parameters.solver_budget;
@@ -390,9 +416,9 @@ fn solve(model: &Model, state: &mut State) {
 }
 
 /// Integrate deformation and rigid motion with the forces held, and account for the energy.
-fn integrate(model: &Model, state: &mut State) {
+fn integrate(model: &Model, state: &mut State, workspace: &Workspace) {
     let gravity = state.gravity;
-    let State { objects, devices, contacts, obstacles, workspace, couplings, recovery, output, .. } = state;
+    let State { objects, devices, contacts, obstacles, couplings, recovery, output, .. } = state;
     let (sleepers, resting) = (&state.sleepers, &state.resting);
     let mut given_back = 0.0;
     for (contact, constraint) in contacts.iter().zip(workspace.constraints.iter()) {

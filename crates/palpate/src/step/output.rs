@@ -5,13 +5,12 @@ use crate::collision::OtherSide;
 use crate::device::PrescribedForce;
 use crate::io::{ClampOutput, ContactOutput, Input};
 use crate::scene::Model;
-use crate::state::State;
+use crate::state::{State, Workspace};
 use glam::DVec3;
 
 /// Write the output of a step from the state at its end.
-pub(super) fn write(model: &Model, state: &mut State, input: &Input) {
-    let State { steps, objects, devices, obstacles, clamps, contacts, couplings, workspace, output, .. } =
-        state;
+pub(super) fn write(model: &Model, state: &mut State, workspace: &Workspace, input: &Input) {
+    let State { steps, objects, devices, obstacles, clamps, contacts, couplings, output, .. } = state;
     let (sleepers, resting) = (&state.sleepers, &state.resting);
     let h = model.parameters.step_s;
     output.time_s = *steps as f64 * h;

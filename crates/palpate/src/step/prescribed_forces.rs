@@ -17,7 +17,7 @@ use crate::io::{AppliedForce, DeviceMode, Input};
 use crate::object::Object;
 use crate::response::ContactLocation;
 use crate::scene::Model;
-use crate::state::State;
+use crate::state::{State, Workspace};
 use crate::surface::SurfacePoint;
 
 /// Put the prescribed forces of a step on their points, and take away those that are over.
@@ -64,9 +64,9 @@ fn location(object: &Object, point: SurfacePoint, patch_radius: f64) -> ContactL
 }
 
 /// Predict the objects that prescribed forces act on: their motion without contact force.
-pub(super) fn predict(model: &Model, state: &mut State) {
+pub(super) fn predict(model: &Model, state: &mut State, workspace: &mut Workspace) {
     let rules = model.step_rules(state.gravity);
-    let State { objects, devices, contacts, sleepers, workspace, output, .. } = state;
+    let State { objects, devices, contacts, sleepers, output, .. } = state;
     let mut problem = ContactProblem {
         objects: &model.objects,
         rules,

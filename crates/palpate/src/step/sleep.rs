@@ -13,7 +13,7 @@ use crate::io::{ContactOutput, DeviceMode, Input};
 use crate::object::{Object, ObjectState};
 use crate::scene::Model;
 use crate::spatial::Twist;
-use crate::state::State;
+use crate::state::{State, Workspace};
 use core::cmp::Ordering;
 use glam::DVec3;
 
@@ -45,13 +45,13 @@ pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
 }
 
 /// Wake what tips, moving obstacles and objects that are awake come near.
-pub(super) fn wake_near(model: &Model, state: &mut State) {
+pub(super) fn wake_near(model: &Model, state: &mut State, workspace: &mut Workspace) {
     if model.parameters.steps_until_sleep().is_none() {
         return;
     }
-    let (mut context, devices, [before, after]) = collision_context(model, state);
+    let (mut context, devices, [before, after]) = collision_context(model, state, workspace);
     context.mark_disturbed(devices, (before, after));
-    let State { sleepers, workspace, .. } = state;
+    let sleepers = &mut state.sleepers;
     for (at, is_disturbed) in workspace.collision.disturbed.iter_mut().enumerate() {
         if core::mem::take(is_disturbed) {
             sleepers.disturb(at);

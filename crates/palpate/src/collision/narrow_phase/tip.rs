@@ -9,7 +9,7 @@
 use super::phong_projection::phong_project;
 use crate::collision::candidate::{CandidateSide, ContactCandidate};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
-use crate::collision::context::{CollisionContext, CollisionWorkspace};
+use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{
     DeformedSurface, MAX_TIP_CONTACTS, SurfaceTime, TriangleProjection,
 };
@@ -18,7 +18,7 @@ use crate::collision::proximity::ProximityQuery;
 use crate::device::{DeviceParameters, DeviceState};
 use crate::object::ObjectState;
 use crate::response::{Body, ContactLocation, Footprint};
-use crate::surface::{SurfacePoint, at_weights};
+use crate::surface::{SurfacePoint, at_weights, segment_distance};
 use glam::DVec3;
 
 /// Upper limit of samples along a slide.
@@ -71,7 +71,7 @@ impl CollisionContext<'_> {
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
         let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
-        let triangles = workspace.triangles[number].of(at, self.step);
+        let triangles = self.caches.triangles[number].of(at, self.step);
         triangles.find(query, &mut surface, start, reach);
         // The surface here moves about as its nearest nodes do.
         let mut motion = motion;
@@ -115,8 +115,8 @@ impl CollisionContext<'_> {
     pub(crate) fn rebuild_ahead(&mut self, number: usize) {
         let parameters = &self.scene.devices[number];
         let Self { scene, states, contacts, .. } = *self;
-        let CollisionWorkspace { triangles, positions, .. } = &mut *self.workspace;
-        for (at, cache) in triangles[number].rebuilding() {
+        let positions = &mut self.workspace.positions;
+        for (at, cache) in self.caches.triangles[number].rebuilding() {
             let (body, own) = (&scene.objects[at].body, &states[at]);
             let coordinates = cache.take_rebuild_coordinates();
             let footprint = body.footprint(parameters.patch_radius);
@@ -195,15 +195,19 @@ impl CollisionContext<'_> {
                 p,
                 (1.0 - COLLISION.tip_margin) * contacts.tip.max(slide.length() / count),
             );
-            query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
-            for found in &query.found {
+            // Other faces, from outside: the slide leads against them, and to them.
+            query.found.retain(|found| {
                 let is_other =
                     contacts.all().all(|c| c.normal_in_body.dot(found.normal) < COLLISION.crease_cosine);
-                // Met from outside: the slide leads against it.
-                if is_other && slide.dot(found.normal) < 0.0 {
-                    let beside = found.position + found.normal * contacts.tip;
-                    contacts.add(&mut surface, found, beside, before.slerp(after, t));
-                }
+                is_other
+                    && slide.dot(found.normal) < 0.0
+                    && segment_distance(surface.corners(found.triangle), [start, start + slide])
+                        < contacts.tip
+            });
+            query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
+            for found in &query.found {
+                let beside = found.position + found.normal * contacts.tip;
+                contacts.add(&mut surface, found, beside, before.slerp(after, t));
             }
             if contacts.count > touching {
                 return;
