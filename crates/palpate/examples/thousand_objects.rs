@@ -1,9 +1,10 @@
-//! A thousand blocks fall on floors of their own, on all cores: one immutable model, one state per scene.
+//! A thousand blocks fall on floors of their own, on all cores: one immutable model, one state per scene, and the buffers of
+//! steps once per thread.
 
 use glam::{DQuat, DVec3};
 use palpate::{
     Input, Model, ModelObject, ModelParameters, ObjectSnapshot, ObjectStart, Obstacle, Pose, Recording,
-    Shape, State, Twist, step,
+    Shape, State, Twist, Workspace, step_in,
 };
 use std::sync::Arc;
 
@@ -26,10 +27,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         snapshots[0].pose.orientation = DQuat::from_scaled_axis(DVec3::new(angle, 0.5 * angle, 0.0));
         snapshots
     };
-    let run = |number: usize| {
+    let run = |number: usize, workspace: &mut Workspace| {
         let mut state = State::resume(&model, &initial(number));
         for _ in 0..STEPS {
-            step(&model, &mut state, &Input::default());
+            step_in(&model, &mut state, workspace, &Input::default());
         }
         state.output().objects[0].pose.position.y
     };
@@ -38,7 +39,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let heights: Vec<f64> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads)
             .map(|worker| {
-                scope.spawn(move || (worker..OBJECTS).step_by(threads).map(run).collect::<Vec<_>>())
+                let (model, run) = (&model, &run);
+                scope.spawn(move || {
+                    let mut workspace = Workspace::new(model);
+                    (worker..OBJECTS).step_by(threads).map(|at| run(at, &mut workspace)).collect::<Vec<_>>()
+                })
             })
             .collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
