@@ -59,13 +59,22 @@ pub fn program() -> PathBuf {
     root().join("target/release/palpate").with_extension(std::env::consts::EXE_EXTENSION)
 }
 
-/// Release build of palpate that is newer than all sources: that of the tests, or one that is built now. Without object storage,
-/// which takes as long to build as all the rest and is of no use here.
+/// Release build of palpate that is newer than all sources and the page that it serves: that of the tests, or one that is built now.
 pub fn palpate() -> Result<PathBuf, String> {
+    newer_than(&["crates", "viewer/dist", "Cargo.toml", "Cargo.lock"])
+}
+
+/// Release build of palpate for chores that need no page of it: it may serve an older one.
+pub fn palpate_without_page() -> Result<PathBuf, String> {
+    newer_than(&["crates", "Cargo.toml", "Cargo.lock"])
+}
+
+/// Release build of palpate that is newer than its sources. Without object storage, which takes as long to build as all the rest and is of no
+/// use here.
+fn newer_than(sources: &[&str]) -> Result<PathBuf, String> {
     let built = std::fs::metadata(program()).and_then(|file| file.modified());
-    let sources =
-        ["crates", "viewer/dist", "Cargo.toml", "Cargo.lock"].map(|name| newest(&root().join(name)));
-    let is_new = built.is_ok_and(|built| sources.into_iter().flatten().all(|source| source <= built));
+    let mut changed = sources.iter().filter_map(|name| newest(&root().join(name)));
+    let is_new = built.is_ok_and(|built| changed.all(|source| source <= built));
     if !is_new {
         eprintln!("building palpate (some minutes the first time)");
         cargo(&["build", "--release", "--locked", "--package", "palpate-cli", "--no-default-features"])?;

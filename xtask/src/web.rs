@@ -1,7 +1,7 @@
 //! WebAssembly of palpate (`bindings/web`), the npm package, and the page that needs no server.
 
 use crate::files::{copy, copy_tree, empty, write};
-use crate::process::{cargo_command, palpate, root, run};
+use crate::process::{cargo_command, palpate_without_page, root, run};
 use crate::standard_library::{HINT, build_std, is_installed};
 use crate::{machine, viewer};
 use std::fs;
@@ -10,12 +10,20 @@ use std::process::Command;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Vector instructions, which every browser has since 2023.
-const FLAGS: &str = "-Ctarget-feature=+simd128";
+/// Vector instructions, which every browser has since 2023. The others are for size: only the smallest functions are inlined, loops are neither
+/// unrolled nor vectorised (those of the step work on whole chunks, which become vectors without that), and addresses in the code take no more
+/// bytes than they need.
+const FLAGS: &[&str] = &[
+    "-Ctarget-feature=+simd128",
+    "-Cllvm-args=-inline-threshold=10",
+    "-Cllvm-args=-unroll-runtime=false",
+    "-Cllvm-args=-unroll-allow-partial=false",
+    "-Cno-vectorize-loops",
+    "-Clink-arg=--compress-relocations",
+];
 
 /// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser.
-const SMALL_FLAGS: &[&str] =
-    &[FLAGS, "-Zlocation-detail=none", "-Zunstable-options", "-Cpanic=immediate-abort"];
+const SMALL_FLAGS: &[&str] = &["-Zlocation-detail=none", "-Zunstable-options", "-Cpanic=immediate-abort"];
 
 /// Folder of the npm package.
 pub fn package() -> PathBuf {
@@ -59,7 +67,7 @@ pub fn test() -> Result<(), String> {
     if !build()? {
         return Ok(());
     }
-    let program = palpate()?;
+    let program = palpate_without_page()?;
     viewer::npm(&package(), &["run", "check", "--silent"], &[])?;
     viewer::npm(&package(), &["test", "--silent"], &[("PALPATE", &program)])?;
     let chromium = machine::need_chromium()?;
@@ -78,9 +86,9 @@ fn build_module(features: &[&str], name: &str) -> Result<Option<PathBuf>, String
     if build_std(&mut cargo, "std,panic_abort")? {
         // Its instructions are reached by a feature of unreleased compilers, as its build is.
         cargo.args(["-Z", "build-std-features=optimize_for_size", "--features", "instructions"]);
-        cargo.env("RUSTFLAGS", SMALL_FLAGS.join(" "));
+        cargo.env("RUSTFLAGS", [FLAGS, SMALL_FLAGS].concat().join(" "));
     } else if is_installed(TARGET)? {
-        cargo.env("RUSTFLAGS", FLAGS);
+        cargo.env("RUSTFLAGS", FLAGS.join(" "));
     } else {
         return Ok(None);
     }
@@ -108,7 +116,7 @@ fn build_page(modules: &[PathBuf]) -> Result<(), String> {
         copy(module, &page.join(module.file_name().unwrap_or_default()))?;
     }
     let scenes = page.join("scenes");
-    run(Command::new(palpate()?).arg("scenes").arg("--output").arg(&scenes))
+    run(Command::new(palpate_without_page()?).arg("scenes").arg("--output").arg(&scenes))
 }
 
 /// Print the size of the package as npm packs it, and where the page is.
