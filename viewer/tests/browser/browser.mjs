@@ -14,17 +14,51 @@ const SWITCHES = [
   "--enable-unsafe-swiftshader",
 ];
 
+/** Whether a surface was asked for and its scene has changed meanwhile: the page loads that of the new one. */
+const isOfFormerScene = (message) => message.text().includes("404") && /\/scene\/\d+\/object\//.test(message.location().url);
+
+/** Time between pictures of a page that draws sparsely [ms]. */
+const SPARSE_MS = 1000;
+
+/**
+ * Lets the page draw its scene once a second only. Without a graphics card a picture takes most of the processor; all else that the page does
+ * in a picture's time goes on at its rate.
+ */
+function drawSparsely(between) {
+  let palpate;
+  Object.defineProperty(window, "palpate", {
+    get: () => palpate,
+    set: (value) => {
+      palpate = value;
+      const { sceneView } = value;
+      let last = -Infinity;
+      const sparsely = (draw) => (...given) => {
+        const now = performance.now();
+        if (now < last + between) return;
+        last = now;
+        draw.apply(sceneView, given);
+      };
+      sceneView.draw = sparsely(sceneView.draw);
+      sceneView.drawImmersive = sparsely(sceneView.drawImmersive);
+    },
+  });
+}
+
 export class Browser {
   static async open() {
     const browser = new Browser();
     browser.chromium = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: SWITCHES });
     browser.contexts = [];
     browser.closers = [];
+    browser.notes = [];
     return browser;
   }
 
-  /** Page in its own context; console errors are collected in `consoleErrors`. Without its ghost finger, which would touch the scene. */
-  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1, ghost = false, calm = false } = {}) {
+  /**
+   * Page in its own context; console errors are collected in `consoleErrors`. Without its ghost finger, which would touch the scene. It draws sparsely
+   * unless the case looks at pictures (`pictures`), or screenshots are taken.
+   */
+  async page(url, { width = 1280, height = 720, dark = false, touch = false, scale = 1, ghost = false, calm = false, pictures = false } = {}) {
     const context = await this.chromium.newContext({
       viewport: { width, height },
       colorScheme: dark ? "dark" : "light",
@@ -34,12 +68,13 @@ export class Browser {
       deviceScaleFactor: scale,
     });
     this.contexts.push(context);
+    if (!pictures && !process.env.SHOTS) await context.addInitScript(drawSparsely, SPARSE_MS);
     const page = await context.newPage();
     page.setDefaultTimeout(20_000);
     page.consoleErrors = [];
     page.on("pageerror", (error) => page.consoleErrors.push(error.stack));
     page.on("console", (message) => {
-      if (message.type() === "error") page.consoleErrors.push(message.text());
+      if (message.type() === "error" && !isOfFormerScene(message)) page.consoleErrors.push(message.text());
     });
     const address = new URL(url);
     if (!ghost) address.searchParams.set("ghost", "off");
@@ -51,6 +86,11 @@ export class Browser {
   keep(server) {
     this.closers.push(() => server.close());
     return server;
+  }
+
+  /** Tells something of a case, below its line. */
+  note(text) {
+    this.notes.push(`  ${text}`);
   }
 
   async clear() {

@@ -51,7 +51,7 @@ export const comparisonCases = [
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start({ kind: "logs", logs: 2 }));
-      const page = await browser.page(server.url);
+      const page = await browser.page(server.url, { pictures: true });
       await bothShown(page);
       await pausePlayback(page);
       await page.keyboard.press("c");
@@ -89,7 +89,7 @@ export const comparisonCases = [
       await page.context().close();
 
       const single = browser.keep(await start({ kind: "logs", logs: 1 }));
-      const alone = await browser.page(single.url);
+      const alone = await browser.page(single.url, { pictures: true });
       await waitForScene(alone);
       await pausePlayback(alone);
       await alone.keyboard.press("c");
@@ -98,7 +98,7 @@ export const comparisonCases = [
       const shown = await scales(alone);
       await alone.context().close();
       const render = browser.keep(await start({ kind: "render", render: { frames: [2, 3], width: 640, height: 360, camera: null, colour: "displacement", dark: false } }));
-      const drawn = await browser.page(render.url);
+      const drawn = await browser.page(render.url, { pictures: true });
       await drawn.waitForSelector('html[data-render="done"]', { timeout: 120_000 });
       assert(JSON.stringify(await scales(drawn)) === JSON.stringify(shown), `rendered ${await scales(drawn)}, shown ${shown}`);
       assert(whole >= shown[0] && force >= shown[1], `two logs: ${whole} m, ${force} N; one of them: ${shown}`);

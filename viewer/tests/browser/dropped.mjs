@@ -185,7 +185,7 @@ export const droppedCases = [
       for (const [name, bytes, text] of bad) {
         await drop(page, { [name]: bytes });
         const told = await notificationOf(page, text);
-        if (process.env.SHOTS) console.log(`  ${told}`);
+        if (process.env.SHOTS) browser.note(told);
         const { step } = await latestFrame(page);
         await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before, step);
       }

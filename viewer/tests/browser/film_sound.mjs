@@ -7,7 +7,13 @@ import { start } from "./servers.mjs";
 /** Time that a busy processor may take to encode a film [ms]. */
 const ENCODED_MS = 90_000;
 
-const waitForTime = (page, time) => page.waitForFunction((t) => document.querySelector(".film:not([hidden]) .time")?.textContent >= t, time);
+/** Waits until the film is longer by some seconds. */
+async function filmOn(page, seconds) {
+  const time = () => page.evaluate(() => document.querySelector(".film:not([hidden]) .time")?.textContent ?? "0:00");
+  const inSeconds = (text) => text.split(":").reduce((sum, part) => 60 * sum + Number(part), 0);
+  const end = inSeconds(await time()) + seconds;
+  while (inSeconds(await time()) < end) await page.waitForTimeout(100);
+}
 
 /** Film of some seconds; `during` acts when it runs. */
 async function filmOf(page, during) {
@@ -47,20 +53,21 @@ export const filmSoundCases = [
   {
     name: "share: a film has the sound of the scene while it is on, and none after it is turned off",
     standinOnly: true,
+    alone: true,
     async run(browser) {
       const server = browser.keep(await start());
-      const page = await browser.page(server.url, { width: 640, height: 480 });
+      const page = await browser.page(server.url, { width: 640, height: 480, pictures: true });
       await waitForScene(page);
-      const silent = await soundOf(browser, await filmOf(page, () => waitForTime(page, "0:01")));
+      const silent = await soundOf(browser, await filmOf(page, () => filmOn(page, 1)));
       assert(silent === null, `a film without sound has ${silent?.seconds} s of it`);
 
       await page.click("button[title='Sound: off']");
       await page.waitForSelector("button[title*='ms in the buffer']");
       const film = await filmOf(page, async () => {
-        await waitForTime(page, "0:02");
+        await filmOn(page, 2);
         // The film goes on without.
         await page.click("button[title^='Sound: on']");
-        await waitForTime(page, "0:05");
+        await filmOn(page, 3);
       });
       const sound = await soundOf(browser, film);
       assert(sound !== null && sound.seconds > 3.5, `the film has ${sound?.seconds} s of sound`);

@@ -18,6 +18,7 @@ async function waitForSteps(page, count) {
 export const firstViewCases = [
   {
     name: "a ghost finger presses and lets go, again and again, until somebody presses",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       for (const [name, options] of [
@@ -48,6 +49,7 @@ export const firstViewCases = [
   },
   {
     name: "there is no ghost finger where less motion is wanted, nor while the scene is paused",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const calm = await browser.page(server.url, { ghost: true, calm: true });
@@ -93,6 +95,7 @@ export const firstViewCases = [
   },
   {
     name: "the hint names what is special in one line, leads to the certificate, and stays closed",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { ghost: true });

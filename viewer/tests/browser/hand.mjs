@@ -64,6 +64,7 @@ export const handCases = [
   },
   {
     name: "a press while the scene is paused is shown, and acts when it goes on",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -132,6 +133,7 @@ export const handCases = [
   },
   {
     name: "a held patch is a disc that lies on the surface, a touching finger a ball",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -169,7 +171,7 @@ export const handCases = [
     standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
-      const page = await browser.page(server.url);
+      const page = await browser.page(server.url, { pictures: true });
       await waitForScene(page);
       assert(await page.evaluate(() => window.palpate.sceneView.graphs[0].grid === null), "a second grid");
       await page.click("text=Weightless cube");
@@ -280,6 +282,7 @@ export const handCases = [
   },
   {
     name: "Space pauses after a click on any control",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

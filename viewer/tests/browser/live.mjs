@@ -146,6 +146,7 @@ export const liveCases = [
   },
   {
     name: "a page that stalled keeps its connection",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -203,6 +204,7 @@ export const liveCases = [
   },
   {
     name: "the layout follows the window size",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -246,9 +248,10 @@ export const liveCases = [
   },
   {
     name: "a lost WebGL context is restored",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
-      const page = await browser.page(server.url);
+      const page = await browser.page(server.url, { pictures: true });
       await waitForScene(page);
       await page.evaluate(() => {
         window.contextLoss = window.palpate.sceneView.renderer.getContext().getExtension("WEBGL_lose_context");

@@ -9,7 +9,7 @@ const time = (page) => page.evaluate(() => window.palpate.sceneView.graphs[0].fr
 
 async function renderOnce(browser, request) {
   const server = await start({ kind: "render", render: request });
-  const page = await browser.page(server.url);
+  const page = await browser.page(server.url, { pictures: true });
   await page.waitForSelector("html[data-render]", { timeout: 120_000 });
   const state = await page.getAttribute("html", "data-render");
   assertNoConsoleErrors(page);
@@ -94,7 +94,7 @@ export const logCases = [
         assert(image.readUInt32BE(16) === request.width && image.readUInt32BE(20) === request.height, `size of image ${i}`);
         assert(image.equals(two[i]), `image ${i} has other bytes the second time`);
       });
-      assert(!one[0].equals(one[1]), "all images are the same");
+      assert(new Set(one.map((image) => image.toString("base64"))).size === one.length, "frames have the same image");
       const camera = { from: [0.3, 0.3, 0.1], to: [0, 0.05, 0] };
       const [dark] = await renderOnce(browser, { ...request, frames: [90], camera, colour: "strain", dark: true });
       if (process.env.SHOTS) {

@@ -56,7 +56,7 @@ export const reconstructionCases = [
       assert(turned < 0.02, `normals are ${turned} apart`);
       const strained = a.normals.reduce((most, x, i) => (i % 4 === 3 ? Math.max(most, Math.abs(x - b.normals[i])) : most), 0);
       assert(strained < 0.01, `strains are ${strained} apart`);
-      console.log(`         positions ${apart.toExponential(1)} m apart of ${allowed.toExponential(1)} allowed, ${a.residuals} residuals, normals ${turned.toExponential(1)}, strains ${strained.toExponential(1)}`);
+      browser.note(`positions ${apart.toExponential(1)} m apart of ${allowed.toExponential(1)} allowed, ${a.residuals} residuals, normals ${turned.toExponential(1)}, strains ${strained.toExponential(1)}`);
       await modal.mouse.up();
       assertNoConsoleErrors(modal);
       assertNoConsoleErrors(plain);

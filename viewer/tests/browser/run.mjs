@@ -3,6 +3,8 @@
 //   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
 //   node tests/browser/run.mjs --standin-only               leaves out what runs against the real server, too
 //
+// Cases run side by side, in a browser for each worker; those that are `alone` hear or film the scene in real time, and run after the others. Cases
+// that run `once` look at what the page does by itself, whoever runs its scene: not again without a server.
 // A case that fails is run once more: one that passes then is reported as flaky, with its error, and has a fault that is to be repaired.
 
 import { mkdirSync } from "node:fs";
@@ -28,48 +30,59 @@ import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const ATTEMPTS = 2;
+const WORKERS = Number(process.env.WORKERS ?? 2);
 const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const cases = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...recordedLogCases].filter(({ name }) => name.includes(filter));
+const all = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...recordedLogCases];
 
-const browser = await Browser.open();
-let failed = 0;
-let flaky = 0;
-for (const { name, run, standinOnly, realOnly, serverOnly, serverlessOnly } of cases) {
-  if (standinOnlyRun && !standinOnly) continue;
-  if (serverless && serverOnly) {
-    console.log(`skipped  ${name} (needs a server)`);
-    continue;
-  }
-  if (!serverless && serverlessOnly) {
-    console.log(`skipped  ${name} (needs the page without a server)`);
-    continue;
-  }
-  if (real ? standinOnly : realOnly) {
-    console.log(`skipped  ${name} (needs the ${real ? "stand-in" : "real server"})`);
-    continue;
-  }
+/** Why a case is left out; none where it runs. */
+function reasonToSkip({ standinOnly, realOnly, serverOnly, serverlessOnly, once }) {
+  if (serverless && serverOnly) return "needs a server";
+  if (serverless && once) return "runs with a server";
+  if (!serverless && serverlessOnly) return "needs the page without a server";
+  if (real ? standinOnly : realOnly) return `needs the ${real ? "stand-in" : "real server"}`;
+  return null;
+}
+
+const wanted = all.filter(({ name, standinOnly }) => name.includes(filter) && (standinOnly || !standinOnlyRun));
+for (const one of wanted) if (reasonToSkip(one) !== null) console.log(`skipped  ${one.name} (${reasonToSkip(one)})`);
+const cases = wanted.filter((one) => reasonToSkip(one) === null);
+let [failed, flaky] = [0, 0];
+
+/** Runs a case, and once more if it fails. */
+async function runCase(browser, { name, run }) {
   const began = performance.now();
   for (let attempt = 1; attempt <= ATTEMPTS; attempt++) {
+    let outcome;
     try {
       await run(browser);
       if (attempt > 1) flaky++;
-      console.log(`${attempt > 1 ? "FLAKY " : "passed"}   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
-      break;
+      outcome = `${attempt > 1 ? "FLAKY " : "passed"}   ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`;
     } catch (error) {
-      if (error instanceof NeedsServer) {
-        console.log(`skipped  ${name} (needs a server: ${error.message})`);
-        break;
-      }
-      if (attempt === ATTEMPTS) failed++;
-      console.log(`FAILED   ${name}${attempt < ATTEMPTS ? ", and runs again" : ""}\n${error.stack ?? error}`);
+      if (error instanceof NeedsServer) outcome = `skipped  ${name} (needs a server: ${error.message})`;
+      else if (attempt === ATTEMPTS) failed++;
+      else console.log(`FAILED   ${name}, and runs again\n${error.stack ?? error}`);
+      outcome ??= attempt === ATTEMPTS && `FAILED   ${name}\n${error.stack ?? error}`;
     } finally {
       await browser.clear();
     }
+    if (outcome) return void console.log([outcome, ...browser.notes.splice(0)].join("\n"));
   }
 }
-await browser.close();
+
+/** Runs cases on so many browsers at once. */
+async function runAll(queue, workers) {
+  const work = async () => {
+    const browser = await Browser.open();
+    for (let next = queue.shift(); next !== undefined; next = queue.shift()) await runCase(browser, next);
+    await browser.close();
+  };
+  await Promise.all(Array.from({ length: Math.min(workers, queue.length) }, work));
+}
+
+await runAll(cases.filter(({ alone }) => !alone), WORKERS);
+await runAll(cases.filter(({ alone }) => alone), 1);
 console.log(`${failed === 0 ? "all passed" : `${failed} failed`}${flaky > 0 ? `, ${flaky} flaky` : ""}`);
 process.exit(failed === 0 ? 0 : 1);

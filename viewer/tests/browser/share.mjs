@@ -52,9 +52,11 @@ function apart(a, b) {
   return Math.max(...["from", "to"].flatMap((end) => a[end].map((x, k) => Math.abs(x - b[end][k])))) / distance;
 }
 
-/** Pixels of a screenshot, decoded in the page. */
-async function pixelsOf(page) {
-  const base64 = (await page.screenshot()).toString("base64");
+/** Pixels of the QR code and what is around it, of a screenshot that is decoded in the page. */
+async function pixelsOfCode(page) {
+  const { x, y, width: wide, height: high } = await page.locator(".qr-code").boundingBox();
+  const around = 12;
+  const base64 = (await page.screenshot({ clip: { x: x - around, y: y - around, width: wide + 2 * around, height: high + 2 * around } })).toString("base64");
   const [width, height, data] = await page.evaluate(async (text) => {
     const image = await createImageBitmap(new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], { type: "image/png" }));
     const context = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height }).getContext("2d");
@@ -79,6 +81,7 @@ const ENCODED_MS = 90_000;
 export const shareCases = [
   {
     name: "share: the dialog gives a link, says that it is copied, and its QR code is read in both themes",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       for (const [name, options] of [
@@ -119,7 +122,7 @@ export const shareCases = [
         assert(!wide, `${name}: the dialog scrolls sideways`);
         await screenshot(page, `share-${name}`);
         await page.locator(".qr-code").scrollIntoViewIfNeeded();
-        const { data, width, height } = await pixelsOf(page);
+        const { data, width, height } = await pixelsOfCode(page);
         // Strict: many readers take no inverted code.
         const code = jsQR(data, width, height, { inversionAttempts: "dontInvert" });
         assert(code?.data === link, `${name}: the QR code says ${code?.data}`);
@@ -216,7 +219,7 @@ export const shareCases = [
       const dialog = await page.evaluate(() => document.querySelector(".share-dialog").outerHTML + [...document.querySelectorAll(".share-dialog :is(input, textarea)")].map(({ value }) => value).join());
       assert(!dialog.includes(token), "the token is in the dialog");
       assert(dialog.includes("asks for a token"), "the dialog says nothing of the token");
-      const { data, width, height } = await pixelsOf(page);
+      const { data, width, height } = await pixelsOfCode(page);
       const link = await page.inputValue(LINK);
       assert(jsQR(data, width, height)?.data === link, "the QR code says something else");
 
@@ -325,9 +328,11 @@ export const shareCases = [
   },
   {
     name: "share: a film holds both canvases, has a length, and plays",
+    once: true,
+    alone: true,
     async run(browser) {
       const server = browser.keep(await start());
-      const page = await browser.page(server.url, { width: 800, height: 560 });
+      const page = await browser.page(server.url, { width: 800, height: 560, pictures: true });
       await waitForScene(page);
       // A patch of the overlay that only the film of both canvases has.
       await page.evaluate(() => {
@@ -397,6 +402,7 @@ export const shareCases = [
   },
   {
     name: "share: a browser without MediaRecorder says that it records no film",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page("about:blank");

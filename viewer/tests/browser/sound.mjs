@@ -44,13 +44,14 @@ export const soundCases = [
   {
     name: "sound is off until it is asked for, has its pitch, and is quiet when it is turned off",
     standinOnly: true,
+    alone: true,
     async run(browser) {
       const page = await pageWithSound(browser);
       await page.waitForTimeout(2500);
       const on = await loudest(page);
       assert(Math.abs(on.hz - 440) < 4, `${on.hz} Hz`);
       const title = await page.getAttribute(PLAYING, "title");
-      console.log(`  ${title}; ${on.hz.toFixed(0)} Hz at ${on.level.toFixed(1)} dB`);
+      browser.note(`${title}; ${on.hz.toFixed(0)} Hz at ${on.level.toFixed(1)} dB`);
       // The buffer leaves out what is later than 60 ms.
       const buffered = Number(title.match(/(\d+) ms in the buffer/)[1]);
       assert(buffered <= 60, title);
@@ -68,6 +69,7 @@ export const soundCases = [
   {
     name: "a bar of the real server sounds at 440 Hz",
     realOnly: true,
+    alone: true,
     async run(browser) {
       const page = await pageWithSound(browser, { scene: "bar" });
       // The mallet strikes every three seconds.
@@ -76,7 +78,7 @@ export const soundCases = [
         await page.waitForTimeout(400);
         found = await loudest(page);
       }
-      console.log(`  ${found.hz.toFixed(1)} Hz at ${found.level.toFixed(1)} dB, ${await page.getAttribute(PLAYING, "title")}`);
+      browser.note(`${found.hz.toFixed(1)} Hz at ${found.level.toFixed(1)} dB, ${await page.getAttribute(PLAYING, "title")}`);
       assert(Math.abs(found.hz - 440) <= 3, `${found.hz} Hz`);
       assertNoConsoleErrors(page);
     },

@@ -138,6 +138,7 @@ export const touchCases = [
   },
   {
     name: "two fingers on a touch screen pinch the object",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { width: 390, height: 844, touch: true, scale: 2 });
@@ -166,6 +167,7 @@ export const touchCases = [
   },
   {
     name: "a keyboard pointer moves, presses and releases",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -186,6 +188,7 @@ export const touchCases = [
   },
   {
     name: "every control is reachable by Tab and has an accessible name",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

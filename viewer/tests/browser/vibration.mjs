@@ -27,6 +27,7 @@ const pulses = (page) => page.evaluate(() => window.pulses);
 export const vibrationCases = [
   {
     name: "a phone vibrates at impacts, in short pulses, and the switch ends it",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const url = new URL(server.url);
@@ -54,6 +55,7 @@ export const vibrationCases = [
   },
   {
     name: "vibration is off at first on a desktop and with reduced motion, and on by its switch",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const url = new URL(server.url);
@@ -76,6 +78,7 @@ export const vibrationCases = [
   },
   {
     name: "a device without a motor has no switch",
+    once: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page("about:blank");
