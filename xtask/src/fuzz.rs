@@ -1,10 +1,10 @@
-//! Fuzzing of the readers by libFuzzer: `fuzz/` is a workspace of its own, since its targets need a nightly toolchain.
+//! Fuzzing of the readers by libFuzzer: `fuzz/` is a workspace of its own, since its targets and all below them are built with its counters.
 //!
 //! Seeds come from `data/` and from the texts below; what a run finds grows in `fuzz/corpus`, which git ignores. An input that panics, takes
 //! longer than [`SECONDS_PER_INPUT`] or more memory than [`MEGABYTES`] ends the run and lies in `fuzz/artifacts`.
 
-use crate::machine::runs;
-use crate::process::{root, run_in};
+use crate::machine;
+use crate::process::{cargo_command, root, run_in};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -20,9 +20,19 @@ const SECONDS_PER_INPUT: u32 = 10;
 /// Memory limit [MB].
 const MEGABYTES: u32 = 2048;
 
-/// Without a sanitizer: the readers have no unsafe code, and C libraries below them would not be instrumented. Panics, hangs and outsized memory are
-/// found all the same, at half the time to build and several times the inputs.
-const SANITIZER: [&str; 2] = ["--sanitizer", "none"];
+/// Counters and comparisons of libFuzzer, as cargo-fuzz has them built, by flags that the released compiler has. With checks of overflow, and without a
+/// sanitizer: the readers have no unsafe code, and C libraries below them would not be instrumented. Panics, hangs and outsized memory are found all
+/// the same, at half the time to build and several times the inputs.
+const FLAGS: &[&str] = &[
+    "--cfg",
+    "fuzzing",
+    "-Cdebug-assertions",
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+];
 
 /// Upper limit of the size of an input [bytes]: the largest seed.
 const LARGEST_INPUT: u32 = 200_000;
@@ -91,25 +101,15 @@ const TEXTS: &[(&str, &str)] = &[
     ("message", "{\"device\":\"left\"}"),
 ];
 
-/// Run targets for some time each, or say why not.
+/// Run targets for some time each.
 pub fn run_targets(target: Option<&str>, seconds: Option<&str>, arguments: &[&str]) -> Result<(), String> {
-    if !runs("cargo", &["+nightly", "--version"]) {
-        println!("skipped: fuzzing needs a nightly toolchain: `rustup toolchain install nightly`");
-        return Ok(());
-    }
-    if !runs("cargo", &["fuzz", "--version"]) {
-        eprintln!("installing cargo-fuzz");
-        if !runs("cargo", &["install", "--locked", "cargo-fuzz"]) {
-            println!("skipped: cargo-fuzz is missing and could not be installed: `cargo install cargo-fuzz`");
-            return Ok(());
-        }
-    }
+    machine::need_c_compiler()?;
     let seconds = seconds.unwrap_or("60");
     let folder = root().join("fuzz");
     let targets: Vec<_> =
         TARGETS.iter().filter(|name| target.is_none_or(|target| target == **name)).collect();
     eprintln!("building the targets (some minutes the first time)");
-    run_in(&folder, Command::new("cargo").args(["+nightly", "fuzz", "build"]).args(SANITIZER).args(target))?;
+    build(&folder, &targets)?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     for together in targets.chunks(cores) {
         let started: Result<Vec<_>, String> =
@@ -127,12 +127,20 @@ pub fn run_targets(target: Option<&str>, seconds: Option<&str>, arguments: &[&st
     Ok(())
 }
 
+/// Build targets. For a target by name, so that build scripts and macros have no counters.
+fn build(folder: &Path, targets: &[&&str]) -> Result<(), String> {
+    let mut cargo = cargo_command();
+    cargo.args(["build", "--release", "--locked", "--target", &host()?]);
+    cargo.args(targets.iter().flat_map(|name| ["--bin", name]));
+    cargo.env("CARGO_TARGET_DIR", folder.join("target"));
+    run_in(folder, cargo.env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\u{1f}")))
+}
+
 /// Starts a built target; its output is kept for a failure.
 fn start(folder: &Path, name: &str, seconds: &str, arguments: &[&str]) -> Result<Child, String> {
     let corpus = sow(name).map_err(|error| format!("the seeds of {name}: {error}"))?;
     let artifacts = folder.join("artifacts").join(name);
     std::fs::create_dir_all(&artifacts).map_err(|error| format!("{}: {error}", artifacts.display()))?;
-    // Not by `cargo fuzz run`, which would build again what is edited in the meantime.
     let mut fuzzer = Command::new(folder.join("target").join(host()?).join("release").join(name));
     fuzzer.arg(&corpus).arg(format!("-artifact_prefix={}/", artifacts.display()));
     fuzzer.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={SECONDS_PER_INPUT}"));
@@ -143,7 +151,7 @@ fn start(folder: &Path, name: &str, seconds: &str, arguments: &[&str]) -> Result
     started.map_err(|error| format!("the fuzzer of {name} can't be started: {error}"))
 }
 
-/// Name of this machine's target, below which cargo-fuzz puts what it builds.
+/// Name of this machine's target, below which cargo puts what is built for it.
 fn host() -> Result<String, String> {
     let output = Command::new("rustc").arg("-vV").output().map_err(|error| format!("rustc -vV: {error}"))?;
     let said = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -47,6 +47,12 @@ const CHORES: &[Chore] = &[
         run: |flags| tests::run_parts(flags.value("--only")),
     },
     Chore {
+        name: "tools",
+        summary: "install what the tests need: tools of the C library's, Python packages, Chromium, npm packages",
+        flags: &[],
+        run: |_| tests::install_tools(),
+    },
+    Chore {
         name: "verify",
         summary: "the slow proofs: computed numbers against analytic ones",
         flags: &[(REST, &[], "arguments of `palpate verify`, as the names of cases")],
@@ -138,7 +144,7 @@ const CHORES: &[Chore] = &[
     },
     Chore {
         name: "fuzz",
-        summary: "run the readers of files on random and damaged input, with a nightly toolchain and cargo-fuzz",
+        summary: "run the readers of files on random and damaged input by libFuzzer",
         flags: &[
             ("--target", fuzz::TARGETS, "one reader; all without"),
             ("--seconds", fuzz::SECONDS, "time for each; 60 without"),

@@ -1,6 +1,6 @@
 //! Tests, by part: Rust, doc comments, Python, C, and the page in a browser. One release build serves them all.
 
-use crate::process::{cargo, program, run};
+use crate::process::{cargo, program, root, run};
 use crate::{c_library, machine, viewer, web, wheel};
 use std::process::Command;
 
@@ -36,6 +36,17 @@ pub fn run_parts(only: Option<&str>) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// Install what the parts need, which they do themselves where it is missing: downloads take little of the processor, beside a build.
+pub fn install_tools() -> Result<(), String> {
+    machine::need_c_compiler()?;
+    machine::need_node()?;
+    c_library::install_tools();
+    machine::need_chromium()?;
+    machine::need_python()?;
+    viewer::install(&root().join("viewer"))?;
+    viewer::install(&web::package())
 }
 
 /// Programs and tests of the workspace.

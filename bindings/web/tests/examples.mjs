@@ -52,7 +52,7 @@ const slowFrames = () => {
   window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 1500);
 };
 const runs = Object.entries(cases).flatMap(([name, touch]) => (name === "worker.html" ? [false] : [false, true]).map((slow) => ({ name, touch, slow })));
-for (const { name, touch, slow } of runs) {
+async function run({ name, touch, slow }) {
   const page = await browser.newPage();
   if (slow) await page.addInitScript(slowFrames);
   const errors = [];
@@ -72,6 +72,10 @@ for (const { name, touch, slow } of runs) {
   }
   await page.close();
 }
+// Slow frames are waits: beside those of the others.
+await Promise.all([false, true].map(async (slow) => {
+  for (const one of runs) if (one.slow === slow) await run(one);
+}));
 await browser.close();
 server.close();
 process.exit(failed === 0 ? 0 : 1);

@@ -4,6 +4,7 @@ import { spawn } from "node:child_process";
 import { readFile } from "node:fs/promises";
 import { createServer as createHttpServer } from "node:http";
 import { createServer } from "node:net";
+import { availableParallelism } from "node:os";
 import { join, normalize } from "node:path";
 import { serve } from "../standin/server.mjs";
 import { hasPage, startProxy } from "./proxy.mjs";
@@ -19,10 +20,14 @@ async function freePort() {
   });
 }
 
+let served = 0;
+
 async function servePalpate(port, { log, scene = "bounce", token, frameAncestor }) {
   const logged = log === undefined ? [] : ["--log", log];
   const framed = frameAncestor === undefined ? [] : ["--frame-ancestor", frameAncestor];
-  const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--no-browser", ...logged, ...framed], {
+  // Each server keeps a core busy, by default the last one.
+  const core = String(served++ % availableParallelism());
+  const child = spawn(process.env.PALPATE, ["serve", "--scene", scene, "--listen", `127.0.0.1:${port}`, "--core", core, "--no-browser", ...logged, ...framed], {
     stdio: ["ignore", "pipe", "pipe"],
     env: token === undefined ? process.env : { ...process.env, PALPATE_TOKEN: token },
   });
