@@ -49,7 +49,7 @@ export const firstViewCases = [
   },
   {
     name: "there is no ghost finger where less motion is wanted, nor while the scene is paused",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const calm = await browser.page(server.url, { ghost: true, calm: true });

@@ -64,7 +64,7 @@ export const handCases = [
   },
   {
     name: "a press while the scene is paused is shown, and acts when it goes on",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -133,7 +133,7 @@ export const handCases = [
   },
   {
     name: "a held patch is a disc that lies on the surface, a touching finger a ball",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -282,7 +282,7 @@ export const handCases = [
   },
   {
     name: "Space pauses after a click on any control",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

@@ -204,7 +204,7 @@ export const liveCases = [
   },
   {
     name: "the layout follows the window size",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -248,7 +248,7 @@ export const liveCases = [
   },
   {
     name: "a lost WebGL context is restored",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { pictures: true });

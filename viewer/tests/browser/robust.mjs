@@ -8,7 +8,7 @@ const PARTS = [".header > *", ".toolbar > *", ".overlay-top > *", ".overlay-bott
 export const robustCases = [
   {
     name: "a phone that is turned shows all of it, in both positions",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url, { width: 390, height: 844, touch: true, scale: 2 });
@@ -46,7 +46,7 @@ export const robustCases = [
   },
   {
     name: "Tab reaches the scene with the sixth press at most, and Pause soon after",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

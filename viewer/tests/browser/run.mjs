@@ -3,11 +3,13 @@
 //   node tests/browser/run.mjs [part of a case's name]      SHOTS=folder saves screenshots
 //   node tests/browser/run.mjs --standin-only               leaves out what runs against the real server, too
 //
-// Cases run side by side, in a browser for each worker; those that are `alone` hear or film the scene in real time, and run after the others. Cases
-// that run `once` look at what the page does by itself, whoever runs its scene: not again without a server.
+// Cases run side by side, in a browser for each worker; those that are `alone` hear or film the scene in real time, and run after the others. What
+// the page does by itself is proved once: against the stand-in, which takes little of the processor, or where a case is to run `once`, not again
+// without a server.
 // A case that fails is run once more: one that passes then is reported as flaky, with its error, and has a fault that is to be repaired.
 
 import { mkdirSync } from "node:fs";
+import { availableParallelism } from "node:os";
 import { Browser } from "./browser.mjs";
 import { comparisonCases } from "./comparison.mjs";
 import { droppedCases } from "./dropped.mjs";
@@ -30,9 +32,10 @@ import { reconstructionCases } from "./reconstruction.mjs";
 
 if (process.env.SHOTS) mkdirSync(process.env.SHOTS, { recursive: true });
 const ATTEMPTS = 2;
-const WORKERS = Number(process.env.WORKERS ?? 2);
 const real = Boolean(process.env.PALPATE || process.env.PAGE);
 const serverless = Boolean(process.env.PAGE);
+// A scene that runs at 1 kHz takes half a core, and its page as much.
+const WORKERS = Number(process.env.WORKERS ?? Math.min(4, availableParallelism() + (real ? 0 : 1)));
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
 const all = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...recordedLogCases];

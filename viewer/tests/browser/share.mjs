@@ -402,7 +402,7 @@ export const shareCases = [
   },
   {
     name: "share: a browser without MediaRecorder says that it records no film",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page("about:blank");

@@ -167,7 +167,7 @@ export const touchCases = [
   },
   {
     name: "a keyboard pointer moves, presses and releases",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
@@ -188,7 +188,7 @@ export const touchCases = [
   },
   {
     name: "every control is reachable by Tab and has an accessible name",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);

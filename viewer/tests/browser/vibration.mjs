@@ -27,7 +27,7 @@ const pulses = (page) => page.evaluate(() => window.pulses);
 export const vibrationCases = [
   {
     name: "a phone vibrates at impacts, in short pulses, and the switch ends it",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const url = new URL(server.url);
@@ -55,7 +55,7 @@ export const vibrationCases = [
   },
   {
     name: "vibration is off at first on a desktop and with reduced motion, and on by its switch",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const url = new URL(server.url);
@@ -78,7 +78,7 @@ export const vibrationCases = [
   },
   {
     name: "a device without a motor has no switch",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page("about:blank");

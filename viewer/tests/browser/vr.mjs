@@ -63,7 +63,7 @@ async function pressDown(page, which) {
 export const vrCases = [
   {
     name: "a headset enters the scene, a controller and a hand touch the object, and the page comes back",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await pageWithHeadset(browser, server);
@@ -100,7 +100,7 @@ export const vrCases = [
   },
   {
     name: "without a headset there is no VR button",
-    once: true,
+    standinOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
       const page = await browser.page(server.url);
