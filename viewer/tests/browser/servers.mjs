@@ -21,6 +21,10 @@ async function freePort() {
 }
 
 let served = 0;
+/** Servers that run, which end with the tests that are stopped. */
+const running = new Set();
+process.on("exit", () => running.forEach((child) => child.kill()));
+for (const signal of ["SIGINT", "SIGTERM"]) process.on(signal, () => process.exit(1));
 
 async function servePalpate(port, { log, scene = "bounce", token, frameAncestor }) {
   const logged = log === undefined ? [] : ["--log", log];
@@ -31,6 +35,8 @@ async function servePalpate(port, { log, scene = "bounce", token, frameAncestor 
     stdio: ["ignore", "pipe", "pipe"],
     env: token === undefined ? process.env : { ...process.env, PALPATE_TOKEN: token },
   });
+  running.add(child);
+  child.once("exit", () => running.delete(child));
   let output = "";
   for (const stream of [child.stdout, child.stderr]) stream.on("data", (part) => (output += part));
   // The server prints its URL, with a token if it needs one.
