@@ -54,7 +54,7 @@ impl Fingers {
     }
 }
 
-/// What a step gives, and the state that it leaves.
+/// Output of the last step, and snapshots of the objects.
 fn result(state: &State) -> (Output, Vec<ObjectSnapshot>) {
     (state.output().clone(), state.snapshots())
 }

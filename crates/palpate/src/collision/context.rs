@@ -25,7 +25,7 @@ pub(crate) struct CollisionScene<'a> {
     pub(crate) max_contact_samples: usize,
 }
 
-/// What collision detection keeps from step to step; buffers are made once.
+/// Caches of collision detection, from step to step; buffers are made once.
 #[derive(Debug, Clone)]
 pub(crate) struct CollisionCaches {
     /// Triangles near each device.
