@@ -13,9 +13,6 @@ import { start } from "./servers.mjs";
 const LOGS = fileURLToPath(new URL("../../../data/logs/", import.meta.url));
 const SAMPLE = readFileSync(join(LOGS, "v3/finger_on_floor.mcap"));
 
-/** Time that a busy processor may take to compute a log and its scales [ms]. */
-const COMPUTED_MS = 180_000;
-
 /** Drops files onto the page: names with their bytes. */
 export function drop(page, files) {
   const given = Object.entries(files).map(([name, bytes]) => [name, Buffer.from(bytes).toString("base64")]);
@@ -32,8 +29,8 @@ export function drop(page, files) {
 
 /** Waits until logs are shown and computed. */
 async function waitForLogs(page, count) {
-  await page.waitForFunction((n) => document.documentElement.dataset.kind === "logs" && window.palpate?.sceneView.graphs.length === n && window.palpate.sceneView.graphs.every((graph) => graph.frame !== null), count, { timeout: COMPUTED_MS });
-  await page.waitForFunction(() => document.querySelectorAll(".job").length === 0, null, { timeout: COMPUTED_MS });
+  await page.waitForFunction((n) => document.documentElement.dataset.kind === "logs" && window.palpate?.sceneView.graphs.length === n && window.palpate.sceneView.graphs.every((graph) => graph.frame !== null), count, { timeout: 60_000 });
+  await page.waitForFunction(() => document.querySelectorAll(".job").length === 0, null, { timeout: 60_000 });
 }
 
 /** Log whose scene names a recording that it does not carry: its attachment has another text, and the checksum of that. */
@@ -71,7 +68,7 @@ async function served(log, last, paths) {
       }
     });
     const answer = async (path) => Buffer.from(await (await fetch(new URL(path, url))).arrayBuffer());
-    const end = Date.now() + COMPUTED_MS;
+    const end = Date.now() + 60_000;
     while ((await answer(`log/0/frames?from=${last}&count=1`)).length === 0) {
       assert(Date.now() < end, "palpate serve did not compute the log");
       await new Promise((wake) => setTimeout(wake, 100));
@@ -157,7 +154,7 @@ export const droppedCases = [
       await waitForLogs(page, 1);
       const last = (await page.evaluate(() => window.palpate.sceneView.graphs[0].info.frames)) - 1;
       const paths = ["log/0/frames?from=0&count=60", `log/0/frames?from=60&count=${last - 59}`, "log/0/series", "scene/0/object/0/surface"];
-      await page.waitForFunction(async (at) => (await window.palpate.connection.fetch(`log/0/frames?from=${at}&count=1`)).byteLength > 0, last, { polling: 200, timeout: COMPUTED_MS });
+      await page.waitForFunction(async (at) => (await window.palpate.connection.fetch(`log/0/frames?from=${at}&count=1`)).byteLength > 0, last, { polling: 200, timeout: 60_000 });
       const theirs = await served(path, last, paths);
       rmSync(dirname(path), { recursive: true });
       for (const [at, of] of paths.entries()) {
