@@ -25,7 +25,7 @@ pub use sample_level::{MIN_CONTACT_SAMPLES, SampleLevel};
 pub(crate) use sphere_tree::{
     Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
 };
-pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle, segment_distance};
+pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 
 use alloc::vec::Vec;
 use glam::DVec3;

@@ -18,7 +18,7 @@ use crate::collision::proximity::ProximityQuery;
 use crate::device::{DeviceParameters, DeviceState};
 use crate::object::ObjectState;
 use crate::response::{Body, ContactLocation, Footprint};
-use crate::surface::{SurfacePoint, at_weights, segment_distance};
+use crate::surface::{SurfacePoint, at_weights};
 use glam::DVec3;
 
 /// Upper limit of samples along a slide.
@@ -195,19 +195,15 @@ impl CollisionContext<'_> {
                 p,
                 (1.0 - COLLISION.tip_margin) * contacts.tip.max(slide.length() / count),
             );
-            // Other faces, from outside: the slide leads against them, and to them.
-            query.found.retain(|found| {
-                let is_other =
-                    contacts.all().all(|c| c.normal_in_body.dot(found.normal) < COLLISION.crease_cosine);
-                is_other
-                    && slide.dot(found.normal) < 0.0
-                    && segment_distance(surface.corners(found.triangle), [start, start + slide])
-                        < contacts.tip
-            });
             query.keep_local_minima(body, f64::INFINITY, 2 * MAX_TIP_CONTACTS);
             for found in &query.found {
-                let beside = found.position + found.normal * contacts.tip;
-                contacts.add(&mut surface, found, beside, before.slerp(after, t));
+                let is_other =
+                    contacts.all().all(|c| c.normal_in_body.dot(found.normal) < COLLISION.crease_cosine);
+                // Met from outside: the slide leads against it.
+                if is_other && slide.dot(found.normal) < 0.0 {
+                    let beside = found.position + found.normal * contacts.tip;
+                    contacts.add(&mut surface, found, beside, before.slerp(after, t));
+                }
             }
             if contacts.count > touching {
                 return;
