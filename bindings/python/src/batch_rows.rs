@@ -76,7 +76,7 @@ impl Workspaces {
         Self((0..threads).map(|_| Mutex::new(Workspace::new(&scene.model))).collect())
     }
 
-    /// Those of the thread that asks, which no other one uses.
+    /// Buffers of the thread that asks, which no other one uses.
     pub fn own(&self) -> MutexGuard<'_, Workspace> {
         let thread = rayon::current_thread_index().unwrap_or(0);
         self.0[thread].lock().unwrap_or_else(PoisonError::into_inner)

@@ -138,6 +138,7 @@ impl RunState {
         stepped
     }
 
+    /// Step with the input by a function, unless an earlier step has panicked; see [`Self::step`].
     fn step_by(
         &mut self,
         scene: &palpate_scene::Scene,

@@ -71,7 +71,6 @@ export class Browser {
     if (!pictures && !process.env.SHOTS) await context.addInitScript(drawSparsely, SPARSE_MS);
     const page = await context.newPage();
     page.setDefaultTimeout(20_000);
-    page.setDefaultNavigationTimeout(60_000);
     page.consoleErrors = [];
     page.on("pageerror", (error) => page.consoleErrors.push(error.stack));
     page.on("console", (message) => {

@@ -5,7 +5,7 @@ import { assert, assertNoConsoleErrors, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 /** Time that a busy processor may take to encode a film [ms]. */
-const ENCODED_MS = 180_000;
+const ENCODED_MS = 90_000;
 
 /** Waits until the film is longer by some seconds. */
 async function filmOn(page, seconds) {

@@ -76,7 +76,7 @@ async function serveHtml(html) {
 }
 
 /** Time that a busy processor may take to encode a film [ms]. */
-const ENCODED_MS = 180_000;
+const ENCODED_MS = 90_000;
 
 export const shareCases = [
   {

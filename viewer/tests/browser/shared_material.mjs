@@ -28,7 +28,7 @@ const waitForMaterial = (page, young, density) =>
   page.waitForFunction(([e, rho]) => {
     const material = window.palpate.sceneView.graphs[0]?.info.objects[0].material;
     return material != null && Math.abs(material.young / e - 1) < 1e-6 && Math.abs(material.density / rho - 1) < 1e-6;
-  }, [young, density], { timeout: 300_000 });
+  }, [young, density], { timeout: 120_000 });
 
 export const sharedMaterialCases = [
   {
