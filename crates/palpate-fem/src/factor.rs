@@ -5,11 +5,9 @@
 //! L·B·Lᵀ (pivots of size one and two) counts the eigenvalues of the pencil below −s (Sylvester).
 
 use crate::assembly::Assembly;
-use crate::kernels::SEQUENTIAL;
+use crate::kernels::{SEQUENTIAL, avx_section, multiply, solve_lower, solve_upper};
 use crate::solve_error::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::SupernodalThreshold;
@@ -19,7 +17,7 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Accum, Conj, Mat, MatMut, Par, Side, unzip, zip};
+use faer::{Accum, Conj, Mat, MatMut, Side, unzip, zip};
 use std::sync::Arc;
 
 /// Elimination order and sparsity of the factor: made once per mesh.
@@ -84,8 +82,8 @@ impl Pattern {
         let mut values = vec![0.0; self.symbolic.len_val()];
         let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(SEQUENTIAL, Default::default());
         let mut memory = MemBuffer::new(scratch);
-        self.symbolic
-            .factorize_numeric_llt::<f64>(
+        let factored = avx_section(|| {
+            self.symbolic.factorize_numeric_llt::<f64>(
                 &mut values,
                 matrix.as_ref(),
                 Side::Lower,
@@ -94,7 +92,8 @@ impl Pattern {
                 MemStack::new(&mut memory),
                 Default::default(),
             )
-            .map_err(|_| SolveError::NotPositiveDefinite)?;
+        });
+        factored.map_err(|_| SolveError::NotPositiveDefinite)?;
         let constrained = (0..constrained.len()).filter(|&row| constrained[row]).collect();
         Ok(Factor { symbolic: self.symbolic.clone(), constrained, values })
     }
@@ -108,17 +107,19 @@ impl Pattern {
         let scratch =
             self.symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(SEQUENTIAL, Default::default());
         let mut memory = MemBuffer::new(scratch);
-        self.symbolic.factorize_numeric_intranode_lblt::<f64>(
-            &mut values,
-            &mut subdiagonal,
-            &mut forward,
-            &mut inverse,
-            matrix.as_ref(),
-            Side::Lower,
-            SEQUENTIAL,
-            MemStack::new(&mut memory),
-            Default::default(),
-        );
+        avx_section(|| {
+            self.symbolic.factorize_numeric_intranode_lblt::<f64>(
+                &mut values,
+                &mut subdiagonal,
+                &mut forward,
+                &mut inverse,
+                matrix.as_ref(),
+                Side::Lower,
+                SEQUENTIAL,
+                MemStack::new(&mut memory),
+                Default::default(),
+            );
+        });
         let SymbolicCholeskyRaw::Supernodal(supernodal) = self.symbolic.raw() else {
             return 0;
         };
@@ -152,14 +153,16 @@ impl Factor {
             columns.as_mut().row_mut(row).fill(0.0);
         }
         let symbolic = &*self.symbolic;
-        let scratch = symbolic.solve_in_place_scratch::<f64>(columns.ncols(), Par::Seq);
+        let scratch = symbolic.solve_in_place_scratch::<f64>(columns.ncols(), SEQUENTIAL);
         let mut memory = MemBuffer::new(scratch);
-        LltRef::<usize, f64>::new(symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            columns,
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        avx_section(|| {
+            LltRef::<usize, f64>::new(symbolic, &self.values).solve_in_place_with_conj(
+                Conj::No,
+                columns,
+                SEQUENTIAL,
+                MemStack::new(&mut memory),
+            );
+        });
     }
 }
 
@@ -214,9 +217,9 @@ impl Factor {
             let (start, width) = (supernode.start(), block.ncols());
             let (diagonal, off) = block.split_at_row(width);
             let mut own = x.as_mut().subcols_mut(start, width);
-            solve_lower_triangular_in_place(diagonal, own.rb_mut().transpose_mut(), Par::Seq);
+            solve_lower(diagonal, own.rb_mut().transpose_mut());
             let mut change = below.as_mut().subcols_mut(0, rows.len());
-            matmul(change.rb_mut(), Accum::Replace, own.rb(), off.transpose(), 1.0, Par::Seq);
+            multiply(change.rb_mut(), Accum::Replace, own.rb(), off.transpose(), 1.0);
             for (i, &row) in rows.iter().enumerate() {
                 zip!(x.col_mut(row), change.rb().col(i)).for_each(|unzip!(x, change)| *x -= *change);
             }
@@ -231,8 +234,8 @@ impl Factor {
                 known.rb_mut().col_mut(i).copy_from(x.col(row));
             }
             let mut own = x.as_mut().subcols_mut(start, width);
-            matmul(own.rb_mut(), Accum::Add, known.rb(), off, -1.0, Par::Seq);
-            solve_upper_triangular_in_place(diagonal.transpose(), own.rb_mut().transpose_mut(), Par::Seq);
+            multiply(own.rb_mut(), Accum::Add, known.rb(), off, -1.0);
+            solve_upper(diagonal.transpose(), own.rb_mut().transpose_mut());
         }
         for new in 0..n {
             loads.as_mut().col_mut(at(new)).copy_from(x.col(new));

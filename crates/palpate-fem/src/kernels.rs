@@ -5,7 +5,8 @@
 //! rows whose sizes depend on the matrix alone.
 
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// Threads of a kernel: one.
@@ -22,13 +23,49 @@ pub(crate) fn use_sequential_kernels() {
     faer::set_global_parallelism(SEQUENTIAL);
 }
 
+/// Result of work with faer's kernels, with the upper halves of the vector registers zero after it.
+///
+/// faer's matrix products on x86 (private-gemm-x86 0.1) leave them in use, against the calling convention. Until something zeroes them, SSE code
+/// of the thread, and of each thread that it starts, waits for its own registers at every instruction: recordings took 15 % longer, and
+/// steps on new threads twice as long.
+pub(crate) fn avx_section<T>(work: impl FnOnce() -> T) -> T {
+    let result = work();
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the processor has AVX.
+        unsafe { std::arch::x86_64::_mm256_zeroupper() };
+    }
+    result
+}
+
+/// target ← left·right·factor, or target + that.
+pub(crate) fn multiply(
+    target: MatMut<'_, f64>,
+    accumulation: Accum,
+    left: MatRef<'_, f64>,
+    right: MatRef<'_, f64>,
+    factor: f64,
+) {
+    avx_section(|| matmul(target, accumulation, left, right, factor, SEQUENTIAL));
+}
+
+/// x ← L⁻¹·x with a lower triangle L.
+pub(crate) fn solve_lower(lower: MatRef<'_, f64>, x: MatMut<'_, f64>) {
+    avx_section(|| solve_lower_triangular_in_place(lower, x, SEQUENTIAL));
+}
+
+/// x ← U⁻¹·x with an upper triangle U.
+pub(crate) fn solve_upper(upper: MatRef<'_, f64>, x: MatMut<'_, f64>) {
+    avx_section(|| solve_upper_triangular_in_place(upper, x, SEQUENTIAL));
+}
+
 /// Product of two matrices, blocks of rows in parallel.
 pub(crate) fn product(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Mat<f64> {
     let mut result = Mat::zeros(left.nrows(), right.ncols());
     let rows = left.nrows().div_ceil(BLOCKS).max(LEAST_ROWS);
     result.as_mut().par_row_chunks_mut(rows).enumerate().for_each(|(at, block)| {
         let own = left.subrows(at * rows, block.nrows());
-        matmul(block, Accum::Replace, own, right, 1.0, SEQUENTIAL);
+        multiply(block, Accum::Replace, own, right, 1.0);
     });
     result
 }
@@ -55,5 +92,43 @@ mod tests {
         for threads in [2, 3, 4] {
             assert!(of(threads) == (inner.clone(), tall.clone()), "{threads} threads");
         }
+    }
+
+    /// Whether the upper halves of vector registers are in use, where the processor tells it.
+    #[cfg(target_arch = "x86_64")]
+    fn upper_halves_are_in_use() -> Option<bool> {
+        use std::arch::x86_64::{__cpuid_count, _xgetbv};
+        // Bits of XINUSE: the upper halves of YMM0 to 15, and of ZMM0 to 15.
+        const UPPER_HALVES: u64 = 1 << 2 | 1 << 6;
+        // Bit of CPUID leaf 13, subleaf 1: XGETBV reads XINUSE.
+        const TELLS: u32 = 1 << 2;
+        if !(std::arch::is_x86_feature_detected!("avx") && std::arch::is_x86_feature_detected!("xsave")) {
+            return None;
+        }
+        if __cpuid_count(0xd, 1).eax & TELLS == 0 {
+            return None;
+        }
+        // SAFETY: the processor has XSAVE, and XGETBV for register 1.
+        Some(unsafe { _xgetbv(1) } & UPPER_HALVES != 0)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn kernels_leave_the_upper_halves_zero() {
+        let lower = Mat::from_fn(64, 64, |i, j| if i >= j { 1.0 + i as f64 } else { 0.0 });
+        let mut x = lower.clone();
+        // A system that restores the registers as a whole has them in use after each switch of threads.
+        let mut is_zero_after = |kernel: &mut dyn FnMut(MatMut<'_, f64>)| {
+            (0..100).any(|_| {
+                x.copy_from(&lower);
+                kernel(x.as_mut());
+                upper_halves_are_in_use() != Some(true)
+            })
+        };
+        let own = lower.as_ref();
+        assert!(is_zero_after(&mut |x| multiply(x, Accum::Replace, own, own, 1.0)));
+        assert!(is_zero_after(&mut |x| solve_lower(own, x)));
+        assert!(is_zero_after(&mut |x| solve_upper(own.transpose(), x)));
+        assert!(is_zero_after(&mut |mut x| avx_section(|| x *= faer::Scale((own * own)[(0, 0)]))));
     }
 }

@@ -7,6 +7,7 @@
 //! Reference: rational Krylov moment matching, Grimme 1997.
 
 use crate::assembly::SystemMatrix;
+use crate::kernels::avx_section;
 use crate::modes::ElasticModes;
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
@@ -177,8 +178,8 @@ impl ProjectedSystem {
 /// Component of a block that is M-orthogonal to rigid motions and kept modes.
 fn without_kept_modes(system: &System, modes: &ElasticModes, mut block: Mat<f64>) -> Mat<f64> {
     system.remove_rigid(&mut block);
-    let amplitudes = modes.shapes.transpose() * system.mass_times(block.as_ref());
-    block -= &modes.shapes * amplitudes;
+    let weighted = system.mass_times(block.as_ref());
+    avx_section(|| block -= &modes.shapes * (modes.shapes.transpose() * weighted));
     block
 }
 

@@ -8,7 +8,7 @@
 //! all modes below s; if one is missing, the basis is extended by a new random block.
 //! References: Golub & Underwood 1977 (block Lanczos); Grimes, Lewis & Simon 1994, SIAM J. Matrix Anal. 15, 228.
 
-use crate::kernels::{SEQUENTIAL, product};
+use crate::kernels::{avx_section, product, solve_lower, solve_upper};
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
 use crate::system::System;
@@ -233,8 +233,8 @@ impl Basis {
         // faer's eigensolver wants entries near 1.
         let scale = h.norm_max();
         h *= faer::Scale(1.0 / scale);
-        let eigen =
-            h.self_adjoint_eigen(Side::Lower).map_err(|e| SolveError::DenseEigenproblem(format!("{e:?}")))?;
+        let eigen = avx_section(|| h.self_adjoint_eigen(Side::Lower))
+            .map_err(|e| SolveError::DenseEigenproblem(format!("{e:?}")))?;
         let vectors = Mat::from_fn(dim, dim, |i, j| eigen.U()[(i, dim - 1 - j)]);
         let values: Vec<f64> = (0..dim).map(|j| eigen.S()[dim - 1 - j] * scale).collect();
         // |G·M·φ − θφ| = |next·(last rows of y)|, with the Gram matrix of `next`.
@@ -263,14 +263,10 @@ fn orthonormalise(system: &System, block: &mut Mat<f64>) -> Option<()> {
             return None;
         }
         let unit = Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / (sizes[i] * sizes[j]));
-        let llt = unit.llt(Side::Lower).ok()?;
+        let llt = avx_section(|| unit.llt(Side::Lower)).ok()?;
         // B ← B·D⁻¹·L⁻ᵀ.
         let mut transposed = Mat::from_fn(block.ncols(), block.nrows(), |j, i| block[(i, j)] / sizes[j]);
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-            llt.L(),
-            transposed.as_mut(),
-            SEQUENTIAL,
-        );
+        solve_lower(llt.L(), transposed.as_mut());
         *block = transposed.transpose().to_owned();
     }
     Some(())
@@ -325,23 +321,19 @@ pub fn all_modes(
         }
     }
     let failed = |e: &dyn std::fmt::Debug| SolveError::DenseEigenproblem(format!("{e:?}"));
-    let llt = m.llt(Side::Lower).map_err(|e| failed(&e))?;
+    let llt = avx_section(|| m.llt(Side::Lower)).map_err(|e| failed(&e))?;
     let lower_solve = |x: &mut Mat<f64>| {
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(llt.L(), x.as_mut(), SEQUENTIAL);
+        solve_lower(llt.L(), x.as_mut());
     };
     lower_solve(&mut k);
     let mut k = k.transpose().to_owned();
     lower_solve(&mut k);
     let scale = k.norm_max();
     let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)]) / scale);
-    let eigen = symmetric.self_adjoint_eigen(Side::Lower).map_err(|e| failed(&e))?;
+    let eigen = avx_section(|| symmetric.self_adjoint_eigen(Side::Lower)).map_err(|e| failed(&e))?;
     let skip = system.rigid_motions();
     let mut vectors = eigen.U().subcols(skip, requested).to_owned();
-    faer::linalg::triangular_solve::solve_upper_triangular_in_place(
-        llt.L().transpose(),
-        vectors.as_mut(),
-        SEQUENTIAL,
-    );
+    solve_upper(llt.L().transpose(), vectors.as_mut());
     let mut shapes = Mat::zeros(dofs, requested);
     for (j, (at, &dof)) in (0..requested).flat_map(|j| free.iter().enumerate().map(move |f| (j, f))) {
         shapes[(dof, j)] = vectors[(at, j)];

@@ -5,6 +5,7 @@ use crate::body::RecordedBody;
 use crate::certificate::{FORCE_ERROR_UNUSABLE, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
+use crate::kernels::avx_section;
 use crate::material;
 use crate::memory::check_memory;
 use crate::modes::{ElasticModes, lowest_modes};
@@ -111,7 +112,7 @@ impl RecordedBody {
         parameters: &RecordParameters,
         progress: &mut dyn Progress,
     ) -> Result<Self, RecordError> {
-        record_body(mesh, parameters, progress)
+        avx_section(|| record_body(mesh, parameters, progress))
     }
 }
 

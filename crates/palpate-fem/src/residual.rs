@@ -6,6 +6,7 @@
 //!
 //! Equations: docs/theory.md (C4).
 
+use crate::kernels::avx_section;
 use crate::modes::ElasticModes;
 use crate::progress::Progress;
 use crate::quantise::quantised;
@@ -138,7 +139,8 @@ fn for_each_column(
         let solved: Vec<_> = batch
             .par_iter()
             .map(|&start| {
-                columns(system, modes, surface_nodes, start..(start + COLUMNS_PER_SOLVE).min(touchable))
+                let range = start..(start + COLUMNS_PER_SOLVE).min(touchable);
+                avx_section(|| columns(system, modes, surface_nodes, range))
             })
             .collect();
         for (&start, block) in batch.iter().zip(&solved) {

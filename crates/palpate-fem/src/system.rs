@@ -17,7 +17,7 @@
 use crate::assembly::{Assembly, SystemMatrix};
 use crate::discretisation::Discretisation;
 use crate::factor::{Factor, Pattern};
-use crate::kernels::use_sequential_kernels;
+use crate::kernels::{avx_section, use_sequential_kernels};
 use crate::memory::check_memory;
 use crate::solve_error::SolveError;
 use crate::supports::SupportedDofs;
@@ -138,16 +138,14 @@ impl System {
     /// Subtracts from loads the inertia forces of the rigid motion that they cause: (I − M·Φr·Φrᵀ)·B.
     pub fn balance(&self, loads: &mut Mat<f64>) {
         if let Some(Rigid { shapes, weighted }) = &self.rigid {
-            let amplitudes = shapes.transpose() * &*loads;
-            *loads -= weighted * amplitudes;
+            avx_section(|| *loads -= weighted * (shapes.transpose() * &*loads));
         }
     }
 
     /// Subtracts from displacements their rigid part: (I − Φr·Φrᵀ·M)·U; zeroes fixed degrees of freedom.
     pub fn remove_rigid(&self, displacements: &mut Mat<f64>) {
         if let Some(Rigid { shapes, weighted }) = &self.rigid {
-            let amplitudes = weighted.transpose() * &*displacements;
-            *displacements -= shapes * amplitudes;
+            avx_section(|| *displacements -= shapes * (weighted.transpose() * &*displacements));
         }
         for (row, _) in self.fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {
             displacements.row_mut(row).fill(0.0);

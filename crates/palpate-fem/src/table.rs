@@ -6,11 +6,11 @@
 //! `palpate-store` writes them to disk.
 
 use crate::body::RecordedBody;
+use crate::kernels::multiply;
 use crate::residual::truncated_displacements;
 use crate::solve_error::SolveError;
 use crate::transient::{Transient, TransientState, resolved_frequency_hz};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, Par};
+use faer::{Accum, Mat, MatMut};
 use palpate::{Damping, OscillatorState, ResidualCompliance, SampledOscillator, SampledResidual, Sampling};
 use rayon::prelude::*;
 
@@ -364,7 +364,7 @@ impl ClosedForm {
             Mat::from_fn(m, parameters.samples, |i, sample| self.modal_responses[sample * m + i] * gain(i));
         let mut values = vec![0.0; rows * parameters.samples];
         let target = MatMut::from_column_major_slice_mut(&mut values, rows, parameters.samples);
-        matmul(target, Accum::Replace, self.observed.as_ref(), coordinates.as_ref(), 1.0, Par::Seq);
+        multiply(target, Accum::Replace, self.observed.as_ref(), coordinates.as_ref(), 1.0);
         let residuals: Vec<f64> =
             (0..rows).map(|row| residual(dof(&parameters.observed_nodes, row))).collect();
         for (values, share) in values.chunks_exact_mut(rows.max(1)).zip(shares) {
