@@ -49,7 +49,7 @@ def main():
     most = int(sys.argv[3]) if len(sys.argv) > 3 else 2
     warnings.simplefilter("ignore", palpate.PalpateWarning)
     ways = {"step": block_of_steps, "run": lambda batch, motions: batch.run(motions)}
-    counts = sorted({1, os.cpu_count() or 1})
+    counts = sorted({1, len(os.sched_getaffinity(0))})
     for name, scene, slide in list(scenes())[:most]:
         batches = {(way, count): palpate.Batch(scene, rows, threads=count) for way in ways for count in counts}
         wall, processors = {key: [] for key in batches}, {key: [] for key in batches}

@@ -6,6 +6,7 @@
 
 use super::places::{Place, residual_between, weighted};
 use super::{EVENT, oscillator, raise};
+use crate::kernels::dot;
 use crate::krylov::ModeAtPlaces;
 use faer::Mat;
 use faer::linalg::solvers::DenseSolveCore;
@@ -134,8 +135,12 @@ impl HeldPlaces {
         self.rigid.iter().for_each(|gains| add(gains, 0.5 * h * h));
         modes.iter().zip(&maps).for_each(|((_, gains), map)| add(gains, map.instantaneous_compliance()));
         let inverse = compliance.partial_piv_lu().inverse();
+        let gains = Mat::from_fn(modes.len(), size, |mode, i| modes[mode].1[i]);
+        let rigid_gains = Mat::from_fn(self.rigid.len(), size, |motion, i| self.rigid[motion][i]);
         let mut states = vec![OscillatorState::default(); size * modes.len()];
         let mut rigid = vec![OscillatorState::default(); size * self.rigid.len()];
+        let [mut modal, mut rigid_modal] =
+            [Mat::zeros(modes.len(), size), Mat::zeros(self.rigid.len(), size)];
         // Displacements by the relaxed forces and by those of the last step.
         let [mut relaxed, mut held] = [Mat::<f64>::zeros(size, size), Mat::<f64>::zeros(size, size)];
         let steps = (EVENT.duration_s / h).round() as usize;
@@ -145,31 +150,26 @@ impl HeldPlaces {
                 let mut missing =
                     &held * faer::Scale(sampled.lead()) - &relaxed * faer::Scale(sampled.decay());
                 (0..size).for_each(|i| missing[(i, i)] += target);
-                let mut subtract = |gains: &[f64], column: usize, q: f64| {
-                    (0..size).for_each(|row| missing[(row, column)] -= gains[row] * q);
-                };
-                for (((_, gains), map), states) in modes.iter().zip(&maps).zip(states.chunks(size)) {
-                    for (column, state) in states.iter().enumerate() {
-                        subtract(gains, column, map.advance(*state, 0.0).q);
-                    }
+                // Displacements at the end of the step without force, then modal forces.
+                for (column, states) in states.chunks(modes.len().max(1)).enumerate() {
+                    let free = modal.col_as_slice_mut(column).iter_mut().zip(&maps).zip(states);
+                    free.for_each(|((q, map), state)| *q = map.advance(*state, 0.0).q);
                 }
-                for (gains, states) in self.rigid.iter().zip(rigid.chunks(size)) {
-                    for (column, state) in states.iter().enumerate() {
-                        subtract(gains, column, state.q + h * state.v);
-                    }
+                for (column, states) in rigid.chunks(self.rigid.len().max(1)).enumerate() {
+                    let free = rigid_modal.col_as_slice_mut(column).iter_mut().zip(states);
+                    free.for_each(|(q, state)| *q = state.q + h * state.v);
                 }
+                subtract_product(&mut missing, &gains, &modal);
+                subtract_product(&mut missing, &rigid_gains, &rigid_modal);
                 let force = &inverse * missing;
-                let modal = |gains: &[f64], column: usize| -> f64 {
-                    (0..size).map(|row| gains[row] * force[(row, column)]).sum()
-                };
-                for (((_, gains), map), states) in modes.iter().zip(&maps).zip(states.chunks_mut(size)) {
-                    for (column, state) in states.iter_mut().enumerate() {
-                        *state = map.advance(*state, modal(gains, column));
-                    }
+                set_to_product(&mut modal, &gains, &force);
+                set_to_product(&mut rigid_modal, &rigid_gains, &force);
+                for (column, states) in states.chunks_mut(modes.len().max(1)).enumerate() {
+                    let forced = states.iter_mut().zip(&maps).zip(modal.col_as_slice(column));
+                    forced.for_each(|((state, map), p)| *state = map.advance(*state, *p));
                 }
-                for (gains, states) in self.rigid.iter().zip(rigid.chunks_mut(size)) {
-                    for (column, state) in states.iter_mut().enumerate() {
-                        let p = modal(gains, column);
+                for (column, states) in rigid.chunks_mut(self.rigid.len().max(1)).enumerate() {
+                    for (state, p) in states.iter_mut().zip(rigid_modal.col_as_slice(column)) {
                         state.q += h * state.v + 0.5 * h * h * p;
                         state.v += h * p;
                     }
@@ -180,6 +180,25 @@ impl HeldPlaces {
                 force
             })
             .collect()
+    }
+}
+
+/// C ← C − Aᵀ·B.
+fn subtract_product(c: &mut Mat<f64>, a: &Mat<f64>, b: &Mat<f64>) {
+    for j in 0..c.ncols() {
+        let column = c.col_as_slice_mut(j).iter_mut().enumerate();
+        column.for_each(|(i, c)| *c -= dot(a.col_as_slice(i), b.col_as_slice(j)));
+    }
+}
+
+/// C ← A·B.
+fn set_to_product(c: &mut Mat<f64>, a: &Mat<f64>, b: &Mat<f64>) {
+    for j in 0..c.ncols() {
+        let c = c.col_as_slice_mut(j);
+        c.fill(0.0);
+        for (k, factor) in b.col_as_slice(j).iter().enumerate() {
+            c.iter_mut().zip(a.col_as_slice(k)).for_each(|(c, a)| *c += a * factor);
+        }
     }
 }
 
