@@ -27,6 +27,7 @@ pub fn build() -> Result<(), String> {
     if !wrong.is_empty() {
         return Err(format!("versions differ:\n{}", wrong.join("\n")));
     }
+    check_committed()?;
     machine::need_c_compiler()?;
     viewer::build()?;
     let dist = root().join(DIST);
@@ -54,6 +55,16 @@ pub fn build() -> Result<(), String> {
     pack(&site)?;
     write_bill(&dist.join(format!("palpate-{version}.cdx.json")))?;
     finish(&dist)
+}
+
+/// A release is built of what is committed: packages of crates state their commit.
+fn check_committed() -> Result<(), String> {
+    let changed = output_of(Command::new("git").args(["status", "--porcelain"]).current_dir(root()))?;
+    if changed.is_empty() {
+        return Ok(());
+    }
+    let changed = String::from_utf8_lossy(&changed);
+    Err(format!("commit or stash these files first, a release is built of what is committed:\n{changed}"))
 }
 
 /// The program with its licences, completions and manual pages.
