@@ -18,7 +18,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Accum, Conj, Mat, MatMut, Side, unzip, zip};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Elimination order and sparsity of the factor: made once per mesh.
 #[derive(Debug, Clone)]
@@ -280,6 +280,10 @@ fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> Spar
     SparseColMat::new(symbolic, values)
 }
 
+/// METIS draws the C library's random numbers, which a process has one series of: it begins the series, and two at once would take each
+/// other's numbers. The elimination order, and so the last bits of a recording, depend on them.
+static METIS: Mutex<()> = Mutex::new(());
+
 /// Nested dissection of the node graph by METIS; node numbers in elimination order.
 fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, SolveError> {
     let n = assembly.nodes();
@@ -293,6 +297,7 @@ fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, SolveError> {
     }
     let mut count = i32::try_from(n).map_err(too_large)?;
     let (mut order, mut inverse) = (vec![0_i32; n], vec![0_i32; n]);
+    let _alone = METIS.lock().unwrap_or_else(PoisonError::into_inner);
     // SAFETY: the arrays have the lengths that METIS 5 states for METIS_NodeND (starts n + 1, order and
     // inverse n, neighbours as starts say, without self loops); null asks for no weights and defaults.
     let status = unsafe {
@@ -320,12 +325,30 @@ mod tests {
     use palpate::Material;
     use palpate_mesh::box_mesh;
 
+    fn assembly(cells: [u32; 3], order: ElementOrder) -> (Assembly, Discretisation) {
+        let mesh = box_mesh([0.3, 0.2, 0.1], cells).expect("a good box");
+        let discretisation = Discretisation::new(&mesh, order);
+        let material = Material::isotropic(1e4, 0.3, 1000.0);
+        (Assembly::new(&discretisation, &[material]), discretisation)
+    }
+
+    #[test]
+    fn elimination_orders_are_the_same_where_several_are_computed_at_once() {
+        const AT_ONCE: usize = 4;
+        const TIMES: usize = 3;
+        let (assembly, _) = assembly([8, 7, 6], ElementOrder::Quadratic);
+        let order = || nested_dissection(&assembly).expect("an order");
+        let alone = order();
+        std::thread::scope(|scope| {
+            for _ in 0..AT_ONCE {
+                scope.spawn(|| (0..TIMES).for_each(|_| assert!(order() == alone)));
+            }
+        });
+    }
+
     #[test]
     fn row_solutions_are_those_of_the_columns() {
-        let mesh = box_mesh([0.3, 0.2, 0.1], [5, 4, 3]).expect("a good box");
-        let discretisation = Discretisation::new(&mesh, ElementOrder::Linear);
-        let material = Material::isotropic(1e4, 0.3, 1000.0);
-        let assembly = Assembly::new(&discretisation, &[material]);
+        let (assembly, discretisation) = assembly([5, 4, 3], ElementOrder::Linear);
         let pattern = Pattern::new(&assembly).expect("a pattern");
         let mut constrained = vec![false; discretisation.dofs()];
         constrained[..9].fill(true);
