@@ -194,6 +194,7 @@ def test_missing_files_are_file_errors(tmp_path, cube):
         ("no.toml", lambda: palpate.Scene.load(tmp_path / "no.toml")),
         ("no.mcap", lambda: palpate.Log(tmp_path / "no.mcap")),
         ("no.txt", lambda: palpate.record(BOX, materials=tmp_path / "no.txt")),
+        ("no.msh", lambda: palpate.record(tmp_path / "no.msh", **BODY)),
     ]:
         with pytest.raises(OSError) as caught:
             call()
@@ -202,7 +203,6 @@ def test_missing_files_are_file_errors(tmp_path, cube):
     with pytest.raises(palpate.FileError, match="it is a folder, not a file") as caught:
         palpate.Recording.open(tmp_path)
     assert caught.value.errno is None and caught.value.filename == str(tmp_path)
-    assert refusal(palpate.MeshError, lambda: palpate.record(tmp_path / "no.msh", **BODY)).startswith("cannot read mesh ")
 
 
 def test_damaged_files_are_refused(tmp_path, cube):
@@ -255,7 +255,7 @@ def test_messages_name_keywords_and_not_options(tmp_path):
     assert refusal(palpate.MeshError, lambda: palpate.record(BOX, fix="q<1", **BODY)).startswith('fix "q<1" is neither')
     assert refusal(palpate.MeshError, lambda: palpate.record(BOX, cell_size=0.1, **BODY)).endswith("leave cell_size out")
     file = tmp_path / "no--order.msh"
-    assert str(file) in refusal(palpate.MeshError, lambda: palpate.record(file, **BODY))
+    assert str(file) in refusal(palpate.FileError, lambda: palpate.record(file, **BODY))
 
 
 def test_tables_of_materials_are_checked():

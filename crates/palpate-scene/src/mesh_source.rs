@@ -201,7 +201,13 @@ pub fn read_surface(path: &Path) -> Result<SurfaceMesh, SceneError> {
 }
 
 fn refused(error: MeshError) -> SceneError {
-    mesh_error(error)
+    match &error {
+        MeshError::Read { path: file, source } | MeshError::Companion { companion: file, source, .. } => {
+            let (file, os_error) = (Some(file.clone()), source.raw_os_error());
+            SceneError { file, os_error, ..SceneError::new(SceneErrorKind::Io, error) }
+        }
+        _ => mesh_error(error),
+    }
 }
 
 fn mesh_error(message: impl std::fmt::Display) -> SceneError {
