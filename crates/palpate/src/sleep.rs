@@ -98,11 +98,22 @@ impl Sleepers {
         true
     }
 
-    /// Count the steps for which an object has been still. Gives their number.
-    pub(crate) fn count(&mut self, object: usize, is_still: bool) -> u32 {
-        let steps = &mut self.still_steps[object];
-        *steps = if is_still { steps.saturating_add(1) } else { 0 };
-        *steps
+    /// Count the steps for which an object has been still. The count gets to a number of steps in one in which its forces balance.
+    /// Gives the count.
+    pub(crate) fn count(
+        &mut self,
+        object: usize,
+        steps: u32,
+        is_still: bool,
+        is_balanced: impl FnOnce() -> bool,
+    ) -> u32 {
+        let count = &mut self.still_steps[object];
+        if !is_still {
+            *count = 0;
+        } else if *count + 1 != steps || is_balanced() {
+            *count = count.saturating_add(1);
+        }
+        *count
     }
 
     /// Begin groups of one object each.
@@ -140,10 +151,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_still_object_falls_asleep_in_a_step_in_which_its_forces_balance() {
+        let mut sleepers = Sleepers::new(1);
+        let counts: Vec<u32> = (0..6).map(|step| sleepers.count(0, 3, true, || step == 4)).collect();
+        assert_eq!(counts, [1, 2, 2, 2, 3, 4]);
+        assert_eq!(sleepers.count(0, 3, false, || true), 0);
+    }
+
+    #[test]
     fn groups_fall_asleep_together_and_wake_together() {
         let mut sleepers = Sleepers::new(6);
         for step in 0..3 {
-            (0..6).for_each(|at| _ = sleepers.count(at, at != 5 || step == 2));
+            (0..6).for_each(|at| _ = sleepers.count(at, 3, at != 5 || step == 2, || true));
         }
         let mut changed = Vec::new();
         sleepers.begin_groups();

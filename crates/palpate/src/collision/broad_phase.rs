@@ -287,7 +287,7 @@ mod tests {
 
             // Pairs of one that is awake with one that sleeps.
             let is_still = |at: usize| at % 3 != 1;
-            (0..count).for_each(|at| _ = sleepers.count(at, is_still(at)));
+            (0..count).for_each(|at| _ = sleepers.count(at, 1, is_still(at), || true));
             sleepers.begin_groups();
             sleepers.fall_asleep(1, |_| {});
             let mut mixed: Vec<[usize; 2]> = Vec::new();

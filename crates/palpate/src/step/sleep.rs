@@ -1,8 +1,8 @@
 //! Sleep of a step: what wakes objects, and which fall asleep.
 //!
 //! An object is still while its kinetic energy is below that of its mass at a small speed, nothing that moves is near it, and no device
-//! holds or pushes it. When all objects of a group have been still for the time that the model says, and contacts press on each, their
-//! velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated. A body
+//! holds or pushes it. When all objects of a group have been still for the time that the model says, until a step in which their forces balance, and
+//! contacts press on each, their velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated. A body
 //! that nothing touches never sleeps: small vibrations and slow drift go on, and it costs little.
 //!
 //! Equations: docs/theory.md (C84).
@@ -19,6 +19,10 @@ use glam::DVec3;
 
 /// Speed of still objects, as a share of their radius per second: above what contact samples at rest move by, below what one sees or feels.
 const STILL_SPEED: f64 = 0.02;
+
+/// Net force, and net torque, at which forces balance, as shares of the sum of the forces and of that times the radius. Slow vibrations pass
+/// through balance; where they turn, the forces that sleep would keep are those of the motion.
+const BALANCE: f64 = 0.01;
 
 /// Wake what the input of a step acts on: held points, prescribed forces, bases that move; all objects when gravity changes.
 pub(super) fn wake_by_input(model: &Model, state: &mut State, input: &Input) {
@@ -87,8 +91,9 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
     let mut could_sleep = false;
     for index in 0..sleepers.awake().len() {
         let at = sleepers.awake()[index] as usize;
-        let is_still = is_still(&model.objects[at], &objects[at]);
-        could_sleep |= sleepers.count(at, is_still) >= steps;
+        let (object, own) = (&model.objects[at], &objects[at]);
+        let is_balanced = || is_balanced(object, own, rules.gravity);
+        could_sleep |= sleepers.count(at, steps, is_still(object, own), is_balanced) >= steps;
     }
     if !could_sleep {
         return;
@@ -144,4 +149,16 @@ fn is_still(object: &Object, own: &ObjectState) -> bool {
         && !own.base.moves()
         && own.points.points.iter().any(|point| point.force != DVec3::ZERO)
         && own.ledger.kinetic <= 0.5 * object.body.recording.mass() * speed * speed
+}
+
+/// Whether the contact forces on an object and its weight balance. Fixed nodes take up what is missing.
+fn is_balanced(object: &Object, own: &ObjectState, gravity: DVec3) -> bool {
+    let Some(inertia) = &object.inertia else { return true };
+    let (mut force, mut torque, mut sum) = (gravity * inertia.mass, DVec3::ZERO, 0.0);
+    for point in &own.points.points {
+        force += point.force;
+        torque += point.end_arm.cross(point.force);
+        sum += point.force.length();
+    }
+    force.length() <= BALANCE * sum && torque.length() <= BALANCE * sum * object.radius
 }
