@@ -59,20 +59,6 @@ pub(crate) fn solve_upper(upper: MatRef<'_, f64>, x: MatMut<'_, f64>) {
     avx_section(|| solve_upper_triangular_in_place(upper, x, SEQUENTIAL));
 }
 
-/// Running sums of [`dot`].
-const LANES: usize = 8;
-
-/// Σ a·b, added in an order that the length alone decides. That of faer's small products depends on addresses as well.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    let mut sums = [0.0; LANES];
-    for (a, b) in a.iter().zip(b) {
-        (0..LANES).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
 /// Product of two matrices, blocks of rows in parallel.
 pub(crate) fn product(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Mat<f64> {
     let mut result = Mat::zeros(left.nrows(), right.ncols());

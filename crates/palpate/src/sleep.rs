@@ -98,8 +98,8 @@ impl Sleepers {
         true
     }
 
-    /// Count the steps for which an object has been still. The count gets to a number of steps in one in which its forces balance.
-    /// Gives the count.
+    /// Count the steps for which an object has been still. Only a step in which its forces balance brings the count to `steps`. Gives the
+    /// count.
     pub(crate) fn count(
         &mut self,
         object: usize,
@@ -108,10 +108,9 @@ impl Sleepers {
         is_balanced: impl FnOnce() -> bool,
     ) -> u32 {
         let count = &mut self.still_steps[object];
-        if !is_still {
-            *count = 0;
-        } else if *count + 1 != steps || is_balanced() {
-            *count = count.saturating_add(1);
+        let next = if is_still { count.saturating_add(1) } else { 0 };
+        if next != steps || is_balanced() {
+            *count = next;
         }
         *count
     }

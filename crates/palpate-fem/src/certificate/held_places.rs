@@ -6,10 +6,10 @@
 
 use super::places::{Place, residual_between, weighted};
 use super::{EVENT, oscillator, raise};
-use crate::kernels::dot;
+use crate::kernels::multiply;
 use crate::krylov::ModeAtPlaces;
-use faer::Mat;
 use faer::linalg::solvers::DenseSolveCore;
+use faer::{Accum, Mat};
 use glam::DVec3;
 use palpate::{Damping, OscillatorState, ResidualCompliance, SampledOscillator, SampledResidual};
 
@@ -159,11 +159,11 @@ impl HeldPlaces {
                     let free = rigid_modal.col_as_slice_mut(column).iter_mut().zip(states);
                     free.for_each(|(q, state)| *q = state.q + h * state.v);
                 }
-                subtract_product(&mut missing, &gains, &modal);
-                subtract_product(&mut missing, &rigid_gains, &rigid_modal);
+                multiply(missing.as_mut(), Accum::Add, gains.transpose(), modal.as_ref(), -1.0);
+                multiply(missing.as_mut(), Accum::Add, rigid_gains.transpose(), rigid_modal.as_ref(), -1.0);
                 let force = &inverse * missing;
-                set_to_product(&mut modal, &gains, &force);
-                set_to_product(&mut rigid_modal, &rigid_gains, &force);
+                multiply(modal.as_mut(), Accum::Replace, gains.as_ref(), force.as_ref(), 1.0);
+                multiply(rigid_modal.as_mut(), Accum::Replace, rigid_gains.as_ref(), force.as_ref(), 1.0);
                 for (column, states) in states.chunks_mut(modes.len().max(1)).enumerate() {
                     let forced = states.iter_mut().zip(&maps).zip(modal.col_as_slice(column));
                     forced.for_each(|((state, map), p)| *state = map.advance(*state, *p));
@@ -180,25 +180,6 @@ impl HeldPlaces {
                 force
             })
             .collect()
-    }
-}
-
-/// C ← C − Aᵀ·B.
-fn subtract_product(c: &mut Mat<f64>, a: &Mat<f64>, b: &Mat<f64>) {
-    for j in 0..c.ncols() {
-        let column = c.col_as_slice_mut(j).iter_mut().enumerate();
-        column.for_each(|(i, c)| *c -= dot(a.col_as_slice(i), b.col_as_slice(j)));
-    }
-}
-
-/// C ← A·B.
-fn set_to_product(c: &mut Mat<f64>, a: &Mat<f64>, b: &Mat<f64>) {
-    for j in 0..c.ncols() {
-        let c = c.col_as_slice_mut(j);
-        c.fill(0.0);
-        for (k, factor) in b.col_as_slice(j).iter().enumerate() {
-            c.iter_mut().zip(a.col_as_slice(k)).for_each(|(c, a)| *c += a * factor);
-        }
     }
 }
 

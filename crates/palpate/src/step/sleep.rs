@@ -1,9 +1,10 @@
 //! Sleep of a step: what wakes objects, and which fall asleep.
 //!
 //! An object is still while its kinetic energy is below that of its mass at a small speed, nothing that moves is near it, and no device
-//! holds or pushes it. When all objects of a group have been still for the time that the model says, until a step in which their forces balance, and
-//! contacts press on each, their velocities are set to zero and they are left as they are, with their contacts and forces. What the velocities stored is dissipated. A body
-//! that nothing touches never sleeps: small vibrations and slow drift go on, and it costs little.
+//! holds or pushes it. All objects of a group fall asleep when they have been still for the time that the model says, each until a step in
+//! which its forces balance, and contacts press on each: velocities are set to zero and the objects are left as they are, with their contacts
+//! and forces. What the velocities stored is dissipated. A body that nothing touches never sleeps: small vibrations and slow drift go on, and
+//! it costs little.
 //!
 //! Equations: docs/theory.md (C84).
 
