@@ -13,21 +13,21 @@ const RADIUS: f64 = 0.04;
 /// Half the thickness of the board that presses from above [m].
 const HALF_BOARD: f64 = 0.02;
 
-/// Step of the scene [s].
-const STEP_S: f64 = 1e-3;
-
 /// Net force that sleep leaves, as a share of the force of the floor: 1 % of that of floor and board.
 const NET: f64 = 0.02;
+
+/// Pose of the board when it has come down by a length [m] from where it touches the ball.
+fn board_pose(down: f64) -> Pose {
+    Pose { position: DVec3::Y * (2.0 * RADIUS + HALF_BOARD - down), orientation: DQuat::IDENTITY }
+}
 
 /// Weightless ball on a floor, under a board that comes down at a speed [m/s] to a depth [m] and stays. Forces of both [N], upwards, in the first
 /// step in which the ball sleeps; none within 20 s.
 fn forces_asleep(model: &Model, depth: f64, speed: f64) -> Option<[f64; 2]> {
     let mut state = State::new(model);
     (0..20_000).find_map(|number| {
-        let down = (speed * f64::from(number) * STEP_S).min(depth);
-        let board =
-            Pose { position: DVec3::Y * (2.0 * RADIUS + HALF_BOARD - down), orientation: DQuat::IDENTITY };
-        let input = Input { obstacles: vec![Pose::IDENTITY, board], ..Input::default() };
+        let down = (speed * f64::from(number) * model.parameters().step_s).min(depth);
+        let input = Input { obstacles: vec![Pose::IDENTITY, board_pose(down)], ..Input::default() };
         let output = step(model, &mut state, &input);
         output.objects[0].is_asleep.then(|| [0, 1].map(|at| output.obstacles[at].force.y))
     })
@@ -44,7 +44,7 @@ fn a_weightless_ball_between_floor_and_board_sleeps_where_their_forces_balance()
     let ball = Arc::new(record(mesh, &parameters, &mut SilentProgress).expect("a recording"));
     let board = Obstacle {
         shape: Shape::Box { half_extents: DVec3::new(0.05, HALF_BOARD, 0.05) },
-        pose: Pose { position: DVec3::Y * (2.0 * RADIUS + HALF_BOARD), orientation: DQuat::IDENTITY },
+        pose: board_pose(0.0),
         friction: 0.5,
     };
     let parameters =

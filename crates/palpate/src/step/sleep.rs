@@ -10,7 +10,7 @@
 
 use super::{accepts_gravity, collision_context, net_forces, predict_object, usable, usable_base};
 use crate::collision::OtherSide;
-use crate::io::{ContactOutput, DeviceMode, Input};
+use crate::io::{ContactOutput, DeviceMode, Input, ObjectOutput};
 use crate::object::{Object, ObjectState};
 use crate::scene::Model;
 use crate::spatial::Twist;
@@ -93,7 +93,7 @@ pub(super) fn fall_asleep(model: &Model, state: &mut State) {
     for index in 0..sleepers.awake().len() {
         let at = sleepers.awake()[index] as usize;
         let (object, own) = (&model.objects[at], &objects[at]);
-        let is_balanced = || is_balanced(object, own, rules.gravity);
+        let is_balanced = || is_balanced(object, own, &output.objects[at], rules.gravity);
         could_sleep |= sleepers.count(at, steps, is_still(object, own), is_balanced) >= steps;
     }
     if !could_sleep {
@@ -152,14 +152,10 @@ fn is_still(object: &Object, own: &ObjectState) -> bool {
         && own.ledger.kinetic <= 0.5 * object.body.recording.mass() * speed * speed
 }
 
-/// Whether the contact forces on an object and its weight balance. Fixed nodes take up what is missing.
-fn is_balanced(object: &Object, own: &ObjectState, gravity: DVec3) -> bool {
+/// Whether the contact forces on an object, whose output is written, and its weight balance. Fixed nodes take up what is missing.
+fn is_balanced(object: &Object, own: &ObjectState, out: &ObjectOutput, gravity: DVec3) -> bool {
     let Some(inertia) = &object.inertia else { return true };
-    let (mut force, mut torque, mut sum) = (gravity * inertia.mass, DVec3::ZERO, 0.0);
-    for point in &own.points.points {
-        force += point.force;
-        torque += point.end_arm.cross(point.force);
-        sum += point.force.length();
-    }
-    force.length() <= BALANCE * sum && torque.length() <= BALANCE * sum * object.radius
+    let allowed = BALANCE * own.points.points.iter().map(|point| point.force.length()).sum::<f64>();
+    let net = out.force + gravity * inertia.mass;
+    net.length() <= allowed && out.torque.length() <= allowed * object.radius
 }
