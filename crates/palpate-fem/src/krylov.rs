@@ -161,10 +161,10 @@ impl ProjectedSystem {
             return Ok(Vec::new());
         }
         let symmetric = |i: usize, j: usize| 0.5 * (stiffness[(i, j)] + stiffness[(j, i)]) / scale;
-        let eigen = Mat::from_fn(columns, columns, symmetric)
-            .self_adjoint_eigen(Side::Lower)
+        let symmetric = Mat::from_fn(columns, columns, symmetric);
+        let eigen = avx_section(|| symmetric.self_adjoint_eigen(Side::Lower))
             .map_err(|e| SolveError::DenseEigenproblem(format!("{e:?}")))?;
-        let gains = eigen.U().transpose() * self.loads.subrows(0, columns);
+        let gains = avx_section(|| eigen.U().transpose() * self.loads.subrows(0, columns));
         let mode = |i: usize| ModeAtPlaces {
             square: eigen.S()[i] * scale,
             gains: (0..gains.ncols() / 3)

@@ -137,8 +137,8 @@ impl HeldPlaces {
         let inverse = compliance.partial_piv_lu().inverse();
         let gains = Mat::from_fn(modes.len(), size, |mode, i| modes[mode].1[i]);
         let rigid_gains = Mat::from_fn(self.rigid.len(), size, |motion, i| self.rigid[motion][i]);
-        let mut states = vec![OscillatorState::default(); size * modes.len()];
-        let mut rigid = vec![OscillatorState::default(); size * self.rigid.len()];
+        let mut states = vec![vec![OscillatorState::default(); modes.len()]; size];
+        let mut rigid = vec![vec![OscillatorState::default(); self.rigid.len()]; size];
         let [mut modal, mut rigid_modal] =
             [Mat::zeros(modes.len(), size), Mat::zeros(self.rigid.len(), size)];
         // Displacements by the relaxed forces and by those of the last step.
@@ -151,11 +151,11 @@ impl HeldPlaces {
                     &held * faer::Scale(sampled.lead()) - &relaxed * faer::Scale(sampled.decay());
                 (0..size).for_each(|i| missing[(i, i)] += target);
                 // Displacements at the end of the step without force, then modal forces.
-                for (column, states) in states.chunks(modes.len().max(1)).enumerate() {
+                for (column, states) in states.iter().enumerate() {
                     let free = modal.col_as_slice_mut(column).iter_mut().zip(&maps).zip(states);
                     free.for_each(|((q, map), state)| *q = map.advance(*state, 0.0).q);
                 }
-                for (column, states) in rigid.chunks(self.rigid.len().max(1)).enumerate() {
+                for (column, states) in rigid.iter().enumerate() {
                     let free = rigid_modal.col_as_slice_mut(column).iter_mut().zip(states);
                     free.for_each(|(q, state)| *q = state.q + h * state.v);
                 }
@@ -164,11 +164,11 @@ impl HeldPlaces {
                 let force = &inverse * missing;
                 multiply(modal.as_mut(), Accum::Replace, gains.as_ref(), force.as_ref(), 1.0);
                 multiply(rigid_modal.as_mut(), Accum::Replace, rigid_gains.as_ref(), force.as_ref(), 1.0);
-                for (column, states) in states.chunks_mut(modes.len().max(1)).enumerate() {
+                for (column, states) in states.iter_mut().enumerate() {
                     let forced = states.iter_mut().zip(&maps).zip(modal.col_as_slice(column));
                     forced.for_each(|((state, map), p)| *state = map.advance(*state, *p));
                 }
-                for (column, states) in rigid.chunks_mut(self.rigid.len().max(1)).enumerate() {
+                for (column, states) in rigid.iter_mut().enumerate() {
                     for (state, p) in states.iter_mut().zip(rigid_modal.col_as_slice(column)) {
                         state.q += h * state.v + 0.5 * h * h * p;
                         state.v += h * p;
