@@ -185,6 +185,7 @@ def test_missing_files_are_file_errors(tmp_path, cube):
         (lambda: palpate.Recording.open(tmp_path / "no.palp"), "cannot read the recording "),
         (lambda: palpate.Scene.load(tmp_path / "no.toml"), "cannot read the scene "),
         (lambda: palpate.Log(tmp_path / "no.mcap"), "cannot read the log "),
+        (lambda: palpate.record(tmp_path / "no.msh", **BODY), "cannot read mesh "),
         (lambda: cube.save(tmp_path / "no" / "cube.palp"), "cannot "),
     ]:
         assert refusal(palpate.FileError, call).startswith(text)
