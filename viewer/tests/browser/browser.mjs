@@ -17,6 +17,9 @@ const SWITCHES = [
 /** Whether a surface was asked for and its scene has changed meanwhile: the page loads that of the new one. */
 const isOfFormerScene = (message) => message.text().includes("404") && /\/scene\/\d+\/object\//.test(message.location().url);
 
+/** Time that a busy processor may take to encode a film [ms]. */
+export const ENCODED_MS = 90_000;
+
 /** Time between pictures of a page that draws sparsely [ms]. */
 const SPARSE_MS = 1000;
 

@@ -1,11 +1,8 @@
 // Sound in films: at its pitch while it is on, silent after it is turned off, and no track without it.
 
 import { readFile } from "node:fs/promises";
-import { assert, assertNoConsoleErrors, waitForScene } from "./browser.mjs";
+import { ENCODED_MS, assert, assertNoConsoleErrors, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
-
-/** Time that a busy processor may take to encode a film [ms]. */
-const ENCODED_MS = 90_000;
 
 /** Waits until the film is longer by some seconds. */
 async function filmOn(page, seconds) {

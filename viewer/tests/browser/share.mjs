@@ -3,7 +3,7 @@
 import { readFile } from "node:fs/promises";
 import { createServer } from "node:http";
 import jsQR from "jsqr";
-import { assert, assertNoConsoleErrors, latestFrame, overlaps, pixelOf, recordSent, screenshot, waitForRest, waitForScene } from "./browser.mjs";
+import { ENCODED_MS, assert, assertNoConsoleErrors, latestFrame, overlaps, pixelOf, recordSent, screenshot, waitForRest, waitForScene } from "./browser.mjs";
 import { start } from "./servers.mjs";
 
 const serverless = Boolean(process.env.PAGE);
@@ -74,9 +74,6 @@ async function serveHtml(html) {
   await new Promise((done) => server.listen(0, "127.0.0.1", done));
   return { url: `http://127.0.0.1:${server.address().port}/`, close: () => new Promise((done) => (server.close(done), server.closeAllConnections())) };
 }
-
-/** Time that a busy processor may take to encode a film [ms]. */
-const ENCODED_MS = 90_000;
 
 export const shareCases = [
   {
