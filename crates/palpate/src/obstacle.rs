@@ -229,6 +229,37 @@ impl Shape {
         })
     }
 
+    /// Signed distance [m] to the face of a box that a surface point presses on, and the face's normal, where its nearest face is one
+    /// that it cannot press on; `presses` tells by the outward normal of a face. The point may be beyond the rim of the face by an
+    /// overhang [m]; depths [m] limit how deep it is, within the rim and beyond it. None where the nearest face counts, and for other
+    /// shapes.
+    ///
+    /// # Real time
+    pub(crate) fn pressed_face(
+        &self,
+        p: DVec3,
+        presses: impl Fn(DVec3) -> bool,
+        (depths, overhang): ([f64; 2], f64),
+    ) -> Option<(f64, DVec3)> {
+        let Self::Box { half_extents } = self else { return None };
+        let excess = p.abs() - *half_extents;
+        let sign = |axis: usize| DVec3::AXES[axis] * libm::copysign(1.0, p[axis]);
+        let nearest = (0..3).filter(|&axis| excess[axis] >= excess.max_element().min(0.0));
+        if nearest.map(sign).all(&presses) {
+            return None;
+        }
+        let faces = (0..3).flat_map(|axis| {
+            let near = sign(axis);
+            [(axis, near, excess[axis]), (axis, -near, -libm::fabs(p[axis]) - half_extents[axis])]
+        });
+        let is_met = |&(axis, normal, distance): &(usize, DVec3, f64)| {
+            let beyond = (excess * (DVec3::ONE - DVec3::AXES[axis])).max(DVec3::ZERO).length();
+            distance > -depths[usize::from(beyond > 0.0)] && beyond <= overhang && presses(normal)
+        };
+        let best = faces.filter(is_met).max_by(|a, b| a.2.total_cmp(&b.2))?;
+        Some((best.2, best.1))
+    }
+
     /// Whether a face of an object can penetrate deeper than its corners ([`Self::deepest`]).
     pub(crate) fn is_round(&self) -> bool {
         match self {
@@ -267,22 +298,27 @@ impl Shape {
     }
 
     /// Corners of the shape, in its frame, in bounding spheres (centre, radius) that `near` accepts; passed to `found` with
-    /// their number.
+    /// their number and their outward normal, which is zero for a mesh: on the side of a cone its apex faces along the axis.
     ///
     /// # Real time
-    pub(crate) fn corners(&self, near: impl Fn(DVec3, f64) -> bool, mut found: impl FnMut(usize, DVec3)) {
+    pub(crate) fn corners(
+        &self,
+        near: impl Fn(DVec3, f64) -> bool,
+        mut found: impl FnMut(usize, DVec3, DVec3),
+    ) {
         match self {
             Self::Plane { .. } | Self::Sphere { .. } | Self::Capsule { .. } => {}
             Self::Box { half_extents } => {
                 for k in 0..8 {
                     let side = |axis: usize| if k >> axis & 1 == 0 { -1.0 } else { 1.0 };
-                    let corner = *half_extents * DVec3::new(side(0), side(1), side(2));
+                    let sides = DVec3::new(side(0), side(1), side(2));
+                    let corner = *half_extents * sides;
                     if near(corner, 0.0) {
-                        found(k, corner);
+                        found(k, corner, sides.normalize());
                     }
                 }
             }
-            Self::Mesh(mesh) => mesh.corners(near, found),
+            Self::Mesh(mesh) => mesh.corners(near, |node, position| found(node, position, DVec3::ZERO)),
         }
     }
 

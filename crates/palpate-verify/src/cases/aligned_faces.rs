@@ -1,13 +1,17 @@
-//! Flat faces of elastic objects on one another: St Venant's impact of two bars, and cubes that rest on cubes.
+//! Flat faces of elastic objects on one another: St Venant's impact of two bars, cubes that rest on cubes, and cubes under boxes.
 
 use crate::check::Check;
 use crate::error::VerifyError;
 use crate::run_invariants::RunInvariants;
 use glam::{DQuat, DVec3};
-use palpate::{Input, Output, State, step};
+use palpate::{
+    Collider, Input, Model, ModelObject, ModelParameters, Obstacle, Output, Pose, Recording, Shape, State,
+    step,
+};
 use palpate_fem::ElementOrder;
 use palpate_mesh::box_mesh;
-use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, scene};
+use palpate_testkit::{ElasticMaterial, GRAVITY_M_S2, floor, object_at, scene, smoothstep};
+use std::sync::Arc;
 
 /// Faces in all positions.
 pub fn aligned_faces() -> Result<Vec<Check>, VerifyError> {
@@ -21,6 +25,9 @@ pub fn aligned_faces() -> Result<Vec<Check>, VerifyError> {
         (DVec3::ZERO, 0.5, "turned"),
     ] {
         checks.extend(cube_on_cube(shift, turn, name)?);
+    }
+    for cells in [2, 3, 6] {
+        checks.extend(cube_under_box(cells)?);
     }
     Ok(checks)
 }
@@ -46,8 +53,7 @@ fn two_bars(order: ElementOrder, name: &str) -> Result<Vec<Check>, VerifyError> 
         object_at(&short, DVec3::Y * (-0.5 * LENGTHS[0] - 0.5 * STEP * SPEED), DVec3::Y * SPEED),
         object_at(&long, DVec3::Y * 0.5 * LENGTHS[1], DVec3::ZERO),
     ];
-    let objects =
-        objects.into_iter().map(|object| palpate::ModelObject { friction: 0.0, ..object }).collect();
+    let objects = objects.into_iter().map(|object| ModelObject { friction: 0.0, ..object }).collect();
     let model = scene(STEP, DVec3::ZERO, Vec::new(), Vec::new(), objects)?;
     let (mut state, mut invariants) = (State::new(&model), RunInvariants::default());
     invariants.observe(state.output());
@@ -139,10 +145,66 @@ fn cube_on_cube(shift: DVec3, turn: f64, name: &str) -> Result<Vec<Check>, Verif
     Ok(checks)
 }
 
+/// A cube on a floor is pressed by a box of its own width, whose rim lies on the cube's, and resists as under a wider one: by all
+/// nodes and by contact samples.
+fn cube_under_box(cells: u32) -> Result<Vec<Check>, VerifyError> {
+    /// Shares of the force under the wider box, by all nodes.
+    const FORCE: f64 = 0.01;
+    const LATERAL: f64 = 1e-3;
+    let cube = RUBBER.free_body(box_mesh([RUBBER_SIDE; 3], [cells; 3])?, ElementOrder::Linear, 60)?;
+    let (wide, _) = force_under_box(&cube, RUBBER_SIDE, usize::MAX)?;
+    let mut checks = Vec::new();
+    for (max_contact_samples, name) in [(usize::MAX, "all nodes"), (48, "48 samples")] {
+        let name = format!("cube of {cells} cells an edge under a box of its width, {name}");
+        let (force, invariants) = force_under_box(&cube, 0.5 * RUBBER_SIDE, max_contact_samples)?;
+        checks.push(Check::new(format!("{name}: force against a wider box [N]"), force.y, wide.y, FORCE));
+        let lateral = force.x.hypot(force.z) / wide.y;
+        checks.push(Check::new(format!("{name}: lateral force, share"), lateral, 0.0, LATERAL));
+        checks.extend(invariants.checks(&name));
+    }
+    Ok(checks)
+}
+
+const RUBBER: ElasticMaterial =
+    ElasticMaterial { young_pa: 2e4, poisson: 0.4, density_kg_m3: 1000.0, stiffness_damping_s: 5e-3 };
+const RUBBER_SIDE: f64 = 0.1;
+
+/// Force [N] on a box that has come down on a rubber cube on a floor and has stayed while vibrations decayed.
+fn force_under_box(
+    cube: &Arc<Recording>,
+    half_width: f64,
+    max_contact_samples: usize,
+) -> Result<(DVec3, RunInvariants), VerifyError> {
+    const STEP: f64 = 1e-3;
+    const DEPTH: f64 = 5e-3;
+    const TIMES_S: [f64; 2] = [0.5, 1.0];
+    const HALF_HEIGHT: f64 = 0.02;
+    const FRICTION: f64 = 0.3;
+    let above = Pose { position: DVec3::Y * (RUBBER_SIDE + HALF_HEIGHT), ..Pose::IDENTITY };
+    let shape = Shape::Box { half_extents: DVec3::new(half_width, HALF_HEIGHT, half_width) };
+    let object = object_at(cube, DVec3::Y * 0.5 * RUBBER_SIDE, DVec3::ZERO);
+    let parameters = ModelParameters {
+        step_s: STEP,
+        obstacles: vec![floor(FRICTION), Obstacle { shape, pose: above, friction: FRICTION }],
+        max_contact_samples,
+        ..ModelParameters::for_reference()
+    };
+    let model = Model::new(parameters, vec![ModelObject { friction: FRICTION, ..object }])?;
+    let (mut state, mut invariants) = (State::new(&model), RunInvariants::default());
+    invariants.observe(state.output());
+    for number in 1..=(TIMES_S.iter().sum::<f64>() / STEP) as usize {
+        let down = DVec3::Y * (DEPTH * smoothstep(number as f64 * STEP / TIMES_S[0]));
+        let pose = Pose { position: above.position - down, ..above };
+        let input = Input { obstacles: vec![Pose::IDENTITY, pose], ..Input::default() };
+        invariants.observe(step(&model, &mut state, &input));
+    }
+    let on_box = state.output().contacts.iter().filter(|contact| contact.against == Collider::Obstacle(1));
+    Ok((-on_box.map(|contact| contact.force).sum::<DVec3>(), invariants))
+}
+
 /// Force [N] on the upper object from the lower one: a contact has one row, with the force on its object.
 fn on_upper(output: &Output) -> DVec3 {
     let sign = |object: usize| if object == 1 { 1.0 } else { -1.0 };
-    let pair =
-        output.contacts.iter().filter(|contact| matches!(contact.against, palpate::Collider::Object(_)));
+    let pair = output.contacts.iter().filter(|contact| matches!(contact.against, Collider::Object(_)));
     pair.map(|contact| contact.force * sign(contact.object)).sum()
 }

@@ -197,7 +197,7 @@ pub const CASES: &[Case] = &[
     Case { name: "stack", about: "two cubes rest on one another for a minute", compute: stack::stack },
     Case {
         name: "faces",
-        about: "flat faces on one another: St Venant's two bars; cubes on cubes, aligned, shifted and turned",
+        about: "flat faces on one another: St Venant's two bars; cubes on cubes and under boxes",
         compute: aligned_faces::aligned_faces,
     },
     Case {

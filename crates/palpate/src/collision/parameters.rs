@@ -26,7 +26,7 @@ pub(super) struct CollisionParameters {
     /// Cosine between the outward normals of a node and of a face below which they can press on each other. On the paper's cube a
     /// face opposes an edge by −0.7 and a corner by −0.58; strain turns normals by some hundredths.
     pub(super) opposing_cosine: f64,
-    /// Distance over the rim of a face that a node in contact may slide before it leaves the face.
+    /// Distance over the rim of a face, of an object or a box, that a node may slide before it leaves the face.
     pub(super) overhang: f64,
     /// Barycentric weight below which a point lies on the opposite edge.
     pub(super) on_edge: f64,

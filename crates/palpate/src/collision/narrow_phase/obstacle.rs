@@ -12,6 +12,7 @@ use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, Featur
 use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
 use crate::collision::parameters::{COLLISION, MAX_ITERATIONS};
+use crate::collision::proximity::opposes;
 use crate::object::ObjectState;
 use crate::obstacle::Obstacle;
 use crate::response::{Body, ContactLocation, Footprint};
@@ -196,7 +197,8 @@ impl ObstacleQuery<'_> {
                     let free = surface.predicted_position(vertex);
                     let location =
                         ContactLocation { point: self.body.node_point(footprint, vertex), footprint };
-                    self.meet(candidates, position, free, location, feature);
+                    let facing = self.body.outward_normal(footprint, vertex);
+                    self.meet(candidates, [position, free], facing, location, feature);
                 }
                 if self.level == 0 {
                     self.triangle_interior(surface, triangle, residual, candidates);
@@ -238,15 +240,17 @@ impl ObstacleQuery<'_> {
         let location =
             ContactLocation { point: SurfacePoint { triangle, weights }, footprint: Footprint::Point };
         let feature = FeatureId::Triangle(triangle);
-        self.meet(candidates, at_weights(starts, weights), at_weights(ends, weights), location, feature);
+        let over_step = [starts, ends].map(|positions| at_weights(positions, weights));
+        self.meet(candidates, over_step, DVec3::ZERO, location, feature);
     }
 
-    /// Push a candidate if a point that moves from one body position to another comes near the obstacle.
+    /// Push a candidate if a point that moves from one body position to another comes near the obstacle. Of a box, it meets faces that
+    /// oppose its outward normal `facing` [body]; all, where that is zero.
     pub(super) fn meet(
         &self,
         candidates: &mut CandidateList,
-        from: DVec3,
-        to: DVec3,
+        [from, to]: [DVec3; 2],
+        facing: DVec3,
         location: ContactLocation,
         feature: FeatureId,
     ) {
@@ -256,11 +260,16 @@ impl ObstacleQuery<'_> {
             self.obstacle_from_body_after.transform_point3(to),
         );
         let height = self.body.smooth_height(&location);
+        let travel = (end - start).length();
+        let facing = self.obstacle_from_body.matrix3 * facing;
+        let depths = [COLLISION.max_depth * self.body.edge, self.margin + COLLISION.motion_factor * travel];
+        let limits = (depths, COLLISION.overhang * self.body.edge);
         let distance = |p: DVec3| {
-            shape.signed_distance(p, f64::INFINITY).map(|(distance, outward)| (distance - height, outward))
+            let found = shape.pressed_face(p, |normal| opposes(normal, facing), limits);
+            let found = found.or_else(|| shape.signed_distance(p, f64::INFINITY));
+            found.map(|(distance, outward)| (distance - height, outward))
         };
         let (Some((first, _)), Some((last, _))) = (distance(start), distance(end)) else { return };
-        let travel = (end - start).length();
         // In the obstacle's frame: where a fast point first touches, else where it is.
         let mut position = start;
         if travel > 0.5 * shape.size() && first > 0.0 {
@@ -325,7 +334,7 @@ impl ObstacleQuery<'_> {
                 let centre = start.body_from_world(self.before.world_from_body(centre));
                 self.body.rest_box_is_within(centre, radius + grown)
             },
-            |corner, position| {
+            |corner, position, outward| {
                 let feature = FeatureId::Corner(corner as u32);
                 let id =
                     ContactId { collider: Collider::Obstacle(self.number), object: self.object, feature };
@@ -333,7 +342,8 @@ impl ObstacleQuery<'_> {
                 let known = known.map(|at| self.own.points.of(contacts[at].slot).location.point.triangle);
                 let point = start.body_from_world(self.before.world_from_body(position));
                 let travel = (free.body_from_world(self.after.world_from_body(position)) - point).length();
-                let (facing, heights, edge) = (DVec3::ZERO, self.body.max_height, self.body.edge);
+                let facing = start.orientation.inverse() * (self.before.orientation * outward);
+                let (heights, edge) = (self.body.max_height, self.body.edge);
                 let moving = MovingPoint { point, travel, facing, known, heights, edge };
                 if let Some((point, normal)) = point_against_surface(query, surface, &moving) {
                     let location = ContactLocation { point, footprint: Footprint::Point };

@@ -23,14 +23,14 @@ impl ObstacleQuery<'_> {
         let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
         let mut added = 0;
         for contact in known {
-            if !matches!(contact.id.feature, FeatureId::Node(_)) {
-                continue;
-            }
+            let FeatureId::Node(node) = contact.id.feature else { continue };
             let point = self.own.points.of(contact.slot);
             let position = point.rest + point.state.displacement;
             let height = self.body.smooth_height(&point.location);
             if contact.force != DVec3::ZERO || self.distance(position, height + depth) < height + depth {
-                self.meet(candidates, position, point.rest + point.free, point.location, contact.id.feature);
+                let facing = self.body.outward_normal(Footprint::Point, node as usize);
+                let over_step = [position, point.rest + point.free];
+                self.meet(candidates, over_step, facing, point.location, contact.id.feature);
                 added += 1;
             }
         }
@@ -69,10 +69,11 @@ impl ObstacleQuery<'_> {
             if candidates.list[first..].iter().any(|candidate| candidate.id.feature == feature) {
                 continue;
             }
-            let (from, to) = (surface.position(node), surface.predicted_position(node));
+            let over_step = [surface.position(node), surface.predicted_position(node)];
             let footprint = Footprint::Point;
             let location = ContactLocation { point: self.body.node_point(footprint, node), footprint };
-            self.meet(candidates, from, to, location, feature);
+            let facing = self.body.outward_normal(footprint, node);
+            self.meet(candidates, over_step, facing, location, feature);
         }
     }
 }
