@@ -1,54 +1,41 @@
-//! Decimation: a surface between some of a surface's nodes, by edge collapse.
+//! Decimation: a surface between some of a surface's nodes (Schroeder, Zarge & Lorensen 1992, "Decimation of triangle meshes").
 //!
-//! The other nodes are merged into a neighbour, one after the other: the one for which the surrounding triangles best keep
-//! their directions and shapes. A closed surface stays closed, and sharp edges with samples are preserved.
+//! The other nodes are removed, and the hole that each leaves is filled with the triangles that best keep the directions of those
+//! removed and have the best shapes; the node whose hole is filled best goes first. A closed surface stays closed, and sharp edges
+//! with samples are preserved.
 //!
 //! Equations: docs/theory.md (C30).
 
 use super::{Surface, area_normal, triangles_around};
+use alloc::collections::BinaryHeap;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cmp::Reverse;
 use glam::DVec3;
 
-/// Lower limit of the cosine by which a collapse turns a triangle [1].
+/// Lower limit of the cosine between a triangle that fills a hole and the nearest of those removed [1].
 const MIN_TURN_COSINE: f64 = 0.3;
 
-/// Lower limit of a triangle's shape quality after a collapse [1]; 1 for an equilateral one.
+/// Lower limit of the shape quality of a triangle that fills a hole [1]; 1 for an equilateral one.
 const MIN_SHAPE: f64 = 0.02;
 
-/// Exponent of the turn's cosine in the quality of a collapse, relative to the shape.
+/// Exponent of the turn's cosine in the quality of a triangle, relative to the shape.
 const TURN_EXPONENT: i32 = 8;
 
-/// Triangles between the nodes that stay; none where not all others can be collapsed.
+/// Triangles between the nodes that stay; none where not all others can be removed.
 pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>> {
-    let mut stays = vec![false; surface.positions.len()];
-    nodes.iter().for_each(|&node| stays[node as usize] = true);
-    let mut mesh = CollapsingMesh {
-        positions: &surface.positions,
-        triangles: surface.triangles.clone(),
-        around: triangles_around(surface),
-    };
-    let is_used = |node: &u32| !mesh.around[*node as usize].is_empty();
-    let mut left: Vec<u32> =
-        (0..stays.len() as u32).filter(|n| !stays[*n as usize]).filter(is_used).collect();
-    // One node of a neighbourhood in a pass, for even triangles.
-    let mut waits = vec![0; stays.len()];
-    let mut pass = 0;
-    while !left.is_empty() {
-        pass += 1;
-        let before = left.len();
-        left.retain(|&node| {
-            if waits[node as usize] == pass {
-                return true;
-            }
-            let ring = mesh.ring(node);
-            let merged = mesh.collapse(node, &ring);
-            if merged {
-                ring.iter().for_each(|&other| waits[other as usize] = pass);
-            }
-            !merged
-        });
-        if left.len() == before {
+    let around = triangles_around(surface);
+    let mut is_left: Vec<bool> = around.iter().map(|triangles| !triangles.is_empty()).collect();
+    nodes.iter().for_each(|&node| is_left[node as usize] = false);
+    let mut mesh =
+        DecimatedMesh { positions: &surface.positions, triangles: surface.triangles.clone(), around };
+    loop {
+        let left: Vec<u32> = (0..is_left.len() as u32).filter(|&node| is_left[node as usize]).collect();
+        if left.is_empty() {
+            break;
+        }
+        // A hole elsewhere may have opened the way for the nodes that are left.
+        if !mesh.remove_best_first(&left, &mut is_left) {
             return None;
         }
     }
@@ -60,13 +47,45 @@ pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>
 const REMOVED: [u32; 3] = [u32::MAX; 3];
 
 /// Surface during decimation.
-struct CollapsingMesh<'a> {
+struct DecimatedMesh<'a> {
     positions: &'a [DVec3],
     triangles: Vec<[u32; 3]>,
     around: Vec<Vec<u32>>,
 }
 
-impl CollapsingMesh<'_> {
+/// Triangles that fill a hole, with the lowest of their qualities [1].
+struct Filling {
+    quality: f64,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl DecimatedMesh<'_> {
+    /// Remove nodes, in each step the one whose hole is filled best. Gives whether one could be removed.
+    fn remove_best_first(&mut self, nodes: &[u32], is_left: &mut [bool]) -> bool {
+        // Positive numbers have the order of their bits.
+        let entry = |mesh: &Self, node: u32| {
+            mesh.filling(node, &mesh.ring(node)).map(|filling| (filling.quality.to_bits(), Reverse(node)))
+        };
+        let mut queue: BinaryHeap<_> = nodes.iter().filter_map(|&node| entry(self, node)).collect();
+        let mut has_removed = false;
+        while let Some((expected, Reverse(node))) = queue.pop() {
+            if !is_left[node as usize] {
+                continue;
+            }
+            let ring = self.ring(node);
+            let Some(filling) = self.filling(node, &ring) else { continue };
+            // Its surroundings have changed since it was entered: those of now are in the queue as well.
+            if filling.quality.to_bits() != expected {
+                continue;
+            }
+            self.fill(node, &filling.triangles);
+            (is_left[node as usize], has_removed) = (false, true);
+            let changed = ring.iter().filter(|other| is_left[**other as usize]);
+            queue.extend(changed.filter_map(|&other| entry(self, other)));
+        }
+        has_removed
+    }
+
     /// Nodes around a node in order; none where the triangles around it are no fan.
     fn ring(&self, node: u32) -> Vec<u32> {
         let own = &self.around[node as usize];
@@ -89,54 +108,89 @@ impl CollapsingMesh<'_> {
         if next == first && ring.len() == sides.len() { ring } else { Vec::new() }
     }
 
-    /// Collapse the best edge of a node. Gives whether there is one.
-    fn collapse(&mut self, node: u32, ring: &[u32]) -> bool {
-        let quality = |&into: &u32| self.collapse_quality(node, into, ring);
-        let best = ring.iter().filter_map(|into| quality(into).map(|quality| (quality, *into)));
-        let Some((_, into)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { return false };
-        for t in core::mem::take(&mut self.around[node as usize]) {
-            let corners = &mut self.triangles[t as usize];
-            if corners.contains(&into) {
-                for corner in core::mem::replace(corners, REMOVED) {
-                    self.around[corner as usize].retain(|other| *other != t);
-                }
-            } else {
-                corners.iter_mut().filter(|corner| **corner == node).for_each(|corner| *corner = into);
-                self.around[into as usize].push(t);
-            }
-        }
-        true
-    }
-
-    /// Quality of the collapse of a node into one of its ring; none where it is not possible.
-    fn collapse_quality(&self, node: u32, into: u32, ring: &[u32]) -> Option<f64> {
-        // Link condition: the two nodes have exactly two common neighbours.
-        let beside = |other: &&u32| {
-            **other != into
-                && self.around[**other as usize].iter().any(|t| self.triangles[*t as usize].contains(&into))
-        };
-        if ring.iter().filter(beside).count() != 2 {
+    /// Best filling of the hole that a node within a ring leaves, by dynamic programming over the ring (Klincsek 1980); none where there
+    /// is none without folds.
+    fn filling(&self, node: u32, ring: &[u32]) -> Option<Filling> {
+        let count = ring.len();
+        let is_edge = |a: u32, b: u32| self.has_triangle(a, |corners| corners.contains(&b));
+        let is_tetrahedron =
+            || self.has_triangle(ring[0], |corners| ring[1..].iter().all(|other| corners.contains(other)));
+        if count < 3 || count == 3 && is_tetrahedron() {
             return None;
         }
-        let mut least = f64::INFINITY;
-        for t in &self.around[node as usize] {
-            let corners = self.triangles[*t as usize];
-            if corners.contains(&into) {
-                continue;
+        let normal = |t: &u32| self.area_normal(self.triangles[*t as usize]).normalize_or_zero();
+        let removed: Vec<DVec3> = self.around[node as usize].iter().map(normal).collect();
+        // Lowest quality in the part of the hole between two nodes of the ring, and the third corner of the triangle at their side.
+        let mut parts = vec![(0.0_f64, 0); count * count];
+        (1..count).for_each(|j| parts[(j - 1) * count + j].0 = f64::INFINITY);
+        for span in 2..count {
+            for i in 0..count - span {
+                let j = i + span;
+                if span + 1 < count && is_edge(ring[i], ring[j]) {
+                    continue;
+                }
+                let mut best = (0.0_f64, 0);
+                for k in i + 1..j {
+                    let beside = parts[i * count + k].0.min(parts[k * count + j].0);
+                    if beside > best.0 {
+                        let quality = self.quality([ring[i], ring[k], ring[j]], &removed).min(beside);
+                        if quality > best.0 {
+                            best = (quality, k);
+                        }
+                    }
+                }
+                parts[i * count + j] = best;
             }
-            let moved = corners.map(|corner| if corner == node { into } else { corner });
-            let area = |of: [u32; 3]| area_normal(of.map(|n| self.positions[n as usize]));
-            let (before, after) = (area(corners), area(moved));
-            let turn = before.normalize_or_zero().dot(after.normalize_or_zero());
-            let [a, b, c] = moved.map(|n| self.positions[n as usize]);
-            let sides = (a - b).length_squared() + (b - c).length_squared() + (c - a).length_squared();
-            let shape = libm::sqrt(12.0) * after.length() / sides;
-            if turn < MIN_TURN_COSINE || shape < MIN_SHAPE {
-                return None;
-            }
-            least = least.min(libm::pow(turn, f64::from(TURN_EXPONENT)) * shape);
         }
-        Some(least)
+        let quality = parts[count - 1].0;
+        if quality == 0.0 {
+            return None;
+        }
+        let (mut triangles, mut open) = (Vec::with_capacity(count - 2), vec![(0, count - 1)]);
+        while let Some((i, j)) = open.pop() {
+            if j - i > 1 {
+                let k = parts[i * count + j].1;
+                triangles.push([ring[i], ring[k], ring[j]]);
+                open.extend([(i, k), (k, j)]);
+            }
+        }
+        Some(Filling { quality, triangles })
+    }
+
+    /// Quality of a triangle that replaces others with these unit normals [1]; 0 where it is folded or too narrow.
+    fn quality(&self, corners: [u32; 3], removed: &[DVec3]) -> f64 {
+        let area = self.area_normal(corners);
+        let [a, b, c] = corners.map(|node| self.positions[node as usize]);
+        let sides = (a - b).length_squared() + (b - c).length_squared() + (c - a).length_squared();
+        let shape = libm::sqrt(12.0) * area.length() / sides;
+        let normal = area.normalize_or_zero();
+        let turn = removed.iter().map(|other| normal.dot(*other)).fold(-1.0, f64::max);
+        if turn < MIN_TURN_COSINE || shape < MIN_SHAPE {
+            return 0.0;
+        }
+        libm::pow(turn, f64::from(TURN_EXPONENT)) * shape
+    }
+
+    /// Fill the hole that a node leaves.
+    fn fill(&mut self, node: u32, filling: &[[u32; 3]]) {
+        let free = core::mem::take(&mut self.around[node as usize]);
+        for &t in &free {
+            for corner in core::mem::replace(&mut self.triangles[t as usize], REMOVED) {
+                self.around[corner as usize].retain(|other| *other != t);
+            }
+        }
+        for (t, corners) in free.into_iter().zip(filling) {
+            self.triangles[t as usize] = *corners;
+            corners.iter().for_each(|corner| self.around[*corner as usize].push(t));
+        }
+    }
+
+    fn has_triangle(&self, node: u32, is_it: impl Fn(&[u32; 3]) -> bool) -> bool {
+        self.around[node as usize].iter().any(|t| is_it(&self.triangles[*t as usize]))
+    }
+
+    fn area_normal(&self, corners: [u32; 3]) -> DVec3 {
+        area_normal(corners.map(|node| self.positions[node as usize]))
     }
 }
 

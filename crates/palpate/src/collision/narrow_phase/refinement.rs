@@ -18,7 +18,10 @@ impl ObstacleQuery<'_> {
     /// # Real time
     /// Costs the nodes that were added, and a limited number of visits.
     pub(super) fn refine(&self, context: &mut CollisionContext, known: &[Contact], first: usize) {
-        let max_added = context.scene.max_contact_samples.saturating_mul(2);
+        let max_samples = context.scene.max_contact_samples;
+        // Contact samples come first: of the room for contact points, one set of them is left free.
+        let points = &self.own.points;
+        let room = points.capacity().saturating_sub(points.points.len()).saturating_sub(max_samples);
         let CollisionWorkspace { positions, near_nodes, candidates, .. } = &mut *context.workspace;
         let depth = COLLISION.sample_tolerance * self.body.recording.surface.radius();
         let mut added = 0;
@@ -64,7 +67,8 @@ impl ObstacleQuery<'_> {
                 }
             },
         );
-        for node in near_nodes.iter().map(|&node| node as usize).take(max_added.saturating_sub(added)) {
+        let max_new = room.min(max_samples.saturating_mul(2).saturating_sub(added));
+        for node in near_nodes.iter().map(|&node| node as usize).take(max_new) {
             let feature = FeatureId::of_node(0, node);
             if candidates.list[first..].iter().any(|candidate| candidate.id.feature == feature) {
                 continue;
