@@ -2,11 +2,11 @@
 //!
 //! The other nodes are removed, and the hole that each leaves is filled with the triangles that best keep the directions of those
 //! removed and have the best shapes; the node whose hole is filled best goes first. A closed surface stays closed, and sharp edges
-//! with samples are preserved.
+//! with samples are preserved. Then edges are flipped where that brings their middles nearer to the surface.
 //!
 //! Equations: docs/theory.md (C30).
 
-use super::{Surface, area_normal, triangles_around};
+use super::{SphereTree, Surface, area_normal, triangles_around};
 use alloc::collections::BinaryHeap;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -18,6 +18,9 @@ const MIN_TURN_COSINE: f64 = 0.3;
 
 /// Lower limit of the shape quality of a triangle that fills a hole [1]; 1 for an equilateral one.
 const MIN_SHAPE: f64 = 0.02;
+
+/// Lower limit of the distance by which a flip brings the middle of an edge nearer to the surface, as a share of the edge's length.
+const MIN_GAIN: f64 = 1e-3;
 
 /// Exponent of the turn's cosine in the quality of a triangle, relative to the shape.
 const TURN_EXPONENT: i32 = 8;
@@ -39,8 +42,10 @@ pub(crate) fn decimate(surface: &Surface, nodes: &[u32]) -> Option<Vec<[u32; 3]>
             return None;
         }
     }
-    let whole = (0..mesh.triangles.len()).filter(|&t| mesh.triangles[t] != REMOVED);
-    Some(whole.map(|t| mesh.triangles[t]).collect())
+    let tree = SphereTree::new(&surface.positions, &surface.triangles);
+    mesh.flip_edges(|point| tree.distance((&surface.positions, &surface.triangles), point, 0.0));
+    mesh.triangles.retain(|corners| *corners != REMOVED);
+    Some(mesh.triangles)
 }
 
 /// Corners of a removed triangle.
@@ -183,6 +188,54 @@ impl DecimatedMesh<'_> {
             self.triangles[t as usize] = *corners;
             corners.iter().for_each(|corner| self.around[*corner as usize].push(t));
         }
+    }
+
+    /// Flip edges whose middle is farther from the surface, by a distance [m], than the middle of the edge across them would be.
+    fn flip_edges(&mut self, distance: impl Fn(DVec3) -> f64) {
+        let mut has_flipped = true;
+        // Each flip lowers the sum of the distances.
+        while core::mem::take(&mut has_flipped) {
+            for t in 0..self.triangles.len() {
+                for side in 0..3 {
+                    has_flipped |= self.flip_edge(t, side, &distance);
+                }
+            }
+        }
+    }
+
+    /// Flip one side of a triangle if that brings its middle nearer to the surface. Gives whether it has.
+    fn flip_edge(&mut self, t: usize, side: usize, distance: &impl Fn(DVec3) -> f64) -> bool {
+        let corners = self.triangles[t];
+        let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+        // Each edge once: from the lower of its nodes. Removed triangles have one node only.
+        if a >= b {
+            return false;
+        }
+        let has_side = |&&other: &&u32| {
+            let corners = self.triangles[other as usize];
+            (0..3).any(|k| (corners[k], corners[(k + 1) % 3]) == (b, a))
+        };
+        let Some(&other) = self.around[a as usize].iter().find(has_side) else { return false };
+        let beyond = self.triangles[other as usize];
+        let Some(d) = beyond.into_iter().find(|node| ![a, b].contains(node)) else { return false };
+        let [from, to] = [a, b].map(|node| self.positions[node as usize]);
+        let middle = |a: u32, b: u32| 0.5 * (self.positions[a as usize] + self.positions[b as usize]);
+        let (now, gain) = (distance(middle(a, b)), MIN_GAIN * (to - from).length());
+        if now <= gain || self.has_triangle(c, |corners| corners.contains(&d)) {
+            return false;
+        }
+        let removed = [corners, beyond].map(|of| self.area_normal(of).normalize_or_zero());
+        let flipped = [[a, d, c], [d, b, c]];
+        let is_sound = flipped.iter().all(|of| self.quality(*of, &removed) > 0.0);
+        if !is_sound || distance(middle(c, d)) > now - gain {
+            return false;
+        }
+        [self.triangles[t], self.triangles[other as usize]] = flipped;
+        self.around[a as usize].retain(|of| *of != other);
+        self.around[b as usize].retain(|of| *of as usize != t);
+        self.around[c as usize].push(other);
+        self.around[d as usize].push(t as u32);
+        true
     }
 
     fn has_triangle(&self, node: u32, is_it: impl Fn(&[u32; 3]) -> bool) -> bool {
