@@ -6,7 +6,7 @@ use crate::certificate::{FORCE_ERROR_UNUSABLE, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
 use crate::kernels::avx_section;
-use crate::material;
+use crate::material::{self, library_material};
 use crate::memory::check_memory;
 use crate::modes::{ElasticModes, lowest_modes};
 use crate::progress::Progress;
@@ -126,6 +126,7 @@ fn record_body(
     let mesh = mesh.checked()?;
     mesh.warnings.iter().for_each(|warning| progress.warn(warning));
     warn_about_locking(parameters, progress);
+    let doubt = first_doubt(&mesh, &parameters.materials, progress);
     match parameters.order {
         ElementOrder::Quadratic => mesh.check_curved()?,
         ElementOrder::Linear => warn_about_straight_edges(&mesh, progress),
@@ -183,7 +184,7 @@ fn record_body(
         let certificate =
             certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)
                 .map_err(certificate_error)?;
-        warn_about_certificate(&certificate, progress);
+        warn_about_certificate(&certificate, doubt, progress);
         stated = Some(Certificate { sample_levels: level_errors, ..certificate });
     }
 
@@ -278,6 +279,34 @@ fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress
     }
 }
 
+/// Advice that comes before that of the certificate: about the size of the body, or Young's modulus, where even the stiffest material sags by more
+/// than the body's size, of which it warns.
+fn first_doubt(mesh: &Mesh, materials: &[Material], progress: &mut dyn Progress) -> Option<&'static str> {
+    if mesh.unit_question(1.0).is_some() {
+        return Some("see to the unit of the mesh first");
+    }
+    let used = || mesh.tets.iter().flatten().map(|&node| mesh.nodes[node as usize]);
+    let size = (used().reduce(DVec3::max)? - used().reduce(DVec3::min)?).max_element();
+    let stiffest = materials.iter().max_by(|a, b| a.young_pa.total_cmp(&b.young_pa))?;
+    let sag = stiffest.sag(size);
+    if sag <= 1.0 {
+        return None;
+    }
+    let range = |name: &str| {
+        let [low, high] = library_material(name).map(|own| own.young_range_pa).unwrap_or_default();
+        format!("{name} {low} to {high}")
+    };
+    progress.warn(&format!(
+        "Young's modulus is {} Pa: under its own weight the body, {size:.3} m large, would sag by {sag:.1} times its size. The unit is \
+         Pa, as for {}, {} and {}; give 1000 times as much for kPa",
+        stiffest.young_pa,
+        range("fat"),
+        range("liver"),
+        range("rubber")
+    ));
+    Some("see to Young's modulus first")
+}
+
 fn warn_about_straight_edges(mesh: &Mesh, progress: &mut dyn Progress) {
     if !mesh.is_curved() {
         return;
@@ -291,19 +320,20 @@ fn warn_about_straight_edges(mesh: &Mesh, progress: &mut dyn Progress) {
     ));
 }
 
-fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
+fn warn_about_certificate(certificate: &Certificate, doubt: Option<&str>, progress: &mut dyn Progress) {
+    let advice = doubt.unwrap_or("keep the residual compliance and more modes");
     let error = certificate.force_error_max;
     let worst_at = DVec3::from_array(certificate.worst_at_m);
     if error > FORCE_ERROR_UNUSABLE {
         progress.warn(&format!(
             "the force of this recording is worth nothing near ({:.4}, {:.4}, {:.4}) m from its centre of mass (see the \
-             certificate): keep the residual compliance and more modes",
+             certificate): {advice}",
             worst_at.x, worst_at.y, worst_at.z
         ));
     } else if error > Certificate::FORCE_ERROR_WARNING {
         progress.warn(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
-             certificate): keep the residual compliance and more modes",
+             certificate): {advice}",
             100.0 * error
         ));
     }

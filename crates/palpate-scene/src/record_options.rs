@@ -235,6 +235,27 @@ mod tests {
     }
 
     #[test]
+    fn a_body_that_would_sag_by_more_than_its_size_is_asked_about() {
+        // By hand: 1000·9.81·0.2/(2·50) = 19.62.
+        let text = "warning: Young's modulus is 50 Pa: under its own weight the body, 0.200 m large, would sag by 19.6 times its size. \
+                    The unit is Pa, as for fat 500 to 25000, liver 600 to 20000 and rubber 920000 to 7400000; give 1000 times as much \
+                    for kPa";
+        for (young, expected) in [(50.0, Some(text)), (1000.0, None)] {
+            let materials = MaterialChoice::Uniform(Material::isotropic(young, 0.3, 1000.0));
+            let mut told = Told::default();
+            let options = RecordOptions { materials, ..options() };
+            options.record(BodySource::Text("box:0.2x0.1x0.1/2x2x2"), &mut told).expect("a recording");
+            assert_eq!(told.0.iter().find(|text| text.contains("Young")).map(String::as_str), expected);
+            let advice = told.0.iter().find(|text| text.contains("certificate):"));
+            assert_eq!(
+                advice.is_some_and(|text| text.contains("more modes")),
+                expected.is_none(),
+                "{advice:?}"
+            );
+        }
+    }
+
+    #[test]
     fn supports_damping_and_targets_are_kept() {
         let fixed = RecordOptions {
             fix: vec!["x<-0.099".into()],
