@@ -1,8 +1,11 @@
 //! Scenes of texts, for programs that move the devices: parts in memory, and devices without a path.
 
 use glam::DVec3;
-use palpate::{AppliedForce, DeviceMode, Recording};
-use palpate_scene::{PartsInMemory, RunMode, Scene, SceneError, SceneErrorKind, read_scene, read_scene_text};
+use palpate::{AppliedForce, DeviceMode, Pose, Recording, State, step};
+use palpate_scene::{
+    PartsInMemory, RunCheck, RunMode, Scene, SceneError, SceneErrorKind, WarningKind, read_scene,
+    read_scene_text,
+};
 use palpate_testkit::FREE_BLOCK_FILE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -83,4 +86,65 @@ fn a_scene_file_needs_a_mover_for_every_device() {
         assert_eq!((error.kind, error.key.as_deref()), (SceneErrorKind::Missing, Some("path")));
         assert!(error.message.starts_with(needs), "{}", error.message);
     }
+}
+
+#[test]
+fn positions_of_a_program_are_checked_as_those_of_a_path() {
+    let scene = read(TEXT, "0,0,0,3000\n1,0,0,1000\n").expect("a scene");
+    let about = |what: &str, name: &str| {
+        format!(
+            "{what} of {name:?} goes 2999.9 m away from the objects, which span 0.245 m: positions are in metres; if these are in \
+             millimetres, divide them by 1000"
+        )
+    };
+    let of_path = scene.warnings.last().expect("a warning");
+    assert_eq!((of_path.kind, &*of_path.message), (WarningKind::Units, &*about("the path", "guided")));
+    let hand = [DVec3::ZERO, DVec3::Z * 3000.0, DVec3::Z * 1000.0];
+    let state = State::new(&scene.model);
+    let mut check = RunCheck::new(&scene);
+    let told = check.add_positions(&scene, "finger", hand.into_iter(), &state).cloned().expect("a warning");
+    assert_eq!(
+        (told.kind, &*told.part, told.message),
+        (WarningKind::Units, "finger", about("the motion", "finger"))
+    );
+    assert_eq!(check.add_positions(&scene, "finger", hand.into_iter(), &state), None, "it is told once");
+    // One that follows an object is near it, however far this has gone.
+    let object = Pose { position: DVec3::Z * 3000.0, ..Pose::IDENTITY };
+    let following = scene.far_positions("finger", hand[..2].iter().copied(), || vec![object]);
+    assert!(
+        following.is_some_and(|warning| warning.message == about("the motion", "finger")),
+        "it left the start"
+    );
+    assert_eq!(scene.far_positions("finger", hand[1..2].iter().copied(), || vec![object]), None);
+    assert_eq!(scene.far_positions("finger", [DVec3::Z * 7.0].into_iter(), Vec::new), None);
+}
+
+#[test]
+fn a_tip_that_moves_and_touches_nothing_is_told_of() {
+    let scene = read(TEXT, "0,0,0,3\n1,0,0,3\n").expect("a scene");
+    let mut state = State::new(&scene.model);
+    let mut check = RunCheck::new(&scene);
+    let mut input = scene.input_at(0.0);
+    input.devices[0].position = DVec3::X;
+    let parts = |check: &RunCheck| {
+        check.warnings(&scene).into_iter().map(|own| (own.kind, own.part)).collect::<Vec<_>>()
+    };
+    let guided = (WarningKind::NoContact, "guided".to_string());
+    step(&scene.model, &mut state, &input);
+    check.add(&input, &state);
+    assert_eq!(
+        parts(&check),
+        std::slice::from_ref(&guided),
+        "a path was meant to touch; a tip that rests was not"
+    );
+    input.devices[0].position = 2.0 * DVec3::X;
+    step(&scene.model, &mut state, &input);
+    check.add(&input, &state);
+    assert_eq!(parts(&check), [(WarningKind::NoContact, "finger".to_string()), guided]);
+    check.sample_surfaces(&scene, &input, &state, &mut Vec::new());
+    let messages: Vec<String> = check.warnings(&scene).into_iter().map(|own| own.message).collect();
+    assert_eq!(
+        messages[0],
+        "finger touched nothing; its centre stayed about 1.9000 m or more from all objects"
+    );
 }
