@@ -30,7 +30,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 const SAMPLES: usize = 100;
 
 /// Least number of steps between two samples: a sample costs as much as some steps of one body.
-const MIN_SAMPLE_INTERVAL: usize = 50;
+const MIN_SAMPLE_INTERVAL: usize = 200;
 
 /// Simulation of a scene: its state, stepped from Python.
 ///

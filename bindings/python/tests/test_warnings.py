@@ -139,7 +139,7 @@ def test_youngs_modulus_in_kilopascals_is_asked_about():
 
     texts, body = told(record)
     # By hand: 1000·9.81·0.1/(2·50) = 9.81.
-    assert texts[0].startswith("Young's modulus is 50 Pa: under its own weight the body, 0.100 m large, would sag by 9.8 times its size.")
+    assert texts[0].startswith("Young's modulus is 50 Pa, and the density 1000 kg/m³: under its own weight the body, 0.100 m large, would sag by 9.8 times")
     assert texts[1].endswith("(see the certificate): see to Young's modulus first")
     texts, _ = told(lambda: palpate.Scene([palpate.Object("cube", body)]))
     assert texts[0].endswith("it would sag by more than its size under its own weight: are its size in metres and its Young's modulus in Pa?")

@@ -170,6 +170,7 @@ fn record_body(
         parameters.precision,
         progress,
     )?;
+    warn_about_damping(parameters.damping, &modes, progress);
     if parameters.precision == Precision::Compact {
         // After the residual compliance: as the difference of rounded numbers it would be indefinite where it is small.
         modes.round_at(&surface_nodes);
@@ -258,10 +259,28 @@ fn certificate_error(error: SolveError) -> RecordError {
     }
 }
 
+/// Density [kg/m³] below which it looks as if given in g/cm³: the lightest foams have 10, osmium has 22.6 g/cm³.
+const LOW_DENSITY_KG_M3: f64 = 10.0;
+
 /// Rough estimate of the needed memory [bytes]: the factor grows with dofs^(4/3) (measured: 0.6 GB at 81 000 with
 /// linear elements), the Krylov basis holds about four columns per mode, in three copies.
 fn needed_bytes(dofs: f64, modes: f64) -> f64 {
     0.6e9 * (dofs / 81e3).powf(4.0 / 3.0) + 3.0 * 8.0 * dofs * (4.0 * modes).min(dofs)
+}
+
+/// Warn of modes that creep back in place of vibrating.
+fn warn_about_damping(damping: Damping, modes: &ElasticModes, progress: &mut dyn Progress) {
+    let Some(lowest) = modes.squares.first().map(|square| square.sqrt()) else { return };
+    let ratio = damping.ratio(lowest);
+    if ratio > 1.0 {
+        let hint = match damping {
+            Damping::Ratio(ratio) => format!("give {} for {ratio} %", ratio / 100.0),
+            Damping::Rayleigh { .. } => "Rayleigh's α is in 1/s and comes first, β is in s".to_string(),
+        };
+        progress.warn(&format!(
+            "the damping ratio of the lowest mode is {ratio:.3}: above 1 the body creeps back in place of vibrating; {hint}"
+        ));
+    }
 }
 
 fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
@@ -285,6 +304,13 @@ fn first_doubt(mesh: &Mesh, materials: &[Material], progress: &mut dyn Progress)
     if mesh.unit_question(1.0).is_some() {
         return Some("see to the unit of the mesh first");
     }
+    if let Some(lightest) = materials.iter().find(|material| material.density_kg_m3 < LOW_DENSITY_KG_M3) {
+        progress.warn(&format!(
+            "the density is {} kg/m³, little more than that of air: the unit is kg/m³, as for foam 30, water 1000 and steel 7850; give \
+             1000 times as much for g/cm³",
+            lightest.density_kg_m3
+        ));
+    }
     let used = || mesh.tets.iter().flatten().map(|&node| mesh.nodes[node as usize]);
     let size = (used().reduce(DVec3::max)? - used().reduce(DVec3::min)?).max_element();
     let stiffest = materials.iter().max_by(|a, b| a.young_pa.total_cmp(&b.young_pa))?;
@@ -297,9 +323,10 @@ fn first_doubt(mesh: &Mesh, materials: &[Material], progress: &mut dyn Progress)
         format!("{name} {low} to {high}")
     };
     progress.warn(&format!(
-        "Young's modulus is {} Pa: under its own weight the body, {size:.3} m large, would sag by {sag:.1} times its size. The unit is \
+        "Young's modulus is {} Pa, and the density {} kg/m³: under its own weight the body, {size:.3} m large, would sag by {sag:.1} times its size. The unit is \
          Pa, as for {}, {} and {}; give 1000 times as much for kPa",
         stiffest.young_pa,
+        stiffest.density_kg_m3,
         range("fat"),
         range("liver"),
         range("rubber")

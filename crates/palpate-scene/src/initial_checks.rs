@@ -1,7 +1,7 @@
-//! Checks of a scene's initial state: penetration of objects, obstacles and tips, and [lengths](crate::unit_check).
+//! Checks of a scene's initial state: penetration of objects, obstacles and tips, and [numbers in another unit](crate::unit_check).
 
 use crate::scene::Scene;
-use crate::unit_check::large_object;
+use crate::unit_check::check_units;
 use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
 use palpate::{DeviceMode, ModelObject, ObstacleMesh, Pose, Recording, Shape, Support, Surface};
@@ -37,8 +37,7 @@ struct Penetration {
 /// Warnings about the start of a scene. Costs a distance query for each surface node whose object is near another one.
 pub(crate) fn check_start(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning> {
     let placed = place(scene, objects);
-    let mut warnings = Vec::new();
-    warnings.extend(placed.iter().filter_map(|object| large_object(object.name, &object.recording.surface)));
+    let mut warnings = check_units(scene, objects);
     for (at, object) in placed.iter().enumerate() {
         for (obstacle, parameters) in scene.obstacles.iter().zip(&scene.model.parameters().obstacles) {
             warnings.extend(in_obstacle(object, &obstacle.name, &parameters.shape, obstacle.pose_at(0.0)));

@@ -28,7 +28,7 @@ impl ObjectBounds {
     }
 
     /// Diagonal [m].
-    fn diagonal(&self) -> f64 {
+    pub(crate) fn diagonal(&self) -> f64 {
         (self.high - self.low).length()
     }
 

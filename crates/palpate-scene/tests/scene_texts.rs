@@ -3,7 +3,7 @@
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceMode, Pose, Recording, State, step};
 use palpate_scene::{
-    PartsInMemory, RunCheck, RunMode, Scene, SceneError, SceneErrorKind, WarningKind, read_scene,
+    PartsInMemory, RunCheck, RunMode, Scene, SceneError, SceneErrorKind, Warning, WarningKind, read_scene,
     read_scene_text,
 };
 use palpate_testkit::FREE_BLOCK_FILE;
@@ -147,4 +147,83 @@ fn a_tip_that_moves_and_touches_nothing_is_told_of() {
         messages[0],
         "finger touched nothing; its centre stayed about 1.9000 m or more from all objects"
     );
+}
+
+#[test]
+fn numbers_in_another_unit_get_a_warning_with_their_part() {
+    let object = "[[object]]\nname = \"cube\"\nrecording = \"<cube>\"\n";
+    let floor = "[[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, -0.05]\nnormal = [0.0, 0.0, 1.0]\n";
+    let other =
+        |at: f64| format!("{}position = [0.0, 0.0, {at:?}]\n", object.replace("\"cube\"", "\"other\""));
+    let finger = |keys: &str| format!("[[device]]\nname = \"finger\"\nmode = \"touch\"\n{keys}\n");
+    let apart = |distance: f64| {
+        format!(
+            "begins {distance:.1} m away from everything else, and is 0.245 m across: positions are in metres; if these are in \
+             millimetres, divide them by 1000"
+        )
+    };
+    let lengths =
+        "and the objects span 0.245 m: lengths are in metres; if this is in millimetres, divide it by 1000";
+    for (text, kind, part, message) in [
+        (format!("step = 1.0\n{object}"), WarningKind::Units, "", "the step is 1 s long: it is in seconds, 0.001 for 1 ms".to_string()),
+        (
+            format!("gravity = [0.0, 0.0, -981.0]\n{object}"),
+            WarningKind::Units,
+            "",
+            "gravity is 981 m/s²: it is in m/s², 9.81 on the Earth".to_string(),
+        ),
+        (
+            format!("gravity = [0.0, 0.0, 9.81]\n{object}{floor}"),
+            WarningKind::Gravity,
+            "",
+            "gravity [0.0, 0.0, 9.81] has the direction of every plane's normal, out of the solid side, and lifts the objects off: turn one of them round"
+                .to_string(),
+        ),
+        (
+            format!("{object}friction = 60.0\n"),
+            WarningKind::Units,
+            "cube",
+            "the friction of \"cube\" is 60: it is a coefficient, 0.6 for 60 %".to_string(),
+        ),
+        (
+            format!("{object}{}", finger("tip_radius = 5.0")),
+            WarningKind::Units,
+            "finger",
+            format!("the tip of \"finger\" has a radius of 5 m, {lengths}"),
+        ),
+        (
+            format!("{object}{}", finger("tip_radius = 0.01\npatch_radius = 40.0")),
+            WarningKind::Units,
+            "finger",
+            format!("the patch of \"finger\" has a radius of 40 m, {lengths}"),
+        ),
+        (
+            format!("{object}{}", other(120.0)),
+            WarningKind::Units,
+            "cube",
+            format!("the object \"cube\" {}", apart(119.8)),
+        ),
+        (
+            format!("{object}{}", floor.replace("-0.05", "-50.0")),
+            WarningKind::Units,
+            "cube",
+            format!("the object \"cube\" {}", apart(49.9)),
+        ),
+    ] {
+        let warnings = read(&text, "").expect("a scene").warnings;
+        let found = warnings.iter().find(|warning| warning.kind == kind).unwrap_or_else(|| panic!("{text}: {warnings:?}"));
+        assert_eq!((&*found.part, &*found.message), (part, &*message));
+    }
+    // What is usual is not asked about: ice, rubber, what does not slip, a fall of 5 m, weight towards a floor, and a wall.
+    let wall = "[[plane]]\nname = \"wall\"\npoint = [1.0, 0.0, 0.0]\nnormal = [-1.0, 0.0, 0.0]\n";
+    for text in [
+        format!("gravity = [0.0, 0.0, -9.81]\n{object}friction = 0.0\n{floor}friction = 4.0\n"),
+        format!("gravity = [0.0, 0.0, 9.81]\n{object}friction = 1e3\n{wall}"),
+        format!("{object}{}", floor.replace("-0.05", "-5.0")),
+        format!("{object}{}", finger("tip_radius = 0.01\npatch_radius = 0.2")),
+    ] {
+        let warnings = read(&text, "").expect("a scene").warnings;
+        let asked = |warning: &&Warning| matches!(warning.kind, WarningKind::Units | WarningKind::Gravity);
+        assert_eq!(warnings.iter().find(asked), None, "{text}");
+    }
 }
