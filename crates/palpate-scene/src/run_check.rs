@@ -12,6 +12,9 @@ const LARGE_DEFORMATION: f64 = 0.1;
 const PENETRATION: f64 = 0.01;
 const PENETRATION_M: f64 = 2e-4;
 
+/// Number of samples below which the least distance of a tip is not known.
+const MIN_SAMPLES: usize = 10;
+
 /// Check of a run, step by step.
 #[derive(Debug, Clone, Default)]
 pub struct RunCheck {
@@ -20,6 +23,8 @@ pub struct RunCheck {
     /// Largest penetration by object [m]: of its contacts in every step, of all its nodes in obstacles in sampled steps.
     pub penetration: Vec<f64>,
     tips: Vec<Tip>,
+    /// Number of samples of the surfaces.
+    samples: usize,
     /// Number of steps with unsolved islands.
     pub unsolved_steps: usize,
     /// Number of steps with dropped contacts.
@@ -108,6 +113,7 @@ impl RunCheck {
         state: &State,
         fields: &mut Vec<ResidualFieldCache>,
     ) {
+        self.samples += 1;
         fields.resize_with(scene.object_names.len(), ResidualFieldCache::default);
         let obstacles = scene.model.parameters().obstacles.iter().zip(&input.obstacles);
         let output = state.output();
@@ -159,7 +165,8 @@ impl RunCheck {
         for (device, tip) in scene.devices.iter().zip(&self.tips) {
             let could_touch = tip.first.is_some() && (device.path.is_some() || tip.has_moved);
             if could_touch && !tip.has_touched {
-                all.push(no_contact(&device.name, tip.nearest));
+                let nearest = if self.samples < MIN_SAMPLES { f64::INFINITY } else { tip.nearest };
+                all.push(no_contact(&device.name, nearest));
             }
         }
         let of_scene = |kind: WarningKind, message: String| Warning::new(kind, "", message);

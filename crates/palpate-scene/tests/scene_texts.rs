@@ -141,7 +141,8 @@ fn a_tip_that_moves_and_touches_nothing_is_told_of() {
     step(&scene.model, &mut state, &input);
     check.add(&input, &state);
     assert_eq!(parts(&check), [(WarningKind::NoContact, "finger".to_string()), guided]);
-    check.sample_surfaces(&scene, &input, &state, &mut Vec::new());
+    assert_eq!(check.warnings(&scene)[0].message, "finger touched nothing");
+    (0..10).for_each(|_| check.sample_surfaces(&scene, &input, &state, &mut Vec::new()));
     let messages: Vec<String> = check.warnings(&scene).into_iter().map(|own| own.message).collect();
     assert_eq!(
         messages[0],
