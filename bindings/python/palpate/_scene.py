@@ -417,4 +417,6 @@ def _with_part(error: SceneError, lines: list[str]) -> SceneError:
         name = next((line.partition(" = ")[2] for line in below if line.startswith(("name = ", "[["))), "")
         part = f"{above[header].strip('[]')} {name}".strip()
     message = re.sub(r"^.*?: line \d+: ", "", str(error), count=1)
+    # Files are named there; rows of an array count from 0.
+    message = re.sub(r"\bpath: line (\d+): ", lambda line: f"path: row {int(line[1]) - 1}: ", message, count=1)
     return SceneError(f"{part}: {message}", kind=error.kind, key=error.key)

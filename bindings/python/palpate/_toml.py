@@ -54,8 +54,9 @@ def _csv(rows: Any, part: str) -> str:
         numbers = given.astype(float)
     except (TypeError, ValueError) as error:
         raise InputError(f"the path of {part} is no file and no array of numbers: {error}") from None
-    if numbers.ndim != 2:
-        raise InputError(f"the path of {part} has the shape {numbers.shape}, expected (rows, 4): t, x, y, z")
+    if numbers.ndim != 2 or 0 in numbers.shape or numbers.shape[1] not in (4, 8):
+        poses = "" if part.partition(" ")[0] in ("object", "device", "gravity") else ", or (rows, 8) with qw, qx, qy, qz"
+        raise InputError(f"the path of {part} has the shape {numbers.shape}, expected (rows, 4): t, x, y, z{poses}")
     return "".join(",".join(map(repr, row)) + "\n" for row in numbers.tolist())
 
 

@@ -5,7 +5,9 @@
 use crate::arrays::array;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::{BatchOutputs, Part};
-use crate::batch_rows::{Row, Rows, Workspaces, chosen_rows, failure_of, fill_rows, make_rows};
+use crate::batch_rows::{
+    Row, Rows, Workspaces, check_positions, chosen_rows, failure_of, fill_rows, make_rows,
+};
 use crate::batch_series::BatchSeries;
 use crate::contacts::ContactLayout;
 use crate::device_mode::ModeChange;
@@ -17,6 +19,7 @@ use crate::scene::Scene;
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
 use crate::starts::Starts;
+use crate::warnings::Told;
 use crate::workers::{Workers, no_threads};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyMemoryError;
@@ -55,6 +58,7 @@ pub struct Batch {
     len: usize,
     threads: usize,
     rows: Mutex<Rows>,
+    told: Told,
 }
 
 impl Batch {
@@ -130,7 +134,16 @@ impl Batch {
         let workspaces = Workspaces::new(&inner, threads);
         let rows = Rows { rows, outputs: numbers, motion, workers, workspaces, is_backward: false };
         let layout = ContactLayout::new(&inner);
-        Ok(Self { scene, inner, layout, outputs, len, threads, rows: Mutex::new(rows) })
+        Ok(Self {
+            scene,
+            inner,
+            layout,
+            outputs,
+            len,
+            threads,
+            rows: Mutex::new(rows),
+            told: Told::default(),
+        })
     }
 
     /// Scene.
@@ -176,6 +189,7 @@ impl Batch {
         let mut guard = self.lock(py)?;
         let all = &mut *guard;
         all.motion.read(py, &self.inner, false, &Arguments { positions, obstacles, clamps })?;
+        check_positions(py, &self.inner, &all.motion, &mut all.rows, &self.told)?;
         let failed = py.detach(|| all.step(&self.inner, self.outputs.row_length()));
         let failed = failed.map_err(|error| no_threads(py, &error))?;
         let Rows { rows, outputs, .. } = all;
@@ -228,6 +242,7 @@ impl Batch {
             motion.count_steps(steps.map(|Whole(steps)| steps)).map_err(|text| input_error(py, text))?;
         let mut guard = self.lock(py)?;
         let Rows { rows, outputs, workers, workspaces, .. } = &mut *guard;
+        check_positions(py, &self.inner, &motion, rows, &self.told)?;
         let mut series = BatchSeries::new(self.len, count, self.outputs.row_length())
             .map_err(|error| PyMemoryError::new_err(format!("the series of {count} steps: {error}")))?;
         let mut failed = Vec::new();

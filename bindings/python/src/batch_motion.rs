@@ -73,6 +73,12 @@ impl BatchMotion {
         Ok(())
     }
 
+    /// Numbers, and numbers per row, of each kind that is given.
+    pub fn given(&self) -> impl Iterator<Item = (Kind, &[f64], usize)> {
+        let given = self.parts.iter().filter(|(_, is_given, ..)| *is_given);
+        given.map(|(kind, _, numbers, width)| (*kind, &**numbers, *width))
+    }
+
     /// Number of steps of the series, or as given.
     pub fn count_steps(&self, given: Option<i64>) -> Result<usize, String> {
         match (self.steps, given) {

@@ -4,7 +4,9 @@ use crate::arrays::shown;
 use crate::batch_motion::BatchMotion;
 use crate::batch_outputs::fill_row;
 use crate::errors::{catch_panic, input_error};
+use crate::position_check::{Given, PositionCheck};
 use crate::run_state::{RunState, StepFailure};
+use crate::warnings::Told;
 use crate::workers::Workers;
 use palpate::Workspace;
 use palpate_fem::check_memory;
@@ -128,6 +130,25 @@ impl Row {
 /// Write the numbers of all rows, each of a length.
 pub fn fill_rows(rows: &[Row], outputs: &mut [f64], length: usize) {
     rows.iter().zip(outputs.chunks_exact_mut(length)).for_each(|(row, own)| row.fill(own));
+}
+
+/// Check where the parts of all rows go, and warn of what looks like millimetres.
+pub fn check_positions(
+    py: Python<'_>,
+    scene: &Scene,
+    motion: &BatchMotion,
+    rows: &mut [Row],
+    told: &Told,
+) -> PyResult<()> {
+    let count = rows.len();
+    for (kind, numbers, width) in motion.given() {
+        for (at, row) in rows.iter_mut().enumerate() {
+            let RunState { check, state, modes, .. } = &mut row.run;
+            let given = Given { kind, numbers, first: at * width, stride: count * width };
+            PositionCheck { scene, check, state, modes, told }.check(py, &given)?;
+        }
+    }
+    Ok(())
 }
 
 /// Numbers of the chosen rows: all, by a mask or by numbers.

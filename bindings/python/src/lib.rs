@@ -16,6 +16,7 @@ mod keywords;
 mod log;
 mod motion;
 mod output;
+mod position_check;
 mod progress;
 mod readings;
 mod record;
@@ -33,6 +34,7 @@ mod session_thread;
 mod simulation;
 mod snapshot;
 mod starts;
+mod warnings;
 mod workers;
 
 use pyo3::prelude::*;

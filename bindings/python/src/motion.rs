@@ -86,12 +86,13 @@ pub fn check_paths(py: Python<'_>, scene: &Scene) -> PyResult<()> {
     }
 }
 
-/// Write the arguments of one step over the input of the scene's paths.
+/// Write the arguments of one step over the input of the scene's paths, once `check` has seen their numbers.
 pub fn write_step(
     py: Python<'_>,
     scene: &Scene,
     arguments: &Arguments<'_, '_>,
     input: &mut Input,
+    mut check: impl FnMut(Kind, &[f64]) -> PyResult<()>,
 ) -> PyResult<()> {
     if arguments.positions.is_none() {
         check_paths(py, scene)?;
@@ -103,7 +104,9 @@ pub fn write_step(
     };
     let [devices, obstacles, clamps] = parts(arguments, scene).map(read);
     for (kind, numbers) in [devices?, obstacles?, clamps?].into_iter().flatten() {
-        write(kind, numbers.as_slice()?, input).map_err(|error| input_error(py, error))?;
+        let numbers = numbers.as_slice()?;
+        check(kind, numbers)?;
+        write(kind, numbers, input).map_err(|error| input_error(py, error))?;
     }
     Ok(())
 }
@@ -151,6 +154,11 @@ impl SeriesMotion {
             series.parts.push((kind, copied, rows * kind.columns()));
         }
         Ok(series)
+    }
+
+    /// Numbers, and numbers per step, of each kind that is given.
+    pub fn given(&self) -> impl Iterator<Item = (Kind, &[f64], usize)> {
+        self.parts.iter().map(|(kind, numbers, width)| (*kind, &**numbers, *width))
     }
 
     /// Write the motion of a step, from 0, over the input of the scene's paths.

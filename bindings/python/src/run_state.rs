@@ -6,6 +6,7 @@ use crate::motion::SeriesMotion;
 use crate::progress::SIGNAL_INTERVAL;
 use glam::DVec3;
 use palpate::{DeviceMode, Grasp, Input, ObjectSnapshot, State, Support, Twist, Workspace, step, step_in};
+use palpate_scene::RunCheck;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use std::collections::TryReserveError;
@@ -21,6 +22,8 @@ pub struct RunState {
     pub input: Input,
     /// Modes of the devices: those of the scene, until one grasps, lets go or leaves.
     pub modes: Vec<DeviceMode>,
+    /// Check of the steps since the start.
+    pub check: RunCheck,
     /// Text of a panic in a step: what is left of the state is of no use.
     panic: Option<String>,
 }
@@ -64,7 +67,7 @@ impl RunState {
 
     fn with(scene: &palpate_scene::Scene, state: State) -> Self {
         let modes = scene.devices.iter().map(|device| device.mode).collect();
-        Self { state, input: scene.input_at(0.0), modes, panic: None }
+        Self { state, input: scene.input_at(0.0), modes, check: RunCheck::new(scene), panic: None }
     }
 
     /// State that resumes from the objects of another one, at time 0.
@@ -149,6 +152,7 @@ impl RunState {
         }
         let stepped = catch_panic(|| {
             step(&mut self.state, &self.input);
+            self.check.add(&self.input, &self.state);
             scene.check_step(&self.input, &self.state)
         });
         match stepped {
@@ -184,7 +188,7 @@ pub fn run_part(
     run: &mut RunState,
     motion: &SeriesMotion,
     steps: std::ops::Range<usize>,
-    mut append: impl FnMut(&Input, &State) -> Result<(), StepFailure>,
+    mut append: impl FnMut(usize, &mut RunState) -> Result<(), StepFailure>,
 ) -> Result<usize, StepFailure> {
     let started = Instant::now();
     for number in steps.clone() {
@@ -194,7 +198,7 @@ pub fn run_part(
         run.follow_paths(scene);
         motion.write(number, &mut run.input).map_err(StepFailure::Motion)?;
         run.step(scene)?;
-        append(&run.input, &run.state)?;
+        append(number, run)?;
     }
     Ok(steps.end)
 }

@@ -1,10 +1,11 @@
 //! Base class of `palpate.Scene`: a scene that is read from TOML, with its files beside it or in memory.
 
 use crate::arrays::{array, flat};
-use crate::errors::{catch_panic, input_error, internal_error, kind_name, scene_error};
+use crate::errors::{catch_panic, input_error, internal_error, scene_error};
 use crate::progress::warn;
 use crate::recording::Recording;
 use crate::scalars::{FilePath, Text};
+use crate::warnings::warnings_by_name;
 use numpy::{PyArray1, PyArrayMethods};
 use palpate_scene::{PartsInMemory, RunMode, read_scene_text};
 use pyo3::prelude::*;
@@ -156,14 +157,7 @@ impl Scene {
     /// Warnings for the author of the scene: dicts with `kind`, `part` and `message` (docs/scene.md).
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let entry = |warning: &palpate_scene::Warning| {
-            let entry = PyDict::new(py);
-            entry.set_item("kind", kind_name(warning.kind))?;
-            entry.set_item("part", &warning.part)?;
-            entry.set_item("message", &warning.message)?;
-            Ok(entry)
-        };
-        self.inner.warnings.iter().map(entry).collect()
+        warnings_by_name(py, &self.inner.warnings)
     }
 
     /// Values that were chosen automatically, a line each.

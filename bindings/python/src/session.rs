@@ -13,13 +13,15 @@ use crate::run_length::count_steps;
 use crate::run_state::RunState;
 use crate::scalars::{FilePath, Whole};
 use crate::scene::Scene;
-use crate::session_hands::Hands;
+use crate::session_hands::{Hands, Move};
 use crate::session_report::{report_by_name, timing_by_name};
 use crate::session_start::{LogFailure, begin_log, check_start, scheduling};
 use crate::session_thread::{End, Running, lock};
 use crate::snapshot::Snapshot;
+use crate::warnings::Told;
 use palpate::State;
 use palpate_haptics::{Playback, Snapshot as Newest};
+use palpate_scene::Warning;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex};
@@ -71,6 +73,7 @@ pub struct Session {
     hands: Mutex<Hands>,
     running: Arc<Running>,
     log_failure: LogFailure,
+    told: Told,
 }
 
 impl Drop for Session {
@@ -111,6 +114,14 @@ impl Session {
         end.report.as_ref().map_err(|failure| failure.exception(py))?;
         end.log.as_ref().map_err(|error| scene_error(py, error))?;
         Ok(())
+    }
+
+    /// Warnings about positions of a move that look like millimetres.
+    fn far_positions(&self, given: &Move, hands: &Hands) -> Vec<Warning> {
+        let poses = || self.running.newest().output.objects.iter().map(|object| object.pose).collect();
+        let positions = given.positions(&self.inner, &hands.modes);
+        let far = |(name, x)| self.inner.far_positions(name, std::iter::once(x), poses);
+        positions.filter_map(far).collect()
     }
 
     fn change(&self, py: Python<'_>, change: ModeChange) -> PyResult<()> {
@@ -165,11 +176,9 @@ impl Session {
         let begun = Instant::now();
         let playback = Arc::new(Playback::default());
         let (mut hands, devices) = Hands::open(&inner, begun, Arc::clone(&playback));
-        if positions.is_some() {
-            let arguments = Arguments { positions, obstacles: None, clamps: None };
-            let first = hands.read(py, &inner, &arguments, None, None)?;
-            hands.make(&first);
-        }
+        let arguments = Arguments { positions, obstacles: None, clamps: None };
+        let begin = positions.map(|_| hands.read(py, &inner, &arguments, None, None)).transpose()?;
+        begin.iter().for_each(|begin| hands.make(begin));
         let state = py.detach(|| {
             catch_panic(|| match &objects {
                 Some(objects) => State::resume(&inner.model, objects),
@@ -192,7 +201,13 @@ impl Session {
         let running =
             Running::start(session, &inner, state, &first, log).map_err(|failure| failure.exception(py))?;
         let layout = Arc::new(ContactLayout::new(&inner));
-        Ok(Self { scene, inner, layout, hands: Mutex::new(hands), running, log_failure })
+        let hands = Mutex::new(hands);
+        let made = Self { scene, inner, layout, hands, running, log_failure, told: Told::default() };
+        if let Some(begin) = begin {
+            let far = made.far_positions(&begin, &lock(&made.hands));
+            made.told.tell(py, &far)?;
+        }
+        Ok(made)
     }
 
     /// Scene.
@@ -241,7 +256,10 @@ impl Session {
         let mut hands = lock(&self.hands);
         let given = hands.read(py, &self.inner, &Arguments { positions, obstacles, clamps }, device, over)?;
         hands.make(&given);
-        Ok(())
+        let far = self.far_positions(&given, &hands);
+        // Python's filters run code of the caller.
+        drop(hands);
+        self.told.tell(py, &far)
     }
 
     /// Newest output: that of the last step, without waiting for the next.
@@ -432,7 +450,9 @@ impl Session {
         let report = end.report.as_ref().map_err(|failure| failure.exception(py))?;
         self.check_end(py, &end)?;
         self.check_steps(py)?;
-        report_by_name(py, &self.inner, report)
+        let warnings = self.inner.session_warnings(report);
+        self.told.tell(py, &warnings)?;
+        report_by_name(py, &self.inner, report, &warnings)
     }
 
     /// State at the end of a session, for the `start` of another one, and for :meth:`Simulation.restore`: objects are placed, moving and deformed

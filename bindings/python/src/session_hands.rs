@@ -84,6 +84,25 @@ pub struct Move {
     over_s: Option<f64>,
 }
 
+impl Move {
+    /// Parts that it gives a position, and these [m, world].
+    pub fn positions<'s>(
+        &'s self,
+        scene: &'s Scene,
+        modes: &'s [DeviceMode],
+    ) -> impl Iterator<Item = (&'s str, DVec3)> {
+        let has_position = |device: &usize| !matches!(modes[*device], DeviceMode::Force(_));
+        let hands = self.hands.iter().filter(move |(device, _)| has_position(device));
+        let hands = hands.map(|(device, position)| (&*scene.devices[*device].name, *position));
+        let obstacles = self.obstacles.iter().map(|(at, pose)| (&scene.obstacles[*at], pose.position));
+        // Those that stay are where the scene has them.
+        let obstacles = obstacles.filter(|(own, position)| own.start.position != *position);
+        let obstacles = obstacles.map(|(own, position)| (&*own.name, position));
+        let clamps = self.clamps.iter().map(|(at, pose)| (&*scene.clamps[*at].name, pose.position));
+        hands.chain(obstacles).chain(clamps)
+    }
+}
+
 impl Hands {
     /// Parts of a scene, and the devices that a session takes.
     pub fn open(scene: &Scene, start: Instant, playback: Arc<Playback>) -> (Self, Vec<SessionDevice>) {

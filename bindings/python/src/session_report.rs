@@ -1,7 +1,8 @@
 //! Report of a session, by name: the names of `palpate run --realtime --json`, in SI units.
 
+use crate::warnings::warnings_by_name;
 use palpate_haptics::{Percentiles, Report, Timing};
-use palpate_scene::Scene;
+use palpate_scene::{Scene, Warning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -27,7 +28,12 @@ fn percentiles_by_name(py: Python<'_>, of: Percentiles) -> PyResult<Bound<'_, Py
 }
 
 /// Report of a session that has ended.
-pub fn report_by_name<'py>(py: Python<'py>, scene: &Scene, report: &Report) -> PyResult<Bound<'py, PyDict>> {
+pub fn report_by_name<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    report: &Report,
+    warnings: &[Warning],
+) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("steps", report.steps)?;
     dict.set_item("wall_time", report.wall_s)?;
@@ -54,6 +60,7 @@ pub fn report_by_name<'py>(py: Python<'py>, scene: &Scene, report: &Report) -> P
         dict.set_item("whole", !log.is_cut)?;
         PyResult::Ok(dict)
     });
+    dict.set_item("warnings", warnings_by_name(py, warnings)?)?;
     dict.set_item("log", log.transpose()?)?;
     Ok(dict)
 }

@@ -7,6 +7,7 @@ use crate::contacts::ContactLayout;
 use crate::device_mode::{ModeChange, mode_name};
 use crate::errors::{catch_panic, input_error, internal_error, lock_at_once};
 use crate::motion::{Arguments, SeriesMotion, check_devices, write_step};
+use crate::position_check::{Given, PositionCheck};
 use crate::readings::{self, array_of, energy_by_name, status_by_name, write_forces};
 use crate::run_length::count_steps;
 use crate::run_state::{RunState, StepFailure, held_points, run_part};
@@ -15,6 +16,7 @@ use crate::scene::Scene;
 use crate::series::Series;
 use crate::snapshot::Snapshot;
 use crate::starts::Starts;
+use crate::warnings::{Told, warnings_by_name};
 use numpy::PyArray2;
 use palpate::Output;
 use palpate_fem::check_memory;
@@ -23,6 +25,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::TryReserveError;
 use std::sync::{Arc, Mutex, MutexGuard};
+
+/// Number of samples of all surfaces in a run, as `palpate run` takes them.
+const SAMPLES: usize = 100;
+
+/// Least number of steps between two samples: a sample costs as much as some steps of one body.
+const MIN_SAMPLE_INTERVAL: usize = 200;
 
 /// Simulation of a scene: its state, stepped from Python.
 ///
@@ -41,6 +49,7 @@ pub struct Simulation {
     layout: ContactLayout,
     forces: Py<PyArray2<f64>>,
     run: Mutex<RunState>,
+    told: Told,
 }
 
 impl Simulation {
@@ -49,7 +58,7 @@ impl Simulation {
         let inner = Arc::clone(&scene.get().inner);
         let forces = PyArray2::zeros(py, [inner.devices.len(), 3], false).unbind();
         let layout = ContactLayout::new(&inner);
-        let made = Self { scene, inner, layout, forces, run: Mutex::new(run) };
+        let made = Self { scene, inner, layout, forces, run: Mutex::new(run), told: Told::default() };
         made.write_forces(py, made.lock(py)?.state.output())?;
         Ok(made)
     }
@@ -139,7 +148,11 @@ impl Simulation {
     ) -> PyResult<Py<PyArray2<f64>>> {
         let mut run = self.lock(py)?;
         run.follow_paths(&self.inner);
-        write_step(py, &self.inner, &Arguments { positions, obstacles, clamps }, &mut run.input)?;
+        let RunState { check, state, modes, input, .. } = &mut *run;
+        let mut check = PositionCheck { scene: &self.inner, check, state, modes, told: &self.told };
+        write_step(py, &self.inner, &Arguments { positions, obstacles, clamps }, input, |kind, numbers| {
+            check.check(py, &Given { kind, numbers, first: 0, stride: numbers.len() })
+        })?;
         let stepped = run.step(&self.inner);
         self.write_forces(py, run.state.output())?;
         stepped.map_err(|failure| failure.exception(py, ""))?;
@@ -168,7 +181,7 @@ impl Simulation {
     ///     `velocities` (steps, objects, 6) [m/s, rad/s]; `penetration` (steps, objects) [m]; `object_forces`, `object_torques` (steps, objects, 3) and
     ///     `obstacle_forces`, `obstacle_torques` (steps, obstacles, 3) [N, N·m], as the attributes; `clamp_frames` (steps, clamps, 7), `clamp_forces`,
     ///     `clamp_torques` (steps, clamps, 3) [N, N·m]; `probe_positions`, `probe_displacements` (steps, probes, 3) [m]; `unsolved_islands` (steps,);
-    ///     `energy`, a dict of (steps,) [J]; with `contacts=True` the structured array `contacts`, a row per contact and step.
+    ///     `energy`, a dict of (steps,) [J]; `warnings`, as the attribute; with `contacts=True` the structured array `contacts`, a row per contact and step.
     ///
     /// Raises
     /// ------
@@ -210,11 +223,22 @@ impl Simulation {
         let no_memory =
             |error: TryReserveError| PyMemoryError::new_err(format!("the series of {count} steps: {error}"));
         let mut series = Series::new(scene, count, contacts).map_err(no_memory)?;
+        let RunState { check, state, modes, .. } = &mut *run;
+        let mut check = PositionCheck { scene, check, state, modes, told: &self.told };
+        for (kind, numbers, stride) in motion.given() {
+            check.check(py, &Given { kind, numbers, first: 0, stride })?;
+        }
+        let sample_every = (count / SAMPLES).max(MIN_SAMPLE_INTERVAL);
+        let mut fields = Vec::new();
         let mut done = 0;
         let failure = loop {
             let part = py.detach(|| {
                 catch_panic(|| {
-                    run_part(scene, run, &motion, done..count, |input, state| {
+                    run_part(scene, run, &motion, done..count, |number, run| {
+                        let RunState { check, input, state, .. } = run;
+                        if (number + 1).is_multiple_of(sample_every) {
+                            check.sample_surfaces(scene, input, state, &mut fields);
+                        }
                         series.append(scene, layout, input, state).map_err(StepFailure::Memory)
                     })
                 })
@@ -231,8 +255,15 @@ impl Simulation {
             }
         };
         let series = series.into_dict(py, scene, layout)?;
+        let warnings = run.check.warnings(scene);
+        series.set_item("warnings", warnings_by_name(py, &warnings)?)?;
+        // Python's filters run code of the caller.
+        drop(guard);
         match failure {
-            None => Ok(series),
+            None => {
+                self.told.tell(py, &warnings)?;
+                Ok(series)
+            }
             Some(error) => {
                 error.value(py).setattr("series", series)?;
                 Err(error)
@@ -328,6 +359,15 @@ impl Simulation {
     #[getter]
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         status_by_name(py, &self.lock(py)?.state.output().status)
+    }
+
+    /// Warnings of all steps since the start: dicts with `kind`, `part` and `message` (docs/scene.md). Surfaces are sampled now, and by :meth:`run`.
+    #[getter]
+    fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let mut run = self.lock(py)?;
+        let RunState { check, input, state, .. } = &mut *run;
+        check.sample_surfaces(&self.inner, input, state, &mut Vec::new());
+        warnings_by_name(py, &check.warnings(&self.inner))
     }
 
     /// Deformed surface of an object.
@@ -456,7 +496,8 @@ impl Simulation {
     /// Simulation that goes on from the same state by itself.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let run = self.lock(py)?.clone();
-        Self::with(py, self.scene.clone_ref(py), run)
+        let copied = Self::with(py, self.scene.clone_ref(py), run)?;
+        Ok(Self { told: self.told.clone(), ..copied })
     }
 
     fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {

@@ -6,7 +6,7 @@ use crate::certificate::{FORCE_ERROR_UNUSABLE, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
 use crate::kernels::avx_section;
-use crate::material;
+use crate::material::{self, library_material};
 use crate::memory::check_memory;
 use crate::modes::{ElasticModes, lowest_modes};
 use crate::progress::Progress;
@@ -126,6 +126,7 @@ fn record_body(
     let mesh = mesh.checked()?;
     mesh.warnings.iter().for_each(|warning| progress.warn(warning));
     warn_about_locking(parameters, progress);
+    let doubt = first_doubt(&mesh, &parameters.materials, progress);
     match parameters.order {
         ElementOrder::Quadratic => mesh.check_curved()?,
         ElementOrder::Linear => warn_about_straight_edges(&mesh, progress),
@@ -169,6 +170,7 @@ fn record_body(
         parameters.precision,
         progress,
     )?;
+    warn_about_damping(parameters.damping, &modes, progress);
     if parameters.precision == Precision::Compact {
         // After the residual compliance: as the difference of rounded numbers it would be indefinite where it is small.
         modes.round_at(&surface_nodes);
@@ -183,7 +185,7 @@ fn record_body(
         let certificate =
             certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)
                 .map_err(certificate_error)?;
-        warn_about_certificate(&certificate, progress);
+        warn_about_certificate(&certificate, doubt, progress);
         stated = Some(Certificate { sample_levels: level_errors, ..certificate });
     }
 
@@ -257,10 +259,28 @@ fn certificate_error(error: SolveError) -> RecordError {
     }
 }
 
+/// Density [kg/m³] below which it looks as if given in g/cm³: the lightest foams have 10, osmium has 22.6 g/cm³.
+const LOW_DENSITY_KG_M3: f64 = 10.0;
+
 /// Rough estimate of the needed memory [bytes]: the factor grows with dofs^(4/3) (measured: 0.6 GB at 81 000 with
 /// linear elements), the Krylov basis holds about four columns per mode, in three copies.
 fn needed_bytes(dofs: f64, modes: f64) -> f64 {
     0.6e9 * (dofs / 81e3).powf(4.0 / 3.0) + 3.0 * 8.0 * dofs * (4.0 * modes).min(dofs)
+}
+
+/// Warn of modes that creep back in place of vibrating.
+fn warn_about_damping(damping: Damping, modes: &ElasticModes, progress: &mut dyn Progress) {
+    let Some(lowest) = modes.squares.first().map(|square| square.sqrt()) else { return };
+    let ratio = damping.ratio(lowest);
+    if ratio > 1.0 {
+        let hint = match damping {
+            Damping::Ratio(ratio) => format!("give {} for {ratio} %", ratio / 100.0),
+            Damping::Rayleigh { .. } => "Rayleigh's α is in 1/s and comes first, β is in s".to_string(),
+        };
+        progress.warn(&format!(
+            "the damping ratio of the lowest mode is {ratio:.3}: above 1 the body creeps back in place of vibrating; {hint}"
+        ));
+    }
 }
 
 fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress) {
@@ -278,6 +298,42 @@ fn warn_about_locking(parameters: &RecordParameters, progress: &mut dyn Progress
     }
 }
 
+/// Advice that comes before that of the certificate: about the size of the body, or Young's modulus, where even the stiffest material sags by more
+/// than the body's size, of which it warns.
+fn first_doubt(mesh: &Mesh, materials: &[Material], progress: &mut dyn Progress) -> Option<&'static str> {
+    if mesh.unit_question(1.0).is_some() {
+        return Some("see to the unit of the mesh first");
+    }
+    if let Some(lightest) = materials.iter().find(|material| material.density_kg_m3 < LOW_DENSITY_KG_M3) {
+        progress.warn(&format!(
+            "the density is {} kg/m³, little more than that of air: the unit is kg/m³, as for foam 30, water 1000 and steel 7850; give \
+             1000 times as much for g/cm³",
+            lightest.density_kg_m3
+        ));
+    }
+    let used = || mesh.tets.iter().flatten().map(|&node| mesh.nodes[node as usize]);
+    let size = (used().reduce(DVec3::max)? - used().reduce(DVec3::min)?).max_element();
+    let stiffest = materials.iter().max_by(|a, b| a.young_pa.total_cmp(&b.young_pa))?;
+    let sag = stiffest.sag(size);
+    if sag <= 1.0 {
+        return None;
+    }
+    let range = |name: &str| {
+        let [low, high] = library_material(name).map(|own| own.young_range_pa).unwrap_or_default();
+        format!("{name} {low} to {high}")
+    };
+    progress.warn(&format!(
+        "Young's modulus is {} Pa, and the density {} kg/m³: under its own weight the body, {size:.3} m large, would sag by {sag:.1} times its size. The unit is \
+         Pa, as for {}, {} and {}; give 1000 times as much for kPa",
+        stiffest.young_pa,
+        stiffest.density_kg_m3,
+        range("fat"),
+        range("liver"),
+        range("rubber")
+    ));
+    Some("see to Young's modulus first")
+}
+
 fn warn_about_straight_edges(mesh: &Mesh, progress: &mut dyn Progress) {
     if !mesh.is_curved() {
         return;
@@ -291,19 +347,20 @@ fn warn_about_straight_edges(mesh: &Mesh, progress: &mut dyn Progress) {
     ));
 }
 
-fn warn_about_certificate(certificate: &Certificate, progress: &mut dyn Progress) {
+fn warn_about_certificate(certificate: &Certificate, doubt: Option<&str>, progress: &mut dyn Progress) {
+    let advice = doubt.unwrap_or("keep the residual compliance and more modes");
     let error = certificate.force_error_max;
     let worst_at = DVec3::from_array(certificate.worst_at_m);
     if error > FORCE_ERROR_UNUSABLE {
         progress.warn(&format!(
             "the force of this recording is worth nothing near ({:.4}, {:.4}, {:.4}) m from its centre of mass (see the \
-             certificate): keep the residual compliance and more modes",
+             certificate): {advice}",
             worst_at.x, worst_at.y, worst_at.z
         ));
     } else if error > Certificate::FORCE_ERROR_WARNING {
         progress.warn(&format!(
             "even in a smooth press at one place the force of this recording is off by up to {:.0} % (see the \
-             certificate): keep the residual compliance and more modes",
+             certificate): {advice}",
             100.0 * error
         ));
     }

@@ -68,7 +68,7 @@ impl Mesh {
             ));
         }
         if !self.is_unit_asked {
-            self.warnings.extend(size_question(high - low));
+            self.warnings.extend(size_question(high - low, 1.0));
         }
         warn_about_quality(&mut self);
         Ok(CheckedPieces { mesh: self, faces, coincident: coincident.first().map(|&(a, b)| [a, b]) })
@@ -77,7 +77,7 @@ impl Mesh {
     /// Question about the unit of a body of an unusual size, by the scale to metres: to be asked before it is recorded, which takes long.
     pub fn unit_question(&self, scale: f64) -> Option<String> {
         let (low, high) = bounding_box(self, &self.used_nodes().ok()?);
-        size_question(scale * (high - low))
+        size_question(scale * (high - low), scale)
     }
 
     /// Whether each node belongs to a tetrahedron; refuses unknown nodes and coordinates that are not finite.
@@ -197,19 +197,30 @@ fn check_connected(mesh: &Mesh, faces: &[Face], coincident: Option<[u32; 2]>) ->
     Err(MeshError::Disconnected { pieces: sizes.len(), first, coincident })
 }
 
-/// Question about the unit of a body of this extent [m]; none for a usual one.
-pub(crate) fn size_question(extent: DVec3) -> Option<String> {
+/// Units of length that files are written in, and their scales to metres.
+const UNITS: [(&str, f64); 3] = [("metres", 1.0), ("millimetres", 1e-3), ("micrometres", 1e-6)];
+
+/// Question about the unit of a body of this extent [m], which its file has been scaled to; none for a usual one.
+pub(crate) fn size_question(extent: DVec3, scale: f64) -> Option<String> {
     let largest = four_digits(extent.max_element());
     let [small, large] = USUAL_EXTENT;
-    if largest > 1000.0 * large {
-        Some(format!("the body is {largest} m large; if the file is in micrometres, use --scale 1e-6"))
-    } else if largest > large {
-        Some(format!("the body is {largest} m large; if the file is in millimetres, use --scale 0.001"))
-    } else if largest < small {
-        Some(format!("the body is only {largest} m large; is the scale right? (--scale)"))
-    } else {
-        None
+    if scale <= 0.0 || (small..=large).contains(&largest) || largest.is_nan() {
+        return None;
     }
+    let only = if largest < small { "only " } else { "" };
+    let by = if scale == 1.0 { String::new() } else { format!(" with --scale {}", short(scale)) };
+    let in_file = extent.max_element() / scale;
+    let fits = |(_, unit): &&(&str, f64)| (small..=large).contains(&(unit * in_file));
+    let hint = match UNITS.iter().find(fits) {
+        Some((unit, scale)) => format!("if the file is in {unit}, use --scale {}", short(*scale)),
+        None => "is the scale right? (--scale)".into(),
+    };
+    Some(format!("the body is {only}{largest} m large{by}; {hint}"))
+}
+
+/// Scale with few digits.
+fn short(scale: f64) -> String {
+    if (1e-4..1e7).contains(&scale) { scale.to_string() } else { format!("{scale:e}") }
 }
 
 /// Number rounded to four digits; 0 as it is.

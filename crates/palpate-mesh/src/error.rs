@@ -87,7 +87,7 @@ pub enum MeshError {
     /// No lattice point lies inside the surface.
     #[error(
         "no tetrahedron of cells of {cell_size:.3e} m fits into the surface, which is about {thickness:.1e} m thick: give a --cell-size \
-         below that"
+         below that, in metres"
     )]
     NoInside {
         /// Side of a cell [m].
@@ -103,12 +103,14 @@ pub enum MeshError {
     },
     /// The lattice would have too many points.
     #[error(
-        "cells of {cell_size:.3e} m about the surface need {points:.1e} lattice points, of 1.0e6 at most: give a --cell-size of \
-         {smallest:.3e} m or more"
+        "cells of {cell_size:.3e} m about the surface, which is {extent:.3e} m large, need {points:.1e} lattice points, of 1.0e6 at \
+         most: give a --cell-size of {smallest:.3e} m or more, or the --scale of the file's unit to metres"
     )]
     TooManyCells {
         /// Side of a cell [m].
         cell_size: f64,
+        /// Largest extent of the surface [m].
+        extent: f64,
         /// Number of lattice points.
         points: f64,
         /// Smallest allowed size [m].

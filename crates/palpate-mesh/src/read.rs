@@ -81,7 +81,8 @@ impl MeshFile {
             Self::Volume(VolumeFile { mesh, .. }) => mesh.unit_question(scale),
             Self::Surface(SurfaceFile { mesh, .. }) => {
                 let finite = || mesh.positions.iter().copied().filter(|point| point.is_finite());
-                size_question(scale * (finite().reduce(DVec3::max)? - finite().reduce(DVec3::min)?))
+                let extent = finite().reduce(DVec3::max)? - finite().reduce(DVec3::min)?;
+                size_question(scale * extent, scale)
             }
         }
     }

@@ -163,6 +163,8 @@ impl MeshReport {
     fn of_volume(file: VolumeFile, scale: f64, repair: &Repair) -> (Self, Option<Mesh>) {
         let VolumeFile { format, elements, mut mesh } = file;
         let nodes = mesh.nodes.len();
+        // By the report's own question, which knows the scale.
+        mesh.is_unit_asked = true;
         let pieces_before = |mesh: &Mesh| mesh.used_nodes().map(|_| mesh.pieces()).unwrap_or_default();
         // All pieces are listed, also where one is chosen.
         let whole = Repair { piece: PieceChoice::Only, ..*repair };
@@ -194,7 +196,7 @@ impl MeshReport {
             nodes,
             elements: elements.into_iter().map(|(shape, count)| (shape.to_owned(), count)).collect(),
             bounding_box_m: bounding_box.map(|corner| corner.to_array()),
-            unit_question: size_question(bounding_box[1] - bounding_box[0]).filter(|_| is_usable),
+            unit_question: size_question(bounding_box[1] - bounding_box[0], scale).filter(|_| is_usable),
             meshing: None,
             volume: is_usable.then(|| VolumeReport::of(&mesh, pieces)),
             surface: SurfaceReport::of(&surface),
@@ -227,7 +229,7 @@ impl MeshReport {
         let report = Self {
             nodes,
             bounding_box_m: bounding_box.map(|corner| corner.to_array()),
-            unit_question: size_question(bounding_box[1] - bounding_box[0]),
+            unit_question: size_question(bounding_box[1] - bounding_box[0], scale),
             meshing,
             surface: SurfaceReport::of(&surface),
             problem: refused.or(report.problem),

@@ -297,6 +297,26 @@ fn sizes_that_look_like_another_unit_get_a_warning() {
     assert_eq!(warnings(1e-5), ["the body is only 0.00001 m large; is the scale right? (--scale)"]);
     let odd = ["the body is 180.2 m large; if the file is in millimetres, use --scale 0.001"];
     assert_eq!(warnings(180.239997863), odd);
+    let question = |size, scale| box_mesh([size; 3], [2; 3]).expect("a good box").unit_question(scale);
+    let text = |size, scale| question(size, scale).unwrap_or_default();
+    assert_eq!(
+        text(0.08, 1e3),
+        "the body is 80 m large with --scale 1000; if the file is in metres, use --scale 1"
+    );
+    assert_eq!(
+        text(80.0, 1e3),
+        "the body is 80000 m large with --scale 1000; if the file is in millimetres, use --scale 0.001"
+    );
+    assert_eq!(
+        text(0.08, 1e-3),
+        "the body is only 0.00008 m large with --scale 0.001; if the file is in metres, use --scale 1"
+    );
+    assert_eq!(
+        text(80.0, 1e-6),
+        "the body is only 0.00008 m large with --scale 1e-6; if the file is in millimetres, use --scale 0.001"
+    );
+    assert_eq!(text(8e4, 1.0), "the body is 80000 m large; if the file is in micrometres, use --scale 1e-6");
+    assert_eq!([question(0.08, -1.0), question(0.08, 0.0)], [None, None], "the scale itself is refused");
     // Whoever has been asked is not asked again.
     let mut asked = box_mesh([180.0; 3], [2; 3]).expect("a good box");
     assert!(asked.unit_question(1.0).is_some() && asked.unit_question(1e-3).is_none());

@@ -1,10 +1,10 @@
-//! Checks of a scene's initial state: penetration of objects, obstacles and tips, and lengths that look like millimetres.
+//! Checks of a scene's initial state: penetration of objects, obstacles and tips, and [numbers in another unit](crate::unit_check).
 
 use crate::scene::Scene;
+use crate::unit_check::check_units;
 use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
 use palpate::{DeviceMode, ModelObject, ObstacleMesh, Pose, Recording, Shape, Support, Surface};
-use palpate_haptics::MotionPath;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -13,16 +13,6 @@ const PENETRATION: f64 = 1e-3;
 
 /// Depth of the points inside an object that find overlap where surfaces coincide, in mean edges.
 const INNER: f64 = 0.1;
-
-/// Diagonal of an object [m] above which it looks as if given in millimetres.
-const LARGE_OBJECT_M: f64 = 20.0;
-
-/// Distance of a path from the objects, in diagonals of all objects, above which it looks as if given in millimetres: about the
-/// geometric mean of 1 and 1000.
-const FAR_PATH: f64 = 30.0;
-
-/// Number of intervals at which a path is looked at.
-const PATH_INTERVALS: usize = 200;
 
 /// Object at the start.
 struct Placed<'a> {
@@ -47,8 +37,7 @@ struct Penetration {
 /// Warnings about the start of a scene. Costs a distance query for each surface node whose object is near another one.
 pub(crate) fn check_start(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning> {
     let placed = place(scene, objects);
-    let mut warnings = Vec::new();
-    warnings.extend(placed.iter().filter_map(large_object));
+    let mut warnings = check_units(scene, objects);
     for (at, object) in placed.iter().enumerate() {
         for (obstacle, parameters) in scene.obstacles.iter().zip(&scene.model.parameters().obstacles) {
             warnings.extend(in_obstacle(object, &obstacle.name, &parameters.shape, obstacle.pose_at(0.0)));
@@ -66,9 +55,9 @@ pub(crate) fn check_start(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning
         scene.obstacles.iter().filter_map(|obstacle| Some((&*obstacle.name, obstacle.path.as_ref()?)));
     let bases = scene.object_names.iter().zip(&scene.bases);
     let bases = bases.filter_map(|(name, path)| Some((&**name, path.as_ref()?)));
-    warnings.extend(
-        devices.chain(obstacles).chain(bases).filter_map(|(name, path)| far_path(name, path, &placed)),
-    );
+    let clamps = scene.clamps.iter().filter_map(|clamp| Some((&*clamp.name, clamp.path.as_ref()?)));
+    let paths = devices.chain(obstacles).chain(bases).chain(clamps);
+    warnings.extend(paths.filter_map(|(name, path)| scene.object_bounds.far_path(name, path)));
     warnings
 }
 
@@ -120,17 +109,6 @@ fn deepest(points: impl Iterator<Item = DVec3>, shape: &Shape, pose: Pose) -> Pe
         }
     }
     deepest
-}
-
-fn large_object(object: &Placed) -> Option<Warning> {
-    let diagonal = object.recording.surface.diagonal();
-    (diagonal > LARGE_OBJECT_M).then(|| {
-        let message = format!(
-            "the object {:?} is {diagonal:.1} m across: if its mesh is in millimetres, record it with --scale 0.001",
-            object.name
-        );
-        Warning::new(WarningKind::Units, object.name, message)
-    })
 }
 
 fn in_obstacle(object: &Placed, name: &str, shape: &Shape, pose: Pose) -> Option<Warning> {
@@ -209,23 +187,6 @@ fn tip_inside(name: &str, centre: DVec3, radius: f64, object: &Placed) -> Option
             object.name
         );
         Warning::new(WarningKind::BeginsInside, name, message)
-    })
-}
-
-fn far_path(name: &str, path: &MotionPath, placed: &[Placed]) -> Option<Warning> {
-    let nodes = || placed.iter().flat_map(Placed::nodes);
-    let (low, high) =
-        (nodes().fold(DVec3::INFINITY, DVec3::min), nodes().fold(DVec3::NEG_INFINITY, DVec3::max));
-    let diagonal = (high - low).length();
-    let at = |k: usize| path.at(path.end() * k as f64 / PATH_INTERVALS as f64).position;
-    let apart = |x: DVec3| (x - x.clamp(low, high)).length();
-    let farthest = (0..=PATH_INTERVALS).map(|k| apart(at(k))).fold(0.0, f64::max);
-    (farthest > FAR_PATH * diagonal).then(|| {
-        let message = format!(
-            "the path of {name:?} goes {farthest:.1} m away from the objects, which span {diagonal:.3} m: positions are in \
-             metres; if these are in millimetres, divide them by 1000"
-        );
-        Warning::new(WarningKind::Units, name, message)
     })
 }
 

@@ -36,6 +36,7 @@ mod mesh_source;
 mod motion;
 #[cfg(feature = "native")]
 mod node_selection;
+mod object_bounds;
 #[cfg(feature = "native")]
 mod progress;
 #[cfg(feature = "native")]
@@ -46,6 +47,7 @@ mod recording_file;
 #[cfg(feature = "logs")]
 mod replay;
 mod rows;
+mod run_check;
 mod scene;
 #[cfg(feature = "native")]
 mod scene_log;
@@ -55,6 +57,7 @@ mod step_check;
 #[cfg(feature = "native")]
 mod supports;
 mod tables;
+mod unit_check;
 mod warning;
 
 #[cfg(feature = "native")]
@@ -79,6 +82,7 @@ pub use mesh_source::{read_body, read_surface, source_name};
 pub use motion::MotionSource;
 #[cfg(feature = "native")]
 pub use node_selection::{NodeSelection, select_nodes, union_of_nodes};
+pub use object_bounds::ObjectBounds;
 #[cfg(feature = "native")]
 pub use palpate_fem::{Progress, SilentProgress};
 #[cfg(feature = "native")]
@@ -91,6 +95,7 @@ pub use recording_file::{certificate_lines, certificate_table, read_recording};
 #[cfg(feature = "logs")]
 pub use replay::{Difference, LogReplay, ReplayCursor, ReplayError, Replayed};
 pub use rows::{pose_of_row, pose_row, twist_row};
+pub use run_check::RunCheck;
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 #[cfg(feature = "native")]
 pub use scene_log::SceneLog;

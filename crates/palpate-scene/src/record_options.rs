@@ -235,6 +235,63 @@ mod tests {
     }
 
     #[test]
+    fn a_body_that_would_sag_by_more_than_its_size_is_asked_about() {
+        // By hand: 1000·9.81·0.2/(2·50) = 19.62.
+        let text = "warning: Young's modulus is 50 Pa, and the density 1000 kg/m³: under its own weight the body, 0.200 m large, would sag by 19.6 times its size. \
+                    The unit is Pa, as for fat 500 to 25000, liver 600 to 20000 and rubber 920000 to 7400000; give 1000 times as much \
+                    for kPa";
+        for (young, expected) in [(50.0, Some(text)), (1000.0, None)] {
+            let materials = MaterialChoice::Uniform(Material::isotropic(young, 0.3, 1000.0));
+            let mut told = Told::default();
+            let options = RecordOptions { materials, ..options() };
+            options.record(BodySource::Text("box:0.2x0.1x0.1/2x2x2"), &mut told).expect("a recording");
+            assert_eq!(told.0.iter().find(|text| text.contains("Young")).map(String::as_str), expected);
+            let advice = told.0.iter().find(|text| text.contains("certificate):"));
+            assert_eq!(
+                advice.is_some_and(|text| text.contains("more modes")),
+                expected.is_none(),
+                "{advice:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn damping_in_per_cent_and_density_in_grams_are_asked_about() {
+        let told = |options: &RecordOptions| {
+            let mut told = Told::default();
+            options.record(BodySource::Text("box:0.2x0.1x0.1/2x2x2"), &mut told).expect("a recording");
+            told.0
+                .into_iter()
+                .filter(|text| text.contains("damping ratio") || text.contains("density"))
+                .collect::<Vec<_>>()
+        };
+        let damped = |damping: Damping| told(&RecordOptions { damping: Some(damping), ..options() });
+        assert_eq!(
+            damped(Damping::Ratio(5.0)),
+            [
+                "warning: the damping ratio of the lowest mode is 5.000: above 1 the body creeps back in place of vibrating; give 0.05 for 5 %"
+            ]
+        );
+        let swapped = damped(Damping::Rayleigh { alpha: 2e-4, beta: 2.0 });
+        assert!(
+            swapped[0].ends_with("in place of vibrating; Rayleigh's α is in 1/s and comes first, β is in s"),
+            "{swapped:?}"
+        );
+        assert!(
+            damped(Damping::Rayleigh { alpha: 2.0, beta: 2e-4 }).is_empty()
+                && damped(Damping::Ratio(1.0)).is_empty()
+        );
+        let light = MaterialChoice::Uniform(Material::isotropic(2e4, 0.3, 1.0));
+        assert_eq!(
+            told(&RecordOptions { materials: light, ..options() }),
+            [
+                "warning: the density is 1 kg/m³, little more than that of air: the unit is kg/m³, as for foam 30, water 1000 and steel \
+              7850; give 1000 times as much for g/cm³"
+            ]
+        );
+    }
+
+    #[test]
     fn supports_damping_and_targets_are_kept() {
         let fixed = RecordOptions {
             fix: vec!["x<-0.099".into()],

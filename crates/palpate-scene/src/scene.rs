@@ -1,6 +1,7 @@
 //! Scene: a model with the names of its parts, and the paths of its devices and obstacles.
 
 use crate::devices::RealDevice;
+use crate::object_bounds::ObjectBounds;
 use crate::warning::Warning;
 use glam::DVec3;
 use palpate::{AppliedForce, DeviceInput, DeviceMode, DeviceParameters, Input, Model, Pose, State};
@@ -31,6 +32,8 @@ pub struct Scene {
     pub probes: Vec<ProbeLabel>,
     /// Gravity over time, rows of t [s] and x, y, z [m/s²]; none if it is the model's.
     pub gravity: Option<MotionPath>,
+    /// Bounding box of all objects at the start.
+    pub object_bounds: ObjectBounds,
     /// Warnings for the author of the scene.
     pub warnings: Vec<Warning>,
     /// Values that were chosen automatically, a line each.

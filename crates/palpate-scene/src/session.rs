@@ -1,7 +1,10 @@
 //! Session of a scene: what its parts do in real time.
 
-use crate::scene::Scene;
-use palpate_haptics::{Scheduling, Session, SessionDevice};
+use crate::run_check::{no_contact, penetration};
+use crate::scene::{Scene, SceneDevice};
+use crate::warning::{Warning, WarningKind};
+use palpate::DeviceMode;
+use palpate_haptics::{Report, Scheduling, Session, SessionDevice};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -29,5 +32,30 @@ impl Scene {
             cycles: None,
             listener: None,
         }
+    }
+
+    /// Warnings of a session that has ended.
+    pub fn session_warnings(&self, report: &Report) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if report.unsolved_steps > 0 {
+            let message =
+                format!("in {} steps contacts could not be solved, or were left out", report.unsolved_steps);
+            warnings.push(Warning::new(WarningKind::Unsolved, "", message));
+        }
+        let objects =
+            self.object_names.iter().zip(self.model.recordings()).zip(&report.largest_penetration_m);
+        warnings
+            .extend(objects.filter_map(|((name, recording), depth)| penetration(name, recording, *depth)));
+        let refused = self.devices.iter().zip(&report.refused_motions);
+        warnings.extend(refused.filter(|(_, refused)| refused.count > 0).map(|(device, refused)| {
+            let message = format!("the device {:?}: {refused}", device.name);
+            Warning::new(WarningKind::RefusedMotions, &device.name, message)
+        }));
+        // The path of a tip was meant to touch.
+        let is_meant = |device: &SceneDevice| device.mode == DeviceMode::Touch && device.path.is_some();
+        let devices = self.devices.iter().zip(&report.touching_steps);
+        let silent = devices.filter(|(device, touching)| is_meant(device) && **touching == 0);
+        warnings.extend(silent.map(|(device, _)| no_contact(&device.name, f64::INFINITY)));
+        warnings
     }
 }

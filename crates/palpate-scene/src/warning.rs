@@ -37,9 +37,11 @@ pub enum WarningKind {
     BeginsInside,
     /// Two objects overlap at the start.
     Overlap,
-    /// Lengths look like millimetres.
+    /// Numbers look as if given in another unit: millimetres, milliseconds, per cent.
     Units,
-    /// A tip, or an obstacle that moves, touched nothing.
+    /// Gravity lifts objects off every plane.
+    Gravity,
+    /// A tip touched nothing.
     NoContact,
     /// An object was pressed into something.
     Penetration,

@@ -1,8 +1,11 @@
 //! Scenes of texts, for programs that move the devices: parts in memory, and devices without a path.
 
 use glam::DVec3;
-use palpate::{AppliedForce, DeviceMode, Recording};
-use palpate_scene::{PartsInMemory, RunMode, Scene, SceneError, SceneErrorKind, read_scene, read_scene_text};
+use palpate::{AppliedForce, DeviceMode, Pose, Recording, State, step};
+use palpate_scene::{
+    PartsInMemory, RunCheck, RunMode, Scene, SceneError, SceneErrorKind, Warning, WarningKind, read_scene,
+    read_scene_text,
+};
 use palpate_testkit::FREE_BLOCK_FILE;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -82,5 +85,146 @@ fn a_scene_file_needs_a_mover_for_every_device() {
         let error = read_scene(&file, RunMode::Offline).err().expect("nobody moves it");
         assert_eq!((error.kind, error.key.as_deref()), (SceneErrorKind::Missing, Some("path")));
         assert!(error.message.starts_with(needs), "{}", error.message);
+    }
+}
+
+#[test]
+fn positions_of_a_program_are_checked_as_those_of_a_path() {
+    let scene = read(TEXT, "0,0,0,3000\n1,0,0,1000\n").expect("a scene");
+    let about = |what: &str, name: &str| {
+        format!(
+            "{what} of {name:?} goes 2999.9 m away from the objects, which span 0.245 m: positions are in metres; if these are in \
+             millimetres, divide them by 1000"
+        )
+    };
+    let of_path = scene.warnings.last().expect("a warning");
+    assert_eq!((of_path.kind, &*of_path.message), (WarningKind::Units, &*about("the path", "guided")));
+    let hand = [DVec3::ZERO, DVec3::Z * 3000.0, DVec3::Z * 1000.0];
+    let state = State::new(&scene.model);
+    let mut check = RunCheck::new(&scene);
+    let told = check.add_positions(&scene, "finger", hand.into_iter(), &state).cloned().expect("a warning");
+    assert_eq!(
+        (told.kind, &*told.part, told.message),
+        (WarningKind::Units, "finger", about("the motion", "finger"))
+    );
+    assert_eq!(check.add_positions(&scene, "finger", hand.into_iter(), &state), None, "it is told once");
+    // One that follows an object is near it, however far this has gone.
+    let object = Pose { position: DVec3::Z * 3000.0, ..Pose::IDENTITY };
+    let following = scene.far_positions("finger", hand[..2].iter().copied(), || vec![object]);
+    assert!(
+        following.is_some_and(|warning| warning.message == about("the motion", "finger")),
+        "it left the start"
+    );
+    assert_eq!(scene.far_positions("finger", hand[1..2].iter().copied(), || vec![object]), None);
+    assert_eq!(scene.far_positions("finger", [DVec3::Z * 7.0].into_iter(), Vec::new), None);
+}
+
+#[test]
+fn a_tip_that_moves_and_touches_nothing_is_told_of() {
+    let scene = read(TEXT, "0,0,0,3\n1,0,0,3\n").expect("a scene");
+    let mut state = State::new(&scene.model);
+    let mut check = RunCheck::new(&scene);
+    let mut input = scene.input_at(0.0);
+    input.devices[0].position = DVec3::X;
+    let parts = |check: &RunCheck| {
+        check.warnings(&scene).into_iter().map(|own| (own.kind, own.part)).collect::<Vec<_>>()
+    };
+    let guided = (WarningKind::NoContact, "guided".to_string());
+    step(&scene.model, &mut state, &input);
+    check.add(&input, &state);
+    assert_eq!(
+        parts(&check),
+        std::slice::from_ref(&guided),
+        "a path was meant to touch; a tip that rests was not"
+    );
+    input.devices[0].position = 2.0 * DVec3::X;
+    step(&scene.model, &mut state, &input);
+    check.add(&input, &state);
+    assert_eq!(parts(&check), [(WarningKind::NoContact, "finger".to_string()), guided]);
+    assert_eq!(check.warnings(&scene)[0].message, "finger touched nothing");
+    (0..10).for_each(|_| check.sample_surfaces(&scene, &input, &state, &mut Vec::new()));
+    let messages: Vec<String> = check.warnings(&scene).into_iter().map(|own| own.message).collect();
+    assert_eq!(
+        messages[0],
+        "finger touched nothing; its centre stayed about 1.9000 m or more from all objects"
+    );
+}
+
+#[test]
+fn numbers_in_another_unit_get_a_warning_with_their_part() {
+    let object = "[[object]]\nname = \"cube\"\nrecording = \"<cube>\"\n";
+    let floor = "[[plane]]\nname = \"floor\"\npoint = [0.0, 0.0, -0.05]\nnormal = [0.0, 0.0, 1.0]\n";
+    let other =
+        |at: f64| format!("{}position = [0.0, 0.0, {at:?}]\n", object.replace("\"cube\"", "\"other\""));
+    let finger = |keys: &str| format!("[[device]]\nname = \"finger\"\nmode = \"touch\"\n{keys}\n");
+    let apart = |distance: f64| {
+        format!(
+            "begins {distance:.1} m away from everything else, and is 0.245 m across: positions are in metres; if these are in \
+             millimetres, divide them by 1000"
+        )
+    };
+    let lengths =
+        "and the objects span 0.245 m: lengths are in metres; if this is in millimetres, divide it by 1000";
+    for (text, kind, part, message) in [
+        (format!("step = 1.0\n{object}"), WarningKind::Units, "", "the step is 1 s long: it is in seconds, 0.001 for 1 ms".to_string()),
+        (
+            format!("gravity = [0.0, 0.0, -981.0]\n{object}"),
+            WarningKind::Units,
+            "",
+            "gravity is 981 m/s²: it is in m/s², 9.81 on the Earth".to_string(),
+        ),
+        (
+            format!("gravity = [0.0, 0.0, 9.81]\n{object}{floor}"),
+            WarningKind::Gravity,
+            "",
+            "gravity [0.0, 0.0, 9.81] has the direction of every plane's normal, out of the solid side, and lifts the objects off: turn one of them round"
+                .to_string(),
+        ),
+        (
+            format!("{object}friction = 60.0\n"),
+            WarningKind::Units,
+            "cube",
+            "the friction of \"cube\" is 60: it is a coefficient, 0.6 for 60 %".to_string(),
+        ),
+        (
+            format!("{object}{}", finger("tip_radius = 5.0")),
+            WarningKind::Units,
+            "finger",
+            format!("the tip of \"finger\" has a radius of 5 m, {lengths}"),
+        ),
+        (
+            format!("{object}{}", finger("tip_radius = 0.01\npatch_radius = 40.0")),
+            WarningKind::Units,
+            "finger",
+            format!("the patch of \"finger\" has a radius of 40 m, {lengths}"),
+        ),
+        (
+            format!("{object}{}", other(120.0)),
+            WarningKind::Units,
+            "cube",
+            format!("the object \"cube\" {}", apart(119.8)),
+        ),
+        (
+            format!("{object}{}", floor.replace("-0.05", "-50.0")),
+            WarningKind::Units,
+            "cube",
+            format!("the object \"cube\" {}", apart(49.9)),
+        ),
+    ] {
+        let warnings = read(&text, "").expect("a scene").warnings;
+        let found = warnings.iter().find(|warning| warning.kind == kind).unwrap_or_else(|| panic!("{text}: {warnings:?}"));
+        assert_eq!((&*found.part, &*found.message), (part, &*message));
+    }
+    // What is usual is not asked about: ice, rubber, what does not slip, a fall of 5 m, weight towards a floor, and a wall.
+    let wall = "[[plane]]\nname = \"wall\"\npoint = [1.0, 0.0, 0.0]\nnormal = [-1.0, 0.0, 0.0]\n";
+    for text in [
+        format!("gravity = [0.0, 0.0, -9.81]\n{object}friction = 0.0\n{floor}friction = 4.0\n"),
+        format!("gravity = [0.0, 0.0, 9.81]\n{object}friction = 1e3\n{wall}"),
+        format!("{object}{}", floor.replace("-0.05", "-5.0")),
+        format!("{object}{}", finger("tip_radius = 0.01\npatch_radius = 0.2")),
+    ] {
+        let warnings = read(&text, "").expect("a scene").warnings;
+        let asked = |warning: &&Warning| matches!(warning.kind, WarningKind::Units | WarningKind::Gravity);
+        assert_eq!(warnings.iter().find(asked), None, "{text}");
     }
 }

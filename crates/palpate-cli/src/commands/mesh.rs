@@ -156,13 +156,10 @@ fn as_text(name: &str, report: &MeshReport) -> Result<String, std::fmt::Error> {
     if let Some(volume) = report.volume.as_ref().filter(|_| is_surface) {
         write_volume(&mut out, volume)?;
     }
-    // A question about the unit is among the warnings of solids.
     for warning in &report.warnings {
         writeln!(out, "  warning      {warning}")?;
     }
-    if let Some(question) =
-        report.unit_question.as_ref().filter(|question| !report.warnings.contains(question))
-    {
+    if let Some(question) = &report.unit_question {
         writeln!(out, "  unit         {question}")?;
     }
     Ok(out)

@@ -85,7 +85,7 @@ fn a_report_shows_what_a_mesh_holds() {
     let question = json["unit_question"].as_str().expect("a question");
     assert!(
         question.starts_with("the body is only 0.00002")
-            && question.ends_with("is the scale right? (--scale)"),
+            && question.ends_with(" with --scale 0.0001; if the file is in metres, use --scale 1"),
         "{question}"
     );
 }

@@ -195,7 +195,8 @@ fn lattice_about(prepared: &Prepared, cell: f64) -> Result<Lattice, MeshError> {
             let middle = (too_small * enough).sqrt();
             *(if points(middle) > MAX_POINTS { &mut too_small } else { &mut enough }) = middle;
         }
-        return Err(MeshError::TooManyCells { cell_size: cell, points: points(cell), smallest: enough });
+        let (points, extent) = (points(cell), extent.max_element());
+        return Err(MeshError::TooManyCells { cell_size: cell, extent, points, smallest: enough });
     }
     let origin = low - DVec3::splat((1.0 + OFFSET) * cell);
     Ok(Lattice { origin, cell, cells: counts(cell).to_array().map(|count| count as i64) })

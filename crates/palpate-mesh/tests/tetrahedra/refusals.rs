@@ -47,12 +47,12 @@ fn cell_sizes_that_cannot_be_are_refused() {
     let plate = shapes::slab([0.2, 0.2, 0.004]);
     assert_eq!(
         refusal(&plate, Some(0.02)),
-        "no tetrahedron of cells of 2.000e-2 m fits into the surface, which is about 3.8e-3 m thick: give a --cell-size below that"
+        "no tetrahedron of cells of 2.000e-2 m fits into the surface, which is about 3.8e-3 m thick: give a --cell-size below that, in metres"
     );
     let text = refusal(&ball, Some(1e-5));
     assert_eq!(
         text,
-        "cells of 1.000e-5 m about the surface need 2.0e12 lattice points, of 1.0e6 at most: give a --cell-size of 1.316e-3 m or more"
+        "cells of 1.000e-5 m about the surface, which is 1.000e-1 m large, need 2.0e12 lattice points, of 1.0e6 at most: give a --cell-size of 1.316e-3 m or more, or the --scale of the file's unit to metres"
     );
 }
 

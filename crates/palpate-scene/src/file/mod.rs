@@ -16,6 +16,7 @@ mod tables;
 use crate::error::{SceneError, SceneErrorKind};
 use crate::files::read_regular_file;
 use crate::initial_checks::check_start;
+use crate::object_bounds::ObjectBounds;
 use crate::scene::Scene;
 pub(crate) use edited_text::EditedText;
 use entries::{ReadError, read_file_text};
@@ -237,6 +238,10 @@ fn assemble(
     warnings.extend(objects::doubtful_recordings(&objects, &object_names));
     warnings.extend(tables::short_tables(&objects, &object_names));
     let inputs = inputs(source, file);
+    let nodes = objects.iter().flat_map(|ModelObject { recording, start, .. }| {
+        recording.surface.positions.iter().map(|x| start.pose.world_from_body(*x))
+    });
+    let object_bounds = ObjectBounds::of(nodes);
     let mut scene = Scene {
         model: Arc::new(model),
         object_names,
@@ -247,6 +252,7 @@ fn assemble(
         #[cfg(feature = "native")]
         probes,
         gravity,
+        object_bounds,
         warnings,
         choices,
         inputs,

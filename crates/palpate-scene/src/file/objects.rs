@@ -8,7 +8,8 @@ use crate::recording_file::read_recording;
 use crate::warning::{Warning, WarningKind};
 use glam::{DQuat, DVec3};
 use palpate::{
-    Certificate, InitialDeformation, ModelObject, ObjectStart, Pose, Recording, ResponseForm, Support, Twist,
+    Certificate, InitialDeformation, Material, ModelObject, ObjectStart, Pose, Recording, ResponseForm,
+    Support, Twist,
 };
 use palpate_haptics::{Columns, MotionPath};
 use std::sync::Arc;
@@ -118,9 +119,17 @@ pub(super) fn doubtful_recordings<'a>(
         let certificate = object.recording.metadata.certificate.as_ref()?;
         let error = certificate.force_error_max;
         (error > Certificate::FORCE_ERROR_WARNING).then(|| {
+            let (low, high) = object.recording.surface.extent();
+            let size = (high - low).max_element();
+            let sags = |material: &Material| material.sag(size) > 1.0;
+            let advice = if object.recording.metadata.materials.iter().all(sags) {
+                "it would sag by more than its size under its own weight: are its size in metres and its Young's modulus in Pa?"
+            } else {
+                "record it with more modes"
+            };
             let message = format!(
                 "even in a smooth press at one place the force of {name:?} is off by up to {:.0} % (certificate of its \
-                 recording): record it with more modes",
+                 recording): {advice}",
                 100.0 * error
             );
             Warning::new(WarningKind::ForceError, name, message)

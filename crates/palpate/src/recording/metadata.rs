@@ -157,6 +157,12 @@ impl Material {
     pub const fn isotropic(young_pa: f64, poisson: f64, density_kg_m3: f64) -> Self {
         Self { region: String::new(), young_pa, poisson, density_kg_m3, stiffness_pa: None }
     }
+
+    /// Sag of a column of a height [m] under its own weight, ρ·g·L/2E, as a share of the height [1].
+    pub fn sag(&self, height_m: f64) -> f64 {
+        const EARTH_M_S2: f64 = 9.81;
+        self.density_kg_m3 * EARTH_M_S2 * height_m / (2.0 * self.young_pa)
+    }
 }
 
 /// Damping of the elastic modes. The rigid motion is not damped.

@@ -104,7 +104,7 @@ impl Outputs {
         took: Duration,
     ) -> Result<(), Failure> {
         self.steps += 1;
-        self.summary.take(state.output(), took);
+        self.summary.take(input, state, took);
         if self.steps.is_multiple_of(self.sample_every) {
             self.summary.sample_surfaces(scene, input, state);
         }

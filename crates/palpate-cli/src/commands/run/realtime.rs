@@ -1,7 +1,7 @@
 //! A scene in real time: the processes of `palpate-haptics`, with devices that follow paths or are held by simulated or real
 //! hands.
 
-use super::realtime_report::{json, text, warnings};
+use super::realtime_report::{json, text};
 use super::warnings::refuse;
 use super::{Arguments, count_steps};
 use crate::commands::guard::attach_guarded;
@@ -137,7 +137,7 @@ pub(super) fn run(scene: &Scene, arguments: &Arguments) -> Result<(), Failure> {
         print(&text(scene, &report, links, options.log.as_deref()))?;
     }
     kept?;
-    refuse(arguments.strict, &warnings(scene, &report))
+    refuse(arguments.strict, &scene.session_warnings(&report))
 }
 
 /// Begins a log that tells of its first failure at once.

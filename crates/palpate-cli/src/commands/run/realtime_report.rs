@@ -1,11 +1,10 @@
 //! Report of a run in real time, as text and as JSON.
 
-use super::warnings::{no_contact, penetration, should_touch};
 use palpate_export::part_of;
 use palpate_haptics::link::LinkCounts;
 use palpate_haptics::log::LogSummary;
 use palpate_haptics::{DeviceReport, Percentiles, Report, SafetyCounts, Timing};
-use palpate_scene::{Scene, Warning, WarningKind};
+use palpate_scene::Scene;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -96,7 +95,7 @@ pub(super) fn json(scene: &Scene, report: &Report, links: Option<LinkCounts>) ->
             "old": links.old,
             "garbage": links.garbage,
         })),
-        "warnings": super::warnings::json(scene, &warnings(scene, report)),
+        "warnings": super::warnings::json(scene, &scene.session_warnings(report)),
         "log": report.log.map(|log| json!({ "steps": log.steps, "missed": log.missed, "whole": !log.is_cut })),
     })
 }
@@ -160,7 +159,7 @@ pub(super) fn text(scene: &Scene, report: &Report, links: Option<LinkCounts>, lo
             report.steps_out_of_budget, parameters.solver_budget
         );
     }
-    out += &super::warnings::text(&warnings(scene, report));
+    out += &super::warnings::text(&scene.session_warnings(report));
     if let (Some(summary), Some(path)) = (report.log, log) {
         out += &log_line(summary, path);
     }
@@ -178,27 +177,6 @@ fn log_line(LogSummary { steps, missed, is_cut }: LogSummary, path: &Path) -> St
         }
     };
     format!("  log          {steps} steps in {}{lost}\n", of.display())
-}
-
-/// Warnings of the run.
-pub(super) fn warnings(scene: &Scene, report: &Report) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    if report.unsolved_steps > 0 {
-        let message =
-            format!("in {} steps contacts could not be solved, or were left out", report.unsolved_steps);
-        warnings.push(Warning::new(WarningKind::Unsolved, "", message));
-    }
-    let objects = scene.object_names.iter().zip(scene.model.recordings()).zip(&report.largest_penetration_m);
-    warnings.extend(objects.filter_map(|((name, recording), depth)| penetration(name, recording, *depth)));
-    let refused = scene.devices.iter().zip(&report.refused_motions).filter(|(_, refused)| refused.count > 0);
-    warnings.extend(refused.map(|(device, refused)| {
-        let message = format!("the device {:?}: {refused}", device.name);
-        Warning::new(WarningKind::RefusedMotions, &device.name, message)
-    }));
-    let devices = scene.devices.iter().zip(&report.touching_steps);
-    let silent = devices.filter(|(device, touching)| should_touch(device) && **touching == 0);
-    warnings.extend(silent.map(|(device, _)| no_contact(device, None)));
-    warnings
 }
 
 /// Forces, passivity and safety of a device, in a line.

@@ -2,16 +2,13 @@
 
 use super::warnings;
 use glam::DVec3;
-use palpate::{ClampOutput, Collider, Input, Output, ResidualFieldCache, State, StepStatus};
+use palpate::{ClampOutput, Input, Output, ResidualFieldCache, State, StepStatus};
 use palpate_export::ProbeReading;
 use palpate_haptics::percentile_us;
-use palpate_scene::{Scene, SceneClamp, Warning, WarningKind};
+use palpate_scene::{RunCheck, Scene, SceneClamp, Warning};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Displacement, as a share of the object's diagonal, above which linear elasticity is inaccurate.
-const LARGE_DEFORMATION: f64 = 0.1;
 
 /// Summary of a run.
 pub struct Summary {
@@ -24,12 +21,9 @@ pub struct Summary {
     clamp_maxima: Vec<[f64; 2]>,
     /// Readings of the probes at the end.
     probes: Vec<ProbeReading>,
-    /// Maxima over all steps.
+    /// Largest residual and number of iterations.
     status: StepStatus,
-    /// Steps with unsolved islands, with islands out of budget, and with dropped contacts.
-    unsolved_steps: usize,
     steps_out_of_budget: usize,
-    dropping_steps: usize,
     /// Largest number of contacts in a step, and largest contact force [N].
     max_contacts: usize,
     max_contact_force: f64,
@@ -39,13 +33,9 @@ pub struct Summary {
     index: Option<PathBuf>,
     /// Sound file, and the largest size of its samples [1, of full scale].
     sound: Option<(PathBuf, f32)>,
-    /// Largest sampled displacement of the surface, by object [m], and the fields that its samples share.
-    deformation: Vec<f64>,
+    check: RunCheck,
+    /// Fields that the samples of the surfaces share.
     residual_fields: Vec<ResidualFieldCache>,
-    /// Largest penetration by object [m]: of its contacts in every step, of all its nodes in obstacles in sampled steps.
-    penetration: Vec<f64>,
-    /// Whether each device has touched something, and its least sampled distance from the surfaces until then [m].
-    touched: Vec<(bool, f64)>,
 }
 
 impl Summary {
@@ -59,47 +49,33 @@ impl Summary {
             clamp_maxima: vec![[0.0; 2]; scene.clamps.len()],
             probes: Vec::new(),
             status: StepStatus::default(),
-            unsolved_steps: 0,
             steps_out_of_budget: 0,
-            dropping_steps: 0,
             max_contacts: 0,
             max_contact_force: 0.0,
             start_energy: start.energy.stored(),
             times_ns: Vec::with_capacity(steps),
             index: None,
             sound: None,
-            deformation: vec![0.0; scene.object_names.len()],
-            residual_fields: vec![ResidualFieldCache::default(); scene.object_names.len()],
-            penetration: vec![0.0; scene.object_names.len()],
-            touched: vec![(false, f64::INFINITY); scene.devices.len()],
+            check: RunCheck::new(scene),
+            residual_fields: Vec::new(),
         }
     }
 
     /// Adds a step and its compute time.
-    pub(super) fn take(&mut self, output: &Output, took: Duration) {
+    pub(super) fn take(&mut self, input: &Input, state: &State, took: Duration) {
+        let output = state.output();
+        self.check.add(input, state);
         self.times_ns.push(took.as_nanos().min(u128::from(u32::MAX)) as u32);
         for (forces, device) in self.forces.iter_mut().zip(&output.devices) {
             forces.push(device.force_on_hand);
         }
-        for (largest, object) in self.penetration.iter_mut().zip(&output.objects) {
-            *largest = largest.max(object.penetration_m);
-        }
         let obstacles = output.obstacles.iter().map(|obstacle| [obstacle.force, obstacle.torque]);
         raise(&mut self.obstacle_maxima, obstacles);
         raise(&mut self.clamp_maxima, output.clamps.iter().map(|clamp| [clamp.force, clamp.torque]));
-        for contact in &output.contacts {
-            if let Collider::Device(number) = contact.against {
-                self.touched[number].0 = true;
-            }
-        }
         let (all, now) = (&mut self.status, &output.status);
         all.solver_residual_m = all.solver_residual_m.max(now.solver_residual_m);
         all.iterations = all.iterations.max(now.iterations);
-        all.dependent_rows = all.dependent_rows.max(now.dependent_rows);
-        all.dropped_contacts = all.dropped_contacts.max(now.dropped_contacts);
-        self.unsolved_steps += usize::from(now.unsolved_islands > 0);
         self.steps_out_of_budget += usize::from(now.islands_out_of_budget > 0);
-        self.dropping_steps += usize::from(now.dropped_contacts > 0);
         self.max_contacts = self.max_contacts.max(output.contacts.len());
         let forces = output.contacts.iter().map(|contact| contact.force.length());
         self.max_contact_force = forces.fold(self.max_contact_force, f64::max);
@@ -119,39 +95,9 @@ impl Summary {
         (self.index, self.sound) = (index, sound);
     }
 
-    /// Samples the deformation, and with all nodes the penetration in obstacles and the distance of tips.
+    /// Samples the surfaces for the check of the run.
     pub(super) fn sample_surfaces(&mut self, scene: &Scene, input: &Input, state: &State) {
-        let obstacles = scene.model.parameters().obstacles.iter().zip(&input.obstacles);
-        let output = state.output();
-        for (object, recording) in scene.model.recordings().enumerate() {
-            let mut displacement = vec![DVec3::ZERO; recording.surface.positions.len()];
-            let (deformation, fields) = (state.deformation(object), &mut self.residual_fields[object]);
-            deformation.surface_displacement_cached(&scene.model, fields, &mut displacement);
-            let largest = &mut self.deformation[object];
-            *largest = displacement.iter().map(|u| u.length()).fold(*largest, f64::max);
-            let pose = output.objects[object].pose;
-            let mut surface = recording.surface.clone();
-            surface.positions.iter_mut().zip(&displacement).for_each(|(x, u)| *x += *u);
-            let reach = surface.radius();
-            for (obstacle, at) in obstacles.clone() {
-                let distance = |x: DVec3, max_distance: f64| {
-                    let x = at.body_from_world(pose.world_from_body(x));
-                    obstacle
-                        .shape
-                        .signed_distance(x, max_distance)
-                        .map_or(f64::INFINITY, |(distance, _)| distance)
-                };
-                if distance(DVec3::ZERO, reach) <= reach {
-                    let depths = surface.positions.iter().map(|x| -distance(*x, 0.0));
-                    self.penetration[object] = depths.fold(self.penetration[object], f64::max);
-                }
-            }
-            let tips = self.touched.iter_mut().zip(&input.devices);
-            for ((_, nearest), device) in tips.filter(|((touched, _), _)| !touched) {
-                let found = surface.nearest(pose.body_from_world(device.position));
-                *nearest = found.map_or(*nearest, |(_, distance)| nearest.min(distance));
-            }
-        }
+        self.check.sample_surfaces(scene, input, state, &mut self.residual_fields);
     }
 
     /// Quantile of the compute times [µs].
@@ -181,7 +127,7 @@ impl Summary {
             .object_names
             .iter()
             .zip(&self.last.objects)
-            .zip(self.deformation.iter().zip(&self.penetration))
+            .zip(self.check.deformation.iter().zip(&self.check.penetration))
             .map(|((name, object), (deformation, penetration))| {
                 let q = object.pose.orientation;
                 json!({
@@ -270,9 +216,9 @@ impl Summary {
             "solver": {
                 "constraint_residual_max_m": self.status.solver_residual_m,
                 "iterations_max": self.status.iterations,
-                "dependent_rows": self.status.dependent_rows,
-                "dropped_contacts": self.status.dropped_contacts,
-                "unsolved_steps": self.unsolved_steps,
+                "dependent_rows": self.check.dependent_rows,
+                "dropped_contacts": self.check.dropped_contacts,
+                "unsolved_steps": self.check.unsolved_steps,
                 "steps_out_of_budget": self.steps_out_of_budget,
             },
             "warnings": warnings::json(scene, &self.warnings(scene)),
@@ -297,7 +243,7 @@ impl Summary {
             );
         }
         for ((name, object), deformation) in
-            scene.object_names.iter().zip(&self.last.objects).zip(&self.deformation)
+            scene.object_names.iter().zip(&self.last.objects).zip(&self.check.deformation)
         {
             // Adding 0 turns −0 into 0.
             let (p, v) = (object.pose.position + DVec3::ZERO, object.twist.linear + DVec3::ZERO);
@@ -332,7 +278,7 @@ impl Summary {
             );
         }
         if self.max_contacts > 0 {
-            let deepest = self.penetration.iter().copied().fold(0.0, f64::max);
+            let deepest = self.check.penetration.iter().copied().fold(0.0, f64::max);
             out += &format!(
                 "  contacts     {} at once at most, {:.5} N in one at most, {:.3} mm of penetration at most\n",
                 self.max_contacts,
@@ -360,50 +306,7 @@ impl Summary {
 
     /// Warnings of the run.
     pub(super) fn warnings(&self, scene: &Scene) -> Vec<Warning> {
-        let mut all = Vec::new();
-        let objects = scene.model.recordings().zip(&scene.object_names);
-        for ((recording, name), deformation) in objects.clone().zip(&self.deformation) {
-            let share = deformation / recording.surface.diagonal();
-            if share > LARGE_DEFORMATION {
-                let message = format!(
-                    "{name} deforms by {:.0} % of its size; linear elasticity is meant for small strain",
-                    100.0 * share
-                );
-                all.push(Warning::new(WarningKind::LargeDeformation, name, message));
-            }
-        }
-        let depths = objects.zip(&self.penetration);
-        all.extend(
-            depths.filter_map(|((recording, name), depth)| warnings::penetration(name, recording, *depth)),
-        );
-        let silent = scene.devices.iter().zip(&self.touched);
-        let silent = silent.filter(|(device, (touched, _))| warnings::should_touch(device) && !touched);
-        all.extend(silent.map(|(device, (_, nearest))| warnings::no_contact(device, Some(*nearest))));
-        let of_scene = |kind: WarningKind, message: String| Warning::new(kind, "", message);
-        if self.unsolved_steps > 0 {
-            let message = format!(
-                "in {} steps contacts could not be solved, and gave a part of their force or none: use a shorter step",
-                self.unsolved_steps
-            );
-            all.push(of_scene(WarningKind::Unsolved, message));
-        }
-        if self.dropping_steps > 0 {
-            let message = format!(
-                "in {} steps contacts were left out, up to {} at once: raise max_contact_points above {}",
-                self.dropping_steps,
-                self.status.dropped_contacts,
-                scene.model.parameters().max_contact_points
-            );
-            all.push(of_scene(WarningKind::DroppedContacts, message));
-        }
-        if self.status.dependent_rows > 0 {
-            let message = format!(
-                "{} held directions repeat others and were given no force",
-                self.status.dependent_rows
-            );
-            all.push(of_scene(WarningKind::DependentRows, message));
-        }
-        all
+        self.check.warnings(scene)
     }
 
     /// Energy balance as a line.
