@@ -3,8 +3,8 @@
 
 use glam::{DQuat, DVec3};
 use palpate::{
-    DeviceInput, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose, Recording, Shape,
-    State, Twist, step,
+    Collider, DeviceInput, Input, Model, ModelObject, ModelParameters, ObjectStart, Obstacle, Pose,
+    Recording, Shape, State, Twist, step,
 };
 use palpate_testkit::{
     GRAVITY_M_S2, energy_imbalance, finger, floor, free_block, model_and_state, object_at, subdivided,
@@ -28,6 +28,9 @@ const SOLVED: f64 = 1e-9;
 
 /// Half the block's length less a hundredth [m]: its corners are beyond.
 const AT_THE_CORNERS_M: f64 = 0.099;
+
+/// Relative difference of the forces of a grip by 24 samples and few nodes between them, and by all nodes [1].
+const GRIP: f64 = 0.05;
 
 fn block() -> Arc<Recording> {
     Arc::new(subdivided(&free_block(), 2))
@@ -154,4 +157,52 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
         }
     }
     assert!(most.iter().all(|most| *most > 0), "{most:?}");
+}
+
+#[test]
+fn nodes_between_contact_samples_leave_room_for_samples() {
+    // Two boxes grip the block, which stands on a floor: with all the nodes that are too deep there are more contacts than room.
+    const HALF_LENGTH_M: f64 = 0.1;
+    const HALF_BOX_M: f64 = 0.05;
+    const PRESSED_M: f64 = 8e-3;
+    let recording = Arc::new(subdivided(&free_block(), 3));
+    let grip = |max_contact_samples: usize, max_contact_points: usize| {
+        let shape = Shape::Box { half_extents: DVec3::splat(HALF_BOX_M) };
+        let beside = |side: f64| at(DVec3::new(side * (HALF_LENGTH_M + HALF_BOX_M), HALF_BOX_M, 0.0));
+        let jaws =
+            [-1.0, 1.0].map(|side| Obstacle { shape: shape.clone(), pose: beside(side), friction: 0.5 });
+        let parameters = ModelParameters {
+            gravity: GRAVITY,
+            obstacles: [vec![floor(0.5)], jaws.to_vec()].concat(),
+            max_contact_samples,
+            max_contact_points,
+            ..ModelParameters::for_reference()
+        };
+        let object = object_at(&recording, DVec3::Y * HALF_BOX_M, DVec3::ZERO);
+        let (model, mut state) = model_and_state(parameters, vec![object]);
+        let mut poses = vec![Pose::IDENTITY, beside(-1.0), beside(1.0)];
+        let mut dropped = 0;
+        for number in 1..=400 {
+            let pressed = PRESSED_M * (f64::from(number) / 200.0).min(1.0);
+            for (pose, side) in poses[1..].iter_mut().zip([-1.0, 1.0]) {
+                pose.position.x = side * (HALF_LENGTH_M + HALF_BOX_M - pressed);
+            }
+            let output = step(&model, &mut state, &Input { obstacles: poses.clone(), ..Input::default() });
+            dropped += output.status.dropped_contacts;
+        }
+        let jaw = |number: usize| {
+            let contacts =
+                state.output().contacts.iter().filter(move |c| c.against == Collider::Obstacle(number));
+            contacts.map(|c| c.force.x.abs()).sum::<f64>()
+        };
+        ([jaw(1), jaw(2)], dropped)
+    };
+    let (by_nodes, none) = grip(usize::MAX, 1024);
+    assert_eq!(none, 0);
+    let (by_samples, dropped) = grip(24, 120);
+    assert_eq!(dropped, 0);
+    for (got, expected) in by_samples.into_iter().zip(by_nodes) {
+        println!("{got} {expected}");
+        assert!((got - expected).abs() < GRIP * expected, "{got} N for {expected} N");
+    }
 }
