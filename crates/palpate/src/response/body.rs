@@ -282,7 +282,7 @@ impl Body {
 
     /// Outward unit normal of a vertex of a footprint's surface at rest [body]; zero on a sheet of no thickness.
     pub(crate) fn outward_normal(&self, footprint: Footprint, vertex: usize) -> DVec3 {
-        self.samples(footprint).map_or(self.normals[vertex], |samples| samples.normal(vertex))
+        self.samples(footprint).map_or_else(|| self.normals[vertex], |samples| samples.normal(vertex))
     }
 
     /// Height [m] of the smooth surface over a location; 0 on the decimated surface between contact samples, which lie on it.

@@ -14,7 +14,7 @@ use core::cmp::Reverse;
 use glam::DVec3;
 
 /// Lower limit of the cosine between a triangle that fills a hole and the nearest of those removed [1].
-const MIN_TURN_COSINE: f64 = 0.3;
+const MIN_TURN_COSINE: f64 = 0.6;
 
 /// Lower limit of the shape quality of a triangle that fills a hole [1]; 1 for an equilateral one.
 const MIN_SHAPE: f64 = 0.02;
@@ -135,7 +135,7 @@ impl DecimatedMesh<'_> {
                     continue;
                 }
                 let mut best = (0.0_f64, 0);
-                for k in i + 1..j {
+                for k in (i + 1..j).rev() {
                     let beside = parts[i * count + k].0.min(parts[k * count + j].0);
                     if beside > best.0 {
                         let quality = self.quality([ring[i], ring[k], ring[j]], &removed).min(beside);
@@ -273,8 +273,9 @@ mod tests {
     fn a_closed_surface_stays_closed_and_keeps_its_sides() {
         let block = block();
         let whole = volume(&block.positions, &block.triangles);
-        for (surface, spacings) in [(&block, [0.02, 0.035, 0.06, 0.09]), (&ball(4), [0.15, 0.25, 0.4, 0.6])] {
-            for spacing in spacings {
+        let widths = [1.0, 1.2, 1.45, 1.75, 2.1, 2.5, 3.0, 3.6, 4.5];
+        for (surface, finest) in [(&block, 0.02), (&ball(4), 0.15)] {
+            for spacing in widths.map(|width| width * finest) {
                 let nodes = poisson_disk_sample(surface, spacing);
                 let triangles = decimate(surface, &nodes).expect("a surface");
                 let mut sides = BTreeMap::new();
