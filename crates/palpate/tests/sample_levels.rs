@@ -16,7 +16,7 @@ fn ball() -> Recording {
     Recording::from_bytes(BALL).expect("a released recording")
 }
 
-/// The same body with the levels that a recording made now holds, read back from its file.
+/// Recording of the same body with the levels that one made now holds, read back from its file.
 fn newly_recorded() -> Recording {
     let mut new = ball();
     new.sample_levels = new.surface.sample_levels(MIN_CONTACT_SAMPLES);

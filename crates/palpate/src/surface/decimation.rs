@@ -79,7 +79,7 @@ impl DecimatedMesh<'_> {
             }
             let ring = self.ring(node);
             let Some(filling) = self.filling(node, &ring) else { continue };
-            // Its surroundings have changed since it was entered: those of now are in the queue as well.
+            // The triangles around it have changed since: with each change of its ring it was entered again.
             if filling.quality.to_bits() != expected {
                 continue;
             }
