@@ -3,12 +3,14 @@
 
 mod blocked_convolution;
 mod body;
+mod contact_location;
 mod contact_points;
 mod convolution;
 mod fir;
 mod force_history;
 mod level_residual;
 mod modal;
+mod modal_deformation;
 mod modal_distances;
 mod nodal_compliance;
 mod nodal_forces;
@@ -21,7 +23,8 @@ mod sample_surface;
 mod sampled_residual;
 mod spring_forces;
 
-pub(crate) use body::{Body, ContactLocation, Footprint, LocationState, SpringForce};
+pub(crate) use body::Body;
+pub(crate) use contact_location::{ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
 
 pub(crate) use nodal_forces::NodalForces;
@@ -38,7 +41,8 @@ use convolution::FirState;
 use fir::Fir;
 use force_history::ForceHistory;
 use glam::{DMat3, DVec3};
-use modal::{ModalDeformation, ModalState, SampledModes};
+use modal::{ModalState, SampledModes};
+use modal_deformation::ModalDeformation;
 use nodal_compliance::NodalCompliance;
 
 /// Form of an object's response.

@@ -6,13 +6,14 @@
 //! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
 
 use super::ContactPoint;
+use super::modal_deformation::ModalDeformation;
 use super::nodal_compliance::NodalCompliance;
 use super::nodal_forces::{NodalForces, add_residual_displacements};
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
 use super::sampled_residual::{Products, SampledResidual};
 use super::spring_forces::RELAXING;
-use super::{Body, ContactLocation, Footprint, LocationState, SpringForce};
+use super::{Body, ContactLocation, LocationState, SpringForce};
 use crate::bounded_vec::BoundedVec;
 use crate::dot_products::{dot, dot3, dot9, dots};
 use crate::recording::Recording;
@@ -465,56 +466,5 @@ impl SampledModes {
             });
         }
         add_residual_displacements(&recording.residual, &loads, out);
-    }
-}
-
-/// Data that determine the displacement of an object in modal form; buffers are made once.
-#[derive(Debug)]
-pub(crate) struct ModalDeformation {
-    q: Vec<f64>,
-    /// Forces on nodes [N, body].
-    loaded: Vec<(u32, DVec3)>,
-    /// Forces on patches.
-    patches: Vec<SpringForce>,
-}
-
-impl Clone for ModalDeformation {
-    /// Clone of equal capacity: later copies into it do not allocate.
-    fn clone(&self) -> Self {
-        let mut loaded = Vec::with_capacity(self.loaded.capacity());
-        loaded.extend_from_slice(&self.loaded);
-        let mut patches = Vec::with_capacity(self.patches.capacity());
-        patches.extend_from_slice(&self.patches);
-        Self { q: self.q.clone(), loaded, patches }
-    }
-}
-
-impl ModalDeformation {
-    pub(super) fn new(state: &ModalState) -> Self {
-        let mut new = Self {
-            q: state.q.clone(),
-            loaded: Vec::with_capacity(state.nodal.capacity()),
-            patches: Vec::with_capacity(state.spring_forces.capacity()),
-        };
-        new.copy_from(state);
-        new
-    }
-
-    /// Modal coordinates q [m·√kg].
-    pub(super) fn coordinates(&self) -> &[f64] {
-        &self.q
-    }
-
-    /// Copy the present data of the same object.
-    ///
-    /// # Real time
-    pub(super) fn copy_from(&mut self, state: &ModalState) {
-        self.q.copy_from_slice(&state.q);
-        self.loaded.clear();
-        self.loaded.extend_from_slice(state.nodal.loaded());
-        self.patches.clear();
-        let patches =
-            state.spring_forces.iter().filter(|applied| applied.location.footprint != Footprint::Point);
-        self.patches.extend(patches.copied());
     }
 }

@@ -7,7 +7,7 @@
 //! w are the weights of the patch about node c, S [m/N] the residual compliance. The patches of a resting face press in every
 //! rendered frame, and each loads dozens of nodes of a whole S.
 
-use super::body::{Body, Footprint, SpringForce};
+use super::{Body, Footprint, SpringForce};
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
