@@ -102,7 +102,7 @@ fn one_sided_distance(
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_surfaces::{ball, sheet};
+    use super::super::test_surfaces::{ball, cube, sheet};
     use super::*;
     use alloc::vec;
 
@@ -138,6 +138,17 @@ mod tests {
             let distance = level.hausdorff_distance(&ball).expect("a ball has a decimated surface");
             assert!(distance <= sag, "{}: {distance} {sag}", level.nodes.len());
             assert!(distance >= on_lattice(sag) - facets, "{}: {distance} {sag}", level.nodes.len());
+        }
+    }
+
+    #[test]
+    fn levels_of_a_cube_lie_in_its_faces() {
+        for cells in [6, 12, 24] {
+            let cube = cube(cells);
+            for level in cube.sample_levels(MIN_CONTACT_SAMPLES) {
+                let distance = level.hausdorff_distance(&cube);
+                assert!(distance.is_some_and(|d| d < 1e-12), "{cells}, {}: {distance:?}", level.nodes.len());
+            }
         }
     }
 

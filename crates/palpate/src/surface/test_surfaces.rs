@@ -38,6 +38,31 @@ pub(super) fn ball(times: usize) -> Surface {
     ball
 }
 
+/// Cube with the corners 0 and 1 in every coordinate, whose faces are grids with diagonals that alternate.
+pub(super) fn cube(cells: u32) -> Surface {
+    let mut nodes = BTreeMap::new();
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for axis in 0..3 {
+        for (side, i, j) in (0..2 * cells * cells).map(|k| (k % 2, k / 2 % cells, k / 2 / cells)) {
+            let mut node = |(i, j): (u32, u32)| {
+                let mut grid = [0; 3];
+                (grid[axis], grid[(axis + 1) % 3], grid[(axis + 2) % 3]) = (side * cells, i, j);
+                *nodes.entry(grid).or_insert_with(|| {
+                    positions.push(DVec3::from_array(grid.map(|k| f64::from(k) / f64::from(cells))));
+                    positions.len() as u32 - 1
+                })
+            };
+            let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(&mut node);
+            let first = ((i + j) % 2) as usize;
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| corners[(first + k) % 4]);
+            let outward = |[a, b, c]: [u32; 3]| if side == 1 { [a, b, c] } else { [a, c, b] };
+            triangles.extend([outward([a, b, c]), outward([a, c, d])]);
+        }
+    }
+    Surface { source_nodes: (0..positions.len() as u32).collect(), positions, triangles }
+}
+
 /// Sheet of no thickness: the same cells seen from both sides.
 pub(super) fn sheet() -> Surface {
     let positions: Vec<DVec3> =
