@@ -344,6 +344,7 @@ fn every_long_stage_can_be_interrupted() {
 #[test]
 fn a_recorded_ball_holds_its_levels_and_the_certificate_their_chord_sag() {
     const RADIUS_M: f64 = 0.05;
+    const ROUND_OFF_M: f64 = 1e-15;
     let mesh = ball_mesh(RADIUS_M, 6).expect("a good ball");
     let recording = recorded(mesh, &parameters(ElementOrder::Linear, 6)).recording;
     let levels = &recording.sample_levels;
@@ -356,7 +357,7 @@ fn a_recorded_ball_holds_its_levels_and_the_certificate_their_chord_sag() {
         sides.map(|(a, b)| (corner(a) - corner(b)).length()).fold(0.0, f64::max)
     };
     // Depth of a triangle with corners on the sphere, by its longest side: at least that of the side's middle, at most that of an
-    // equilateral triangle's. The recorded surface has triangles itself.
+    // equilateral triangle's, which one of them is, to round-off. The recorded surface has triangles itself.
     let depth = |half_squared: f64| RADIUS_M - (RADIUS_M * RADIUS_M - half_squared).max(0.0).sqrt();
     let own = depth(longest(&recording.surface.triangles).powi(2) / 3.0);
     for (level, stated) in levels.iter().zip(stated) {
@@ -365,7 +366,7 @@ fn a_recorded_ball_holds_its_levels_and_the_certificate_their_chord_sag() {
         let distance = stated.hausdorff_distance_m.expect("a ball has a decimated surface");
         let (low, high) = (depth(side * side / 4.0) - own, depth(side * side / 3.0));
         assert!(
-            (low..high).contains(&distance),
+            (low..high + ROUND_OFF_M).contains(&distance),
             "{} samples: {distance}, {low} to {high}",
             level.nodes.len()
         );
