@@ -298,7 +298,7 @@ impl Shape {
     }
 
     /// Corners of the shape, in its frame, in bounding spheres (centre, radius) that `near` accepts; passed to `found` with
-    /// their number and their outward normal, which is zero for a mesh: on the side of a cone its apex faces along the axis.
+    /// their number and their outward normal: zero for a mesh, where that of a narrow tip is across what it touches when it lies on its side.
     ///
     /// # Real time
     pub(crate) fn corners(
