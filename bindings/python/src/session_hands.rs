@@ -95,7 +95,7 @@ impl Move {
         let hands = self.hands.iter().filter(move |(device, _)| has_position(device));
         let hands = hands.map(|(device, position)| (&*scene.devices[*device].name, *position));
         let obstacles = self.obstacles.iter().map(|(at, pose)| (&scene.obstacles[*at], pose.position));
-        // Those that stay are where the scene has them.
+        // Obstacles where the scene has put them are not asked about.
         let obstacles = obstacles.filter(|(own, position)| own.start.position != *position);
         let obstacles = obstacles.map(|(own, position)| (&*own.name, position));
         let clamps = self.clamps.iter().map(|(at, pose)| (&*scene.clamps[*at].name, pose.position));

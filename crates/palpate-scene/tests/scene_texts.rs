@@ -215,7 +215,7 @@ fn numbers_in_another_unit_get_a_warning_with_their_part() {
         let found = warnings.iter().find(|warning| warning.kind == kind).unwrap_or_else(|| panic!("{text}: {warnings:?}"));
         assert_eq!((&*found.part, &*found.message), (part, &*message));
     }
-    // What is usual is not asked about: ice, rubber, what does not slip, a fall of 5 m, weight towards a floor, and a wall.
+    // Usual numbers get no warning: of ice, rubber, what does not slip, a fall of 5 m, weight towards a floor, and a wall.
     let wall = "[[plane]]\nname = \"wall\"\npoint = [1.0, 0.0, 0.0]\nnormal = [-1.0, 0.0, 0.0]\n";
     for text in [
         format!("gravity = [0.0, 0.0, -9.81]\n{object}friction = 0.0\n{floor}friction = 4.0\n"),

@@ -118,7 +118,6 @@ impl DecimatedMesh<'_> {
     /// is none without folds.
     fn filling(&self, node: u32, ring: &[u32]) -> Option<Filling> {
         let count = ring.len();
-        let is_edge = |a: u32, b: u32| self.has_triangle(a, |corners| corners.contains(&b));
         let is_tetrahedron =
             || self.has_triangle(ring[0], |corners| ring[1..].iter().all(|other| corners.contains(other)));
         if count < 3 || count == 3 && is_tetrahedron() {
@@ -132,7 +131,7 @@ impl DecimatedMesh<'_> {
         for span in 2..count {
             for i in 0..count - span {
                 let j = i + span;
-                if span + 1 < count && is_edge(ring[i], ring[j]) {
+                if span + 1 < count && self.is_edge(ring[i], ring[j]) {
                     continue;
                 }
                 let mut best = (0.0_f64, 0);
@@ -222,7 +221,7 @@ impl DecimatedMesh<'_> {
         let [from, to] = [a, b].map(|node| self.positions[node as usize]);
         let middle = |a: u32, b: u32| 0.5 * (self.positions[a as usize] + self.positions[b as usize]);
         let (now, gain) = (distance(middle(a, b)), MIN_GAIN * (to - from).length());
-        if now <= gain || self.has_triangle(c, |corners| corners.contains(&d)) {
+        if now <= gain || self.is_edge(c, d) {
             return false;
         }
         let removed = [corners, beyond].map(|of| self.area_normal(of).normalize_or_zero());
@@ -237,6 +236,10 @@ impl DecimatedMesh<'_> {
         self.around[c as usize].push(other);
         self.around[d as usize].push(t as u32);
         true
+    }
+
+    fn is_edge(&self, a: u32, b: u32) -> bool {
+        self.has_triangle(a, |corners| corners.contains(&b))
     }
 
     fn has_triangle(&self, node: u32, is_it: impl Fn(&[u32; 3]) -> bool) -> bool {
