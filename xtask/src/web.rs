@@ -10,11 +10,12 @@ use std::process::Command;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Vector instructions, which every browser has since 2023. The others are for size: only the smallest functions are inlined, loops are neither
-/// unrolled nor vectorised (those of the step work on whole chunks, which become vectors without that), and addresses in the code take no more
-/// bytes than they need.
-const FLAGS: &[&str] = &[
-    "-Ctarget-feature=+simd128",
+/// Vector instructions, which every browser has since 2023.
+const VECTORS: &str = "-Ctarget-feature=+simd128";
+
+/// Flags for size: only the smallest functions are inlined, loops are neither unrolled nor vectorised (those of the step work on whole
+/// chunks, which become vectors without that), and addresses in the code take no more bytes than they need.
+const FOR_SIZE: &[&str] = &[
     "-Cllvm-args=-inline-threshold=10",
     "-Cllvm-args=-unroll-runtime=false",
     "-Cllvm-args=-unroll-allow-partial=false",
@@ -24,6 +25,27 @@ const FLAGS: &[&str] = &[
 
 /// Flags of a standard library that is built here: no texts of panics, which nobody reads in a browser.
 const SMALL_FLAGS: &[&str] = &["-Zlocation-detail=none", "-Zunstable-options", "-Cpanic=immediate-abort"];
+
+/// Module of WebAssembly: its features, the profile that it is built with, and its name.
+struct Module {
+    features: &'static [&'static str],
+    profile: &'static str,
+    name: &'static str,
+}
+
+/// Module of the npm package.
+const PACKAGE: Module = Module { features: &["--no-default-features"], profile: "web", name: "package.wasm" };
+
+/// Modules of the page: live scenes; logs; recording of meshes, which is built for speed.
+const PAGE: [Module; 3] = [
+    Module { features: &[], profile: "web", name: "palpate.wasm" },
+    Module { features: &["--features", "logs"], profile: "web", name: "palpate-logs.wasm" },
+    Module {
+        features: &["--no-default-features", "--features", "record"],
+        profile: "web-record",
+        name: "palpate-record.wasm",
+    },
+];
 
 /// Folder of the npm package.
 pub fn package() -> PathBuf {
@@ -37,7 +59,7 @@ pub fn page() -> PathBuf {
 
 /// Build the module, the npm package and the page; false, with a message, where no toolchain for WebAssembly can be had.
 pub fn build() -> Result<bool, String> {
-    let Some(module) = build_module(&["--no-default-features"], "package.wasm")? else {
+    let Some(module) = build_module(&PACKAGE)? else {
         println!(
             "skipped: neither the target {TARGET} is installed (`rustup target add {TARGET}`), nor {HINT}"
         );
@@ -51,11 +73,9 @@ pub fn build() -> Result<bool, String> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&root().join(licence), &package.join("dist").join(licence))?;
     }
-    let page_modules: [(&[&str], _); 2] =
-        [(&[], "palpate.wasm"), (&["--features", "logs"], "palpate-logs.wasm")];
     let mut modules = Vec::new();
-    for (features, name) in page_modules {
-        modules.extend(build_module(features, name)?);
+    for module in &PAGE {
+        modules.extend(build_module(module)?);
     }
     build_page(&modules)?;
     report(&package)?;
@@ -79,16 +99,18 @@ pub fn test() -> Result<(), String> {
 }
 
 /// WebAssembly module, kept by a name; none where no toolchain for it can be had.
-fn build_module(features: &[&str], name: &str) -> Result<Option<PathBuf>, String> {
+fn build_module(&Module { features, profile, name }: &Module) -> Result<Option<PathBuf>, String> {
     let mut cargo = cargo_command();
-    cargo.args(["build", "--locked", "--profile", "web", "--target", TARGET, "--package", "palpate-web"]);
+    cargo.args(["build", "--locked", "--profile", profile, "--target", TARGET, "--package", "palpate-web"]);
     cargo.args(features);
+    let for_size = if profile == PACKAGE.profile { FOR_SIZE } else { &[] };
+    let flags = [&[VECTORS], for_size].concat();
     if build_std(&mut cargo, "std,panic_abort")? {
         // Its instructions are reached by a feature of unreleased compilers, as its build is.
         cargo.args(["-Z", "build-std-features=optimize_for_size", "--features", "instructions"]);
-        cargo.env("RUSTFLAGS", [FLAGS, SMALL_FLAGS].concat().join(" "));
+        cargo.env("RUSTFLAGS", [&flags, SMALL_FLAGS].concat().join(" "));
     } else if is_installed(TARGET)? {
-        cargo.env("RUSTFLAGS", FLAGS.join(" "));
+        cargo.env("RUSTFLAGS", flags.join(" "));
     } else {
         return Ok(None);
     }
@@ -98,7 +120,7 @@ fn build_module(features: &[&str], name: &str) -> Result<Option<PathBuf>, String
     let kept = root().join("target/web/modules").join(name);
     fs::create_dir_all(root().join("target/web/modules"))
         .map_err(|error| format!("target/web/modules: {error}"))?;
-    copy(&root().join("target").join(TARGET).join("web/palpate_web.wasm"), &kept)?;
+    copy(&root().join("target").join(TARGET).join(profile).join("palpate_web.wasm"), &kept)?;
     Ok(Some(kept))
 }
 

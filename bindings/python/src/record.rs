@@ -10,7 +10,7 @@ use crate::workers::{Workers, no_threads};
 use glam::DVec3;
 use palpate::{Damping, Material};
 use palpate_fem::{ElementOrder, ErrorTarget, Precision, ResidualChoice, library_material};
-use palpate_mesh::{MergeNodes, Mesh, PieceChoice, Region, Repair};
+use palpate_mesh::{MergeNodes, Mesh, MeshingParameters, PieceChoice, Region, Repair};
 use palpate_scene::{BodySource, MaterialChoice, RecordOptions, SceneError};
 use pyo3::prelude::*;
 use std::num::NonZero;
@@ -127,7 +127,7 @@ pub fn record(
             other => return Err(refused(format!("order is {other}, expected 1 or 2"))),
         },
         scale,
-        cell_size,
+        meshing: MeshingParameters { cell_size, nodes: None },
         fix: texts(fix, "fix")?,
         spring: texts(spring, "spring")?,
         residual: residual.map_or(Ok(ResidualChoice::Automatic), read_residual)?,

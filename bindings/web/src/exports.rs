@@ -19,6 +19,8 @@ use std::sync::Arc;
 /// Kinds of what is sent.
 const ERROR: u32 = 0;
 const JSON: u32 = 1;
+pub(crate) const TEXT: u32 = 2;
+pub(crate) const DATA: u32 = 4;
 
 #[link(wasm_import_module = "palpate")]
 unsafe extern "C" {

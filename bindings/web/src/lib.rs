@@ -18,6 +18,8 @@ mod live_exports;
 mod live_scene;
 #[cfg(all(target_arch = "wasm32", feature = "logs"))]
 mod log_exports;
+#[cfg(all(target_arch = "wasm32", feature = "record"))]
+mod record_exports;
 mod simulation;
 
 pub use description::{describe_recording, describe_scene};

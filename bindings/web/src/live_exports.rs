@@ -2,7 +2,7 @@
 
 #![allow(missing_docs)]
 
-use crate::exports::{handle_or_error, or_error, send, send_json, text};
+use crate::exports::{DATA, TEXT, handle_or_error, or_error, send, send_json, text};
 use crate::live_scene::{LiveScene, RecordedRun, Rescaled, Titles};
 use palpate::Recording;
 use palpate_scene::{PartsInMemory, falling_scene};
@@ -11,9 +11,7 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Kinds of what is sent, beside those of [`exports`](crate::exports).
-const TEXT: u32 = 2;
 const FRAME: u32 = 3;
-pub(crate) const DATA: u32 = 4;
 const SOUND: u32 = 5;
 
 #[link(wasm_import_module = "palpate")]

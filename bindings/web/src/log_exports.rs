@@ -2,8 +2,8 @@
 
 #![allow(missing_docs)]
 
-use crate::exports::{bytes, handle, handle_or_error, or_error, send, send_json, text};
-use crate::live_exports::{DATA, now, send_message};
+use crate::exports::{DATA, bytes, handle, handle_or_error, or_error, send, send_json, text};
+use crate::live_exports::{now, send_message};
 use palpate_scene::{LogMaker, PartsInMemory};
 use palpate_viewer::LocalLogs;
 use serde_json::json;

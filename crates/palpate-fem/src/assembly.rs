@@ -104,7 +104,8 @@ impl Assembly {
     /// Product K·X or M·X with a block of columns of 3·nodes rows.
     pub fn multiply(&self, which: SystemMatrix, x: MatRef<'_, f64>) -> Mat<f64> {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
-        y.par_col_iter_mut().zip(x.par_col_iter()).for_each(|(mut out, column)| {
+        let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).collect();
+        columns.into_par_iter().for_each(|(mut out, column)| {
             let at = |node: u32| {
                 let base = 3 * node as usize;
                 glam::DVec3::new(column[base], column[base + 1], column[base + 2])

@@ -1,10 +1,11 @@
-//! Sparse factors of K + s·M: the only module that uses faer's sparse matrices and METIS.
+//! Sparse factors of K + s·M: the only module that uses faer's sparse factorisations.
 //!
 //! Constrained degrees of freedom keep their row with a diagonal entry alone, so that sizes never change;
 //! a right-hand side is zero there. For s ≥ 0 the factor is Cholesky's; for s < 0 the inertia of
 //! L·B·Lᵀ (pivots of size one and two) counts the eigenvalues of the pencil below −s (Sylvester).
 
 use crate::assembly::Assembly;
+use crate::elimination_order::elimination_order;
 use crate::kernels::{SEQUENTIAL, avx_section, multiply, solve_lower, solve_upper};
 use crate::solve_error::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -18,7 +19,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Accum, Conj, Mat, MatMut, Side, unzip, zip};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Elimination order and sparsity of the factor: made once per mesh.
 #[derive(Debug, Clone)]
@@ -34,9 +35,6 @@ pub struct Factor {
     values: Vec<f64>,
 }
 
-/// Number of nodes from which nested dissection reduces fill-in.
-const NESTED_DISSECTION_FROM: usize = 64;
-
 impl Pattern {
     /// Symbolic factorisation of a body.
     ///
@@ -45,8 +43,7 @@ impl Pattern {
     pub fn new(assembly: &Assembly) -> Result<Self, SolveError> {
         let n = assembly.nodes();
         let setup = |e: &dyn std::fmt::Debug| SolveError::SymbolicFactor(format!("{e:?}"));
-        let order: Vec<usize> =
-            if n < NESTED_DISSECTION_FROM { (0..n).collect() } else { nested_dissection(assembly)? };
+        let order = elimination_order(assembly)?;
         let forward: Vec<usize> =
             order.iter().flat_map(|&node| [3 * node, 3 * node + 1, 3 * node + 2]).collect();
         let mut inverse = vec![0; forward.len()];
@@ -280,43 +277,6 @@ fn lower_triangle(assembly: &Assembly, constrained: &[bool], shift: f64) -> Spar
     SparseColMat::new(symbolic, values)
 }
 
-/// METIS draws the C library's random numbers, which a process has one series of: it begins the series, and two at once would take each
-/// other's numbers. The elimination order, and so the last bits of a recording, depend on them.
-static METIS: Mutex<()> = Mutex::new(());
-
-/// Nested dissection of the node graph by METIS; node numbers in elimination order.
-fn nested_dissection(assembly: &Assembly) -> Result<Vec<usize>, SolveError> {
-    let n = assembly.nodes();
-    let too_large = |_| SolveError::SymbolicFactor("more than 2³¹ entries".into());
-    let mut starts = vec![0_i32];
-    let mut neighbours = Vec::new();
-    for node in 0..n {
-        let row = &assembly.columns[assembly.offsets[node]..assembly.offsets[node + 1]];
-        neighbours.extend(row.iter().filter(|&&other| other as usize != node).map(|&other| other as i32));
-        starts.push(i32::try_from(neighbours.len()).map_err(too_large)?);
-    }
-    let mut count = i32::try_from(n).map_err(too_large)?;
-    let (mut order, mut inverse) = (vec![0_i32; n], vec![0_i32; n]);
-    let _alone = METIS.lock().unwrap_or_else(PoisonError::into_inner);
-    // SAFETY: the arrays have the lengths that METIS 5 states for METIS_NodeND (starts n + 1, order and
-    // inverse n, neighbours as starts say, without self loops); null asks for no weights and defaults.
-    let status = unsafe {
-        metis_sys::METIS_NodeND(
-            &mut count,
-            starts.as_mut_ptr(),
-            neighbours.as_mut_ptr(),
-            std::ptr::null_mut(),
-            std::ptr::null_mut(),
-            order.as_mut_ptr(),
-            inverse.as_mut_ptr(),
-        )
-    };
-    if status != metis_sys::rstatus_et_METIS_OK {
-        return Err(SolveError::SymbolicFactor(format!("METIS returned {status}")));
-    }
-    Ok(order.into_iter().map(|node| node as usize).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,20 +290,6 @@ mod tests {
         let discretisation = Discretisation::new(&mesh, order);
         let material = Material::isotropic(1e4, 0.3, 1000.0);
         (Assembly::new(&discretisation, &[material]), discretisation)
-    }
-
-    #[test]
-    fn elimination_orders_are_the_same_where_several_are_computed_at_once() {
-        const AT_ONCE: usize = 4;
-        const TIMES: usize = 3;
-        let (assembly, _) = assembly([8, 7, 6], ElementOrder::Quadratic);
-        let order = || nested_dissection(&assembly).expect("an order");
-        let alone = order();
-        std::thread::scope(|scope| {
-            for _ in 0..AT_ONCE {
-                scope.spawn(|| (0..TIMES).for_each(|_| assert!(order() == alone)));
-            }
-        });
     }
 
     #[test]

@@ -59,11 +59,24 @@ pub(crate) fn solve_upper(upper: MatRef<'_, f64>, x: MatMut<'_, f64>) {
     avx_section(|| solve_upper_triangular_in_place(upper, x, SEQUENTIAL));
 }
 
+/// Blocks of rows, the last with what is left, for work in parallel.
+pub(crate) fn row_blocks(matrix: MatMut<'_, f64>, rows: usize) -> Vec<MatMut<'_, f64>> {
+    let mut rest = matrix;
+    let mut blocks = Vec::with_capacity(rest.nrows().div_ceil(rows));
+    while rest.nrows() > rows {
+        let (block, below) = rest.split_at_row_mut(rows);
+        blocks.push(block);
+        rest = below;
+    }
+    blocks.push(rest);
+    blocks
+}
+
 /// Product of two matrices, blocks of rows in parallel.
 pub(crate) fn product(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Mat<f64> {
     let mut result = Mat::zeros(left.nrows(), right.ncols());
     let rows = left.nrows().div_ceil(BLOCKS).max(LEAST_ROWS);
-    result.as_mut().par_row_chunks_mut(rows).enumerate().for_each(|(at, block)| {
+    row_blocks(result.as_mut(), rows).into_par_iter().enumerate().for_each(|(at, block)| {
         let own = left.subrows(at * rows, block.nrows());
         multiply(block, Accum::Replace, own, right, 1.0);
     });

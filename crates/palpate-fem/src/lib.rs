@@ -17,6 +17,7 @@ mod body;
 mod certificate;
 mod discretisation;
 mod element;
+mod elimination_order;
 mod error_target;
 mod estimate;
 mod factor;

@@ -3,7 +3,7 @@
 //! Rounding moves the correlations N_ij = S_ij/√(S_ii·S_jj) by a matrix E with entries of at most half a step. Where N + E has a negative
 //! eigenvalue, the diagonal of S is raised by a share ε: a Cholesky factorisation proves (N + ε·1)/(1 + ε) + E positive definite.
 
-use crate::kernels::{avx_section, multiply, solve_lower};
+use crate::kernels::{avx_section, multiply, row_blocks, solve_lower};
 use faer::{Accum, Mat, Side};
 use palpate::QuantisedCompliance;
 use rayon::prelude::*;
@@ -77,11 +77,11 @@ fn is_positive_definite(quantised: &QuantisedCompliance) -> bool {
         let Ok(factor) = avx_section(|| block.llt(Side::Lower)) else { return false };
         let below = first + width;
         let mut panel = rest.submatrix(below, first, n - below, width).to_owned();
-        panel.as_mut().par_row_chunks_mut(BLOCK).for_each(|rows| {
+        row_blocks(panel.as_mut(), BLOCK).into_par_iter().for_each(|rows| {
             solve_lower(factor.L(), rows.transpose_mut());
         });
         let trailing = rest.as_mut().submatrix_mut(below, below, n - below, n - below);
-        trailing.par_row_chunks_mut(BLOCK).enumerate().for_each(|(at, rows)| {
+        row_blocks(trailing, BLOCK).into_par_iter().enumerate().for_each(|(at, rows)| {
             let (height, columns) = (rows.nrows(), at * BLOCK + rows.nrows());
             let own = panel.subrows(at * BLOCK, height);
             let lower = rows.subcols_mut(0, columns);

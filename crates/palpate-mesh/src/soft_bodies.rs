@@ -86,7 +86,7 @@ impl Liver {
     pub fn mesh(&self) -> Result<Mesh, MeshError> {
         let mut surface = SurfaceMesh::from_boundary(ball_mesh(1.0, Self::LAYERS)?)?;
         surface.positions.iter_mut().for_each(|position| *position = self.place(*position));
-        let meshing = MeshingParameters { cell_size: Some(self.cell_size) };
+        let meshing = MeshingParameters { cell_size: Some(self.cell_size), ..MeshingParameters::default() };
         let (mut mesh, _) = tetrahedralise(&surface, &meshing, &mut |_| ControlFlow::Continue(()))?;
         mesh.warnings.clear();
         let region = |tag, name: &str| Region { tag, name: Some(name.into()), material: None };

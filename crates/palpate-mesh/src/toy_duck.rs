@@ -84,7 +84,7 @@ impl Duck {
             surface.positions.extend(placed);
             surface.triangles.extend(ball.triangles.iter().map(|corners| corners.map(|node| node + first)));
         }
-        let meshing = MeshingParameters { cell_size: Some(self.cell_size) };
+        let meshing = MeshingParameters { cell_size: Some(self.cell_size), ..MeshingParameters::default() };
         let (mut mesh, _) = tetrahedralise(&surface, &meshing, &mut |_| ControlFlow::Continue(()))?;
         // Warnings of parts that overlap: they are meant to.
         mesh.warnings.clear();

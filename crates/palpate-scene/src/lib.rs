@@ -29,19 +29,19 @@ mod library;
 mod log_facts;
 #[cfg(feature = "logs")]
 mod log_maker;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod material_choice;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod mesh_source;
 mod motion;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod node_selection;
 mod object_bounds;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod progress;
 #[cfg(feature = "native")]
 mod recipe;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod record_options;
 mod recording_file;
 #[cfg(feature = "logs")]
@@ -54,7 +54,7 @@ mod scene_log;
 #[cfg(feature = "native")]
 mod session;
 mod step_check;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 mod supports;
 mod tables;
 mod unit_check;
@@ -70,26 +70,30 @@ pub use file::{
 };
 #[cfg(feature = "native")]
 pub use growing_log::{Failures, GrowingLog, Teller, create_part};
+#[cfg(feature = "recording")]
+pub use library::MeshUpload;
 #[cfg(feature = "native")]
-pub use library::{BUILT_IN_SCENES, BuiltInScene, MeshUpload, OpenedScene, SceneLibrary, paper_cube_recipe};
+pub use library::{BUILT_IN_SCENES, BuiltInScene, OpenedScene, SceneLibrary, paper_cube_recipe};
 pub use library::{SettingsChange, TouchableScene, falling_scene, read_touchable_scene};
 #[cfg(feature = "logs")]
 pub use log_maker::LogMaker;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use material_choice::MaterialChoice;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use mesh_source::{read_body, read_surface, source_name};
 pub use motion::MotionSource;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use node_selection::{NodeSelection, select_nodes, union_of_nodes};
 pub use object_bounds::ObjectBounds;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use palpate_fem::{Progress, SilentProgress};
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
+pub use palpate_mesh::MeshingParameters;
+#[cfg(feature = "recording")]
 pub use progress::{ProgressFn, WithoutRemarks};
 #[cfg(feature = "native")]
 pub use recipe::{RecordingRecipe, cache_folder};
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use record_options::{BodySource, PreparedBody, RecordOptions};
 pub use recording_file::{certificate_lines, certificate_table, read_recording};
 #[cfg(feature = "logs")]
@@ -99,7 +103,7 @@ pub use run_check::RunCheck;
 pub use scene::{Scene, SceneClamp, SceneDevice, SceneObstacle};
 #[cfg(feature = "native")]
 pub use scene_log::SceneLog;
-#[cfg(feature = "native")]
+#[cfg(feature = "recording")]
 pub use supports::read_supports;
 pub use warning::{Warning, WarningKind};
 

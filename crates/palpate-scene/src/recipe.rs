@@ -18,8 +18,8 @@ pub struct RecordingRecipe {
     pub source: String,
     /// Scale from the units of the mesh to metres.
     pub scale: f64,
-    /// Side of the cells that a surface is filled with [m]; none for the default.
-    pub cell_size: Option<f64>,
+    /// Cells that a surface is filled with.
+    pub meshing: MeshingParameters,
     /// Material, isotropic; its own region is ignored.
     pub material: Material,
     /// Young's modulus of the regions after the first, over that of the material.
@@ -58,7 +58,7 @@ impl RecordingRecipe {
         Self {
             source: source.into(),
             scale: 1.0,
-            cell_size: None,
+            meshing: MeshingParameters::default(),
             material,
             inclusion_stiffness: 1.0,
             fix: Vec::new(),
@@ -91,7 +91,11 @@ impl RecordingRecipe {
             Damping::Ratio(ratio) => format!("z{ratio}"),
         };
         let source = source_name(&self.source).replace(['/', ':'], "_");
-        let cells = self.cell_size.map_or(String::new(), |size| format!("-c{size}"));
+        let cells = match self.meshing {
+            MeshingParameters { cell_size: Some(size), .. } => format!("-c{size}"),
+            MeshingParameters { nodes: Some(nodes), .. } => format!("-k{nodes}"),
+            _ => String::new(),
+        };
         let inclusion = match self.inclusion_stiffness {
             1.0 => String::new(),
             stiffness => format!("-i{stiffness}"),
@@ -138,8 +142,7 @@ impl RecordingRecipe {
     /// # Errors
     /// When it cannot be read.
     pub fn mesh(&self, progress: &mut dyn Progress) -> Result<Mesh, SceneError> {
-        let meshing = MeshingParameters { cell_size: self.cell_size };
-        let mut mesh = read_body(&self.source, self.scale, &meshing, progress)?;
+        let mut mesh = read_body(&self.source, self.scale, &self.meshing, progress)?;
         mesh.repair(&Repair::default()).map_err(|error| self.refused(error))?;
         if self.order == ElementOrder::Quadratic && !self.fix.is_empty() {
             mesh.add_mid_edge_nodes();

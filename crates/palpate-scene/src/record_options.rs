@@ -30,8 +30,8 @@ pub struct RecordOptions {
     pub order: ElementOrder,
     /// Metres per unit of the mesh.
     pub scale: f64,
-    /// Side of the cells that a surface is filled with [m]; none for about 2,000 nodes.
-    pub cell_size: Option<f64>,
+    /// Cells that a surface is filled with.
+    pub meshing: MeshingParameters,
     /// Repairs of the mesh.
     pub repair: Repair,
     /// Fixed nodes, as `--fix`.
@@ -55,7 +55,7 @@ impl Default for RecordOptions {
             target: ErrorTarget::default(),
             order: ElementOrder::Quadratic,
             scale: 1.0,
-            cell_size: None,
+            meshing: MeshingParameters::default(),
             repair: Repair::default(),
             fix: Vec::new(),
             spring: Vec::new(),
@@ -103,8 +103,7 @@ impl RecordOptions {
             BodySource::Mesh(mesh, name) => (UnscaledBody::of_mesh(mesh, name), name.to_string()),
         };
         body.ask_unit(self.scale, progress);
-        let meshing = MeshingParameters { cell_size: self.cell_size };
-        let mut mesh = body.into_mesh(self.scale, &meshing, progress)?;
+        let mut mesh = body.into_mesh(self.scale, &self.meshing, progress)?;
         mesh.is_unit_asked = true;
         mesh.repair(&self.repair).map_err(|error| refused(SceneErrorKind::Mesh, &name, error))?;
         if self.order == ElementOrder::Quadratic {
@@ -214,7 +213,8 @@ mod tests {
         surface.positions.iter().for_each(|p| off += &format!("{} {} {}\n", p.x, p.y, p.z));
         surface.triangles.iter().for_each(|[a, b, c]| off += &format!("3 {a} {b} {c}\n"));
         let modes_by_error = ErrorTarget { force_error: Some(0.5), ..ErrorTarget::default() };
-        let coarse = RecordOptions { cell_size: Some(50.0), ..options() };
+        let coarse =
+            RecordOptions { meshing: MeshingParameters { cell_size: Some(50.0), nodes: None }, ..options() };
         for (source, options) in [
             (BodySource::Mesh(mesh.clone(), "mine"), options()),
             (BodySource::Mesh(mesh, "mine"), RecordOptions { target: modes_by_error, ..options() }),

@@ -1,7 +1,9 @@
 //! Library of scenes: pointers are added, settings change the text, and the last scene stays when a change is refused.
 
 use palpate::Material;
-use palpate_scene::{MeshUpload, Progress, SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress};
+use palpate_scene::{
+    MeshUpload, MeshingParameters, Progress, SceneErrorKind, SceneLibrary, SettingsChange, SilentProgress,
+};
 use palpate_testkit::FREE_BLOCK_FILE;
 use tempfile::TempDir;
 
@@ -98,7 +100,7 @@ fn an_uploaded_mesh_is_read_by_its_content_and_its_repairs_are_told() {
         name: name.into(),
         bytes: text.into(),
         scale: 0.1,
-        cell_size: None,
+        meshing: MeshingParameters::default(),
         material: Material::isotropic(1e4, 0.3, 1000.0),
         modes: 6,
     };
@@ -127,7 +129,10 @@ fn an_uploaded_mesh_is_read_by_its_content_and_its_repairs_are_told() {
     // A cube of 10 cm, one face of two triangles turned.
     let surface = "OFF\n8 7 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n\
                    4 1 2 6 5\n4 2 3 7 6\n3 3 0 4\n3 3 7 4\n";
-    let upload = MeshUpload { cell_size: Some(0.03), ..upload("cube.stl", surface) };
+    let upload = MeshUpload {
+        meshing: MeshingParameters { cell_size: Some(0.03), nodes: None },
+        ..upload("cube.stl", surface)
+    };
     let opened = library.record_upload(upload, &mut SilentProgress).expect("a scene");
     let told = "Your own mesh. Press and drag it. Note: 1 triangles faced the other way than their neighbours and were turned Note: the \
                 surface was filled with ";

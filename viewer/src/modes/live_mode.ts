@@ -3,6 +3,7 @@
 import type { Connection } from "../protocol/connection";
 import type { ClientMessage, DeviceAssigned, Hello, Progress, SceneMessage, Status } from "../protocol/messages";
 import type { Frame } from "../protocol/frame";
+import { PageRecorder, ServerRecorder, type MeshRecorder } from "../ui/mesh_recorder";
 import { MeshUpload } from "../ui/mesh_upload";
 import { OpenFiles } from "../ui/open_files";
 import { ForceReadout } from "../ui/force_readout";
@@ -49,8 +50,11 @@ export class LiveMode implements PageMode {
   private readonly sound: SoundControl;
   private readonly hint: Hint;
   private readonly forceReadout = new ForceReadout();
-  private readonly jobs = new JobList(() => this.cancelJob());
+  private readonly jobs = new JobList((job) => this.cancelJob(job));
+  private readonly recorder: MeshRecorder;
   private readonly meshUpload: MeshUpload;
+  /** Recorder of the server, where there is one. */
+  private readonly serverRecorder: ServerRecorder | null = null;
   /** Files, on a page without a server. */
   private readonly openFiles: OpenFiles | null = null;
   private readonly lostObjects: LostObjects;
@@ -106,17 +110,25 @@ export class LiveMode implements PageMode {
       this.pointers.stopGhost();
       this.hint.dismiss();
     });
-    const meshUpload = new MeshUpload(notifications, this.jobs);
-    this.meshUpload = meshUpload;
-
     if (worker === null) {
-      meshUpload.listenForDrops();
+      this.serverRecorder = new ServerRecorder(notifications, this.jobs);
+      this.recorder = this.serverRecorder;
+      this.meshUpload = new MeshUpload(notifications, this.recorder, "A surface is filled with about 2,000 nodes.");
+      this.meshUpload.listenForDrops();
     } else {
-      this.openFiles = new OpenFiles(notifications, async (file) => {
+      const open = (name: string, recording: ArrayBuffer, about: string) => {
         this.linked.end();
-        worker.openRecording(file.name, await file.arrayBuffer());
+        worker.openRecording(name, recording, about);
+      };
+      this.recorder = new PageRecorder(notifications, this.jobs, open);
+      const meshUpload = new MeshUpload(notifications, this.recorder, "A surface is filled with about 600 nodes; palpate record makes finer ones. The file stays on this device.");
+      this.meshUpload = meshUpload;
+      this.openFiles = new OpenFiles(notifications, {
+        openRecording: async (file) => open(file.name, await file.arrayBuffer(), "Your own recording. Press and drag it."),
+        openMesh: (file) => meshUpload.open(file),
       });
     }
+    const { meshUpload } = this;
 
     layout.toolbar.append(...this.toolbar.parts, this.share.button, ...this.sound.parts, vr.button);
     layout.overlayTop.append(this.share.film.box, this.share.log.box, this.forceReadout.box, this.hint.box, this.jobs.box);
@@ -147,8 +159,10 @@ export class LiveMode implements PageMode {
     this.suspend();
     this.panels.scenes.setScenes(hello.scenes);
     this.linked.hello(hello);
-    this.meshUpload.viewer = hello.viewer;
-    this.meshUpload.section.hidden = !hello.records;
+    if (this.serverRecorder !== null) {
+      this.serverRecorder.viewer = hello.viewer;
+      this.meshUpload.section.hidden = !hello.records;
+    }
     this.panels.material.records = hello.records;
     this.sound.connected();
     this.stream();
@@ -159,9 +173,8 @@ export class LiveMode implements PageMode {
     this.send({ type: "stream", format: this.sceneView.reconstructsOnGpu ? "modal" : "vertices", stride: document.hidden ? 0 : 1 });
   }
 
-  private cancelJob(): void {
-    this.meshUpload.cancel();
-    this.send({ type: "cancel_job" });
+  private cancelJob(job: string): void {
+    if (!this.recorder.cancel(job)) this.send({ type: "cancel_job" });
   }
 
   visibilityChanged(): void {
@@ -180,7 +193,7 @@ export class LiveMode implements PageMode {
     this.suspend();
     this.pointers.clear();
     this.share.log.sceneBegins();
-    const again = scene.id === null ? (this.meshUpload.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
+    const again = scene.id === null ? (this.recorder.again(scene.title) ?? this.openFiles?.again(scene.title)) : undefined;
     this.panels.scene(scene, again);
     this.notifications.showWarnings(scene.warnings);
     this.shown.load(scene, () => {

@@ -53,9 +53,9 @@ export class WorkerConnection {
     });
   }
 
-  /** Opens a recording as a scene of its own. */
-  openRecording(name: string, bytes: ArrayBuffer): void {
-    this.post({ kind: "recording", name, bytes });
+  /** Opens a recording as a scene of its own, with what is said about it. */
+  openRecording(name: string, bytes: ArrayBuffer, about: string): void {
+    this.post({ kind: "recording", name, bytes, about });
   }
 
   send(message: ClientMessage): void {

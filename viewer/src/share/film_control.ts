@@ -3,10 +3,8 @@
 import type { SceneView } from "../rendering/scene_view";
 import { element } from "../ui/elements";
 import type { Notifications } from "../ui/notifications";
+import { saveFile } from "../ui/save_file";
 import { fileEnding, Film, filmType, type FilmFile, type FilmSound } from "./film";
-
-/** Time after which the address of a download is given back [ms]. */
-const DOWNLOAD_MS = 60_000;
 
 /** Length as minutes and seconds. */
 export function clock(seconds: number): string {
@@ -81,15 +79,8 @@ export class FilmControl {
       return;
     }
     const name = filmName(this.scene(), fileEnding(type), new Date());
-    download(film.data, name);
+    saveFile(film.data, name);
     const size = Math.max(0.1, film.data.size / 1e6).toFixed(1);
     this.notifications.notify(`${film.full ? "The film has its largest length: " : ""}${name} (${clock(film.seconds)}, ${size} MB) goes to your downloads.`);
   }
-}
-
-/** Hands a file to the downloads. */
-export function download(data: Blob, name: string): void {
-  const address = URL.createObjectURL(data);
-  element("a", { attributes: { href: address, download: name } }).click();
-  window.setTimeout(() => URL.revokeObjectURL(address), DOWNLOAD_MS);
 }

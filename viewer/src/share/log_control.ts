@@ -2,7 +2,8 @@
 
 import type { Notifications } from "../ui/notifications";
 import { element } from "../ui/elements";
-import { clock, download, filmName } from "./film_control";
+import { saveFile } from "../ui/save_file";
+import { clock, filmName } from "./film_control";
 
 /** Longest log, in simulated time [s]; the module has the same limit. */
 export const LONGEST_LOG_S = 60;
@@ -74,7 +75,7 @@ export class LogControl {
     const name = filmName(this.scene(), "mcap", new Date());
     try {
       const { bytes, steps } = await source.endLog();
-      download(new Blob([bytes], { type: "application/octet-stream" }), name);
+      saveFile(new Blob([bytes], { type: "application/octet-stream" }), name);
       this.notifications.notify(`${name} (${steps} steps, ${Math.max(0.1, bytes.byteLength / 1e6).toFixed(1)} MB) goes to your downloads. palpate replay and palpate render open it, and this page does.`);
     } catch (error) {
       this.notifications.notify(`There is no log: ${error instanceof Error ? error.message : String(error)}.`, "error");

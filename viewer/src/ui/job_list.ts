@@ -9,15 +9,16 @@ export class JobList {
   readonly box = element("div", { class: "job-list", attributes: { "aria-label": "Background jobs" } });
   private readonly jobs = new Map<string, { row: HTMLElement; bar: HTMLProgressElement; phase: HTMLElement; cancel: HTMLElement | null; timer: number }>();
 
-  /** `cancel`: cancels the job that runs, of which a server has one at a time; null if jobs cannot be cancelled. */
-  constructor(private readonly cancel: (() => void) | null) {}
+  /** `cancel`: cancels a job by its name; null if jobs cannot be cancelled. */
+  constructor(private readonly cancel: ((job: string) => void) | null) {}
 
   update(progress: Progress): void {
     let job = this.jobs.get(progress.job);
     if (job === undefined) {
       const bar = element("progress", { attributes: { max: "1", "aria-label": progress.job } });
       const phase = element("span", { class: "phase" });
-      const cancel = this.cancel === null ? null : iconButton("close", `Cancel: ${progress.job}`, this.cancel);
+      const { cancel: cancelJob } = this;
+      const cancel = cancelJob === null ? null : iconButton("close", `Cancel: ${progress.job}`, () => cancelJob(progress.job));
       const row = element("div", { class: "job" }, element("span", { class: "name", text: progress.job }), phase, bar, cancel);
       job = { row, bar, phase, cancel, timer: 0 };
       this.jobs.set(progress.job, job);

@@ -1,15 +1,15 @@
-// Upload of a mesh file: asks for length unit, material and modes, and has the server record it. It can be cancelled.
+// Import of a mesh file: asks for length unit, material and modes, and has it recorded.
 
-import { serverUrl } from "../protocol/urls";
 import { element, section } from "./elements";
 import { kindOfFile } from "./open_files";
 import { listenForDrops } from "./file_drop";
 import { MaterialFields, PRESETS } from "./material_panel";
-import type { JobList } from "./job_list";
+import type { MeshRecorder } from "./mesh_recorder";
 import type { Notifications } from "./notifications";
+import { saveFile } from "./save_file";
 
-const EXTENSIONS = [".msh", ".vtk", ".vtu", ".mesh", ".veg", ".inp", ".obj", ".stl", ".ply", ".off"];
-const DROP = "Drop a mesh here to record it: solid elements (.msh, .vtk, .vtu, .mesh, .veg, .inp) or a closed surface (.stl, .obj, .ply, .off)";
+const EXTENSIONS = [".msh", ".vtk", ".vtu", ".mesh", ".meshb", ".veg", ".inp", ".obj", ".stl", ".ply", ".off", ".glb", ".gltf"];
+const DROP = "Drop a mesh here to record it: solid elements (.msh, .vtk, .vtu, .mesh, .veg, .inp) or a closed surface (.stl, .obj, .ply, .off, .glb)";
 const SCALES: readonly [string, number][] = [
   ["millimetres", 0.001],
   ["centimetres", 0.01],
@@ -24,16 +24,14 @@ export class MeshUpload {
   private readonly modes = element("input", { type: "number", attributes: { min: "1", max: "2000", value: "200" } });
   private readonly fields = new MaterialFields();
   private readonly fileName = element("strong");
+  private readonly saves = element("div");
   private file: File | null = null;
-  private upload: AbortController | null = null;
-  /** Uploads that the server has taken, by file name. */
-  private readonly accepted = new Map<string, () => void>();
-  /** Number of this viewer: the recording is cancelled when the page leaves. */
-  viewer = 0;
 
+  /** `about` says where the mesh is recorded, and how fine a surface is filled. */
   constructor(
     private readonly notifications: Notifications,
-    private readonly jobs: JobList,
+    private readonly recorder: MeshRecorder,
+    about: string,
   ) {
     const input = element("input", { type: "file", attributes: { accept: EXTENSIONS.join(","), hidden: true } });
     input.addEventListener("change", () => {
@@ -44,9 +42,10 @@ export class MeshUpload {
     this.section = section(
       "Import a mesh",
       false,
-      element("p", { class: "secondary", text: "Drop a mesh onto the page, or choose a file: solid elements (Gmsh, VTK, VTU, MEDIT, Vega, Abaqus), or a closed surface (STL, OBJ, PLY, OFF, glTF), which is filled with about 2,000 nodes." }),
+      element("p", { class: "secondary", text: `Drop a mesh onto the page, or choose a file: solid elements (Gmsh, VTK, VTU, MEDIT, Vega, Abaqus), or a closed surface (STL, OBJ, PLY, OFF, glTF). ${about}` }),
       button,
       input,
+      this.saves,
     );
     this.scale.append(...SCALES.map(([name, factor]) => element("option", { text: name, attributes: { value: String(factor) } })));
     this.fields.value = PRESETS[1];
@@ -72,7 +71,7 @@ export class MeshUpload {
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.dialog.close();
-      void this.post();
+      void this.record();
     });
     this.dialog.append(form);
   }
@@ -102,47 +101,14 @@ export class MeshUpload {
     this.dialog.showModal();
   }
 
-  private async post(): Promise<void> {
-    const material = this.fields.value;
-    if (this.file === null || material === null) return;
-    const query = {
-      name: this.file.name,
-      young: String(material.young),
-      poisson: String(material.poisson),
-      density: String(material.density),
-      scale: this.scale.value,
-      modes: this.modes.value,
-    };
-    await this.send(this.file, query);
-  }
-
-  private async send(file: File, query: Record<string, string>): Promise<void> {
-    const job = { type: "progress", job: "upload", phase: file.name, fraction: null } as const;
-    const upload = new AbortController();
-    this.upload = upload;
-    this.jobs.update(job);
-    try {
-      const address = `record?${new URLSearchParams({ ...query, viewer: String(this.viewer) })}`;
-      const response = await fetch(serverUrl(address), { method: "POST", body: file, signal: upload.signal });
-      if (!response.ok) throw new Error((await response.text()) || `${response.status} ${response.statusText}`);
-      this.notifications.notify(`${file.name} is being recorded`);
-      this.accepted.set(file.name, () => void this.send(file, query));
-    } catch (error) {
-      if (upload.signal.aborted) this.notifications.notify(`The upload of ${file.name} was cancelled`);
-      else this.notifications.notify(`${file.name} was not recorded: ${error instanceof Error ? error.message : String(error)}`, "error");
-    } finally {
-      this.jobs.update({ ...job, done: true });
-      if (this.upload === upload) this.upload = null;
-    }
-  }
-
-  /** Function that uploads a file of this name again, if the server has taken one. */
-  again(name: string): (() => void) | undefined {
-    return this.accepted.get(name);
-  }
-
-  /** Cancels an upload that is under way. */
-  cancel(): void {
-    this.upload?.abort();
+  private async record(): Promise<void> {
+    const { file, fields } = this;
+    const material = fields.value;
+    if (file === null || material === null) return;
+    const recording = await this.recorder.record(file, { ...material, scale: Number(this.scale.value), modes: Number(this.modes.value) });
+    if (recording === null) return;
+    const name = `${file.name.replace(/\.[^.]*$/, "")}.palp`;
+    const save = element("button", { class: "button wide", type: "button", text: `Save ${name}`, on: { click: () => saveFile(new Blob([recording]), name) } });
+    this.saves.replaceChildren(...[...this.saves.children].filter((other) => other.textContent !== save.textContent), save);
   }
 }

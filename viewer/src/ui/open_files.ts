@@ -1,4 +1,4 @@
-// Files that a page without a server opens: logs, which it plays, and recordings, each as a scene of its own.
+// Files that a page without a server opens: logs, which it plays, recordings, each as a scene of its own, and meshes, which it records.
 
 import { keptLogs } from "../worker/kept_logs";
 import { MAX_LOGS, scenesAddress, showLogs, showsLogs } from "../protocol/local_logs";
@@ -31,22 +31,22 @@ export class OpenFiles {
   private readonly opened = new Map<string, () => void>();
   private checking = false;
 
-  /** `openRecording` is null where the page shows no live scene. */
+  /** `live` opens recordings and meshes; it is null where the page shows no live scene. */
   constructor(
     private readonly notifications: Notifications,
-    private readonly openRecording: ((file: File) => Promise<void>) | null,
+    private readonly live: { openRecording(file: File): Promise<void>; openMesh(file: File): void } | null,
   ) {
-    const accept = openRecording === null ? ".mcap,.part" : ".mcap,.part,.palp";
+    const accept = live === null ? ".mcap,.part" : ".mcap,.part,.palp";
     const input = element("input", { type: "file", attributes: { accept, multiple: "", hidden: true, "aria-label": "Files to open" } });
     input.addEventListener("change", () => {
       void this.open([...(input.files ?? [])]);
       input.value = "";
     });
     const choose = element("button", { class: "button wide", type: "button", text: "Choose files…", on: { click: () => input.click() } });
-    const about = openRecording === null ? "Drop a second log (.mcap) to compare it with this one." : "Drop a log (.mcap) to play it, two to compare them, or a recording (.palp) to touch it.";
+    const about = live === null ? "Drop a second log (.mcap) to compare it with this one." : "Drop a log (.mcap) to play it, two to compare them, or a recording (.palp) to touch it.";
     const back = element("button", { class: "button wide", type: "button", text: "Back to the scenes", on: { click: () => window.location.assign(scenesAddress()) } });
-    this.section = section("Open files", openRecording === null, element("p", { class: "secondary", text: `${about} They stay on this device.` }), choose, input, ...(openRecording === null ? [back] : []));
-    listenForDrops(openRecording === null ? "Drop a log here (.mcap)" : "Drop a log (.mcap) or a recording (.palp) here", (files) => void this.open(files));
+    this.section = section("Open files", live === null, element("p", { class: "secondary", text: `${about} They stay on this device.` }), choose, input, ...(live === null ? [back] : []));
+    listenForDrops(live === null ? "Drop a log here (.mcap)" : "Drop a mesh (.stl, .obj, .glb, .vtu, .msh …), a recording (.palp) or a log (.mcap) here", (files) => void this.open(files));
   }
 
   /** Opens files: logs if there are any, or the first of the others. */
@@ -55,8 +55,9 @@ export class OpenFiles {
     const [first] = files;
     if (logs.length > 0) await this.openLogs(logs);
     else if (first === undefined) return;
-    else if (kindOfFile(first.name) === "recording" && this.openRecording !== null) await this.read(first);
-    else this.notifications.notify(`${first.name} cannot be opened here: ${this.openRecording === null ? "this page plays logs (.mcap)" : "logs (.mcap) and recordings (.palp) can. palpate serve records a mesh that is dropped onto its page; palpate record MESH -o NAME.palp makes a recording of one"}`, "error");
+    else if (kindOfFile(first.name) === "recording" && this.live !== null) await this.read(first);
+    else if (this.live !== null) this.live.openMesh(first);
+    else this.notifications.notify(`${first.name} cannot be opened here: this page plays logs (.mcap)`, "error");
   }
 
   /** Function that opens a recording of this name again. */
@@ -66,7 +67,7 @@ export class OpenFiles {
 
   private async read(file: File): Promise<void> {
     try {
-      await this.openRecording?.(file);
+      await this.live?.openRecording(file);
       this.opened.set(file.name, () => void this.read(file));
     } catch (error) {
       this.notifications.notify(`${file.name}: ${reasonOf(error)}`, "error");

@@ -6,8 +6,8 @@ export type ToWorker =
   | { kind: "start"; base: string; scene: string | null }
   /** Start of a worker that plays logs, those that the browser keeps if none are given. */
   | { kind: "start_logs"; base: string; files: readonly File[] | null }
-  /** Recording to open as a scene, with the name of its file. */
-  | { kind: "recording"; name: string; bytes: ArrayBuffer }
+  /** Recording to open as a scene, with the name of its file and what is said about it. */
+  | { kind: "recording"; name: string; bytes: ArrayBuffer; about: string }
   /** Begin and end of a record for a log. */
   | { kind: "begin_log" }
   | { kind: "end_log" }

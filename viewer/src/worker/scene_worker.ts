@@ -87,7 +87,7 @@ class SceneRunner {
   }
 
   /** Opens a scene in which the object of a recording falls on a floor. */
-  openRecording(name: string, bytes: Uint8Array): void {
+  openRecording(name: string, bytes: Uint8Array, about: string): void {
     const { instance } = this;
     this.opening += 1;
     try {
@@ -100,7 +100,7 @@ class SceneRunner {
           instance.exports.recording_free(recording);
         }
       })();
-      const summary = { id: "", title: name, about: "Your own recording. Press and drag it." };
+      const summary = { id: "", title: name, about };
       this.start({ summary, text, recordings: new Map([[DROPPED, bytes]]), paths: new Map() });
     } catch (error) {
       if (instance.stopped === null) tell({ type: "error", text: `${name}: ${reasonOf(error)}` });
@@ -258,7 +258,7 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
   const message = event.data;
   if (message.kind === "start") void start(message.base, message.scene);
   else if (message.kind === "message") runner?.receive(message.text);
-  else if (message.kind === "recording") runner?.openRecording(message.name, new Uint8Array(message.bytes));
+  else if (message.kind === "recording") runner?.openRecording(message.name, new Uint8Array(message.bytes), message.about);
   else if (message.kind === "begin_log") runner?.beginLog();
   else if (message.kind === "end_log") void runner?.endLog();
   else if (message.kind === "shown") runner?.shown();

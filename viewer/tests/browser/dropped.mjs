@@ -1,4 +1,5 @@
-// Files that are dropped onto the page without a server: logs play and are compared, recordings become scenes, and bad files are told.
+// Files that are dropped onto the page without a server: logs play and are compared, recordings become scenes, meshes are recorded, and bad
+// files are told.
 
 import { execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -78,6 +79,42 @@ async function served(log, last, paths) {
     child.removeAllListeners("exit");
     child.kill("SIGINT");
   }
+}
+
+/** Second preset of the dialog, in which it comes up. */
+const LIVER = { density: 1060 };
+
+/** Drops a mesh onto the page, and has it recorded as the dialog proposes. */
+async function record(page, name, bytes) {
+  await drop(page, { [name]: bytes });
+  await page.waitForSelector("dialog.upload-dialog[open]");
+  await page.click("dialog.upload-dialog .primary");
+}
+
+/** Surface of a box as a binary STL: each face in so many squares a side. */
+function boxSurface(size, cells) {
+  const triangles = [];
+  for (let axis = 0; axis < 3; axis++) {
+    const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+    for (const side of [0, 1]) {
+      for (let i = 0; i < cells; i++) {
+        for (let j = 0; j < cells; j++) {
+          const corner = (a, b) => {
+            const point = [0, 0, 0];
+            [point[axis], point[u], point[v]] = [side * size[axis], ((i + a) / cells) * size[u], ((j + b) / cells) * size[v]];
+            return point;
+          };
+          const square = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+          if (side === 0) square.reverse();
+          triangles.push([square[0], square[1], square[2]], [square[0], square[2], square[3]]);
+        }
+      }
+    }
+  }
+  const bytes = Buffer.alloc(84 + 50 * triangles.length);
+  bytes.writeUInt32LE(triangles.length, 80);
+  triangles.forEach((points, at) => points.flat().forEach((number, k) => bytes.writeFloatLE(number, 84 + 50 * at + 12 + 4 * k)));
+  return bytes;
 }
 
 function notificationOf(page, text) {
@@ -180,7 +217,7 @@ export const droppedCases = [
         ["cut.mcap", SAMPLE.subarray(0, 300), "cut.mcap: the log"],
         ["zeros.mcap", Buffer.alloc(5000), "zeros.mcap: the log"],
         ["other.mcap", withoutRecording, "other.mcap: finger_on_floor.toml: line 9: cannot read the recording gone.palp"],
-        ["mesh.stl", Buffer.from("solid"), "palpate record"],
+        ["notes.txt", Buffer.from("solid"), "notes.txt is not a supported mesh file"],
       ];
       for (const [name, bytes, text] of bad) {
         await drop(page, { [name]: bytes });
@@ -191,6 +228,67 @@ export const droppedCases = [
       }
       await screenshot(page, "dropped-bad");
       assert((await page.getAttribute("html", "data-kind")) === "live", "the page left the scene");
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
+    name: "a dropped surface is recorded in the page and falls, and its recording is saved for the program",
+    serverlessOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      const { generation } = await latestFrame(page);
+      await record(page, "box.stl", boxSurface([60, 40, 50], 4));
+      await page.waitForSelector('.job [aria-label="Cancel: mesh"]');
+      // The scene goes on meanwhile.
+      const { step } = await latestFrame(page);
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame.step > before + 100, step);
+      await screenshot(page, "recording-in-page");
+      await page.waitForFunction(() => document.querySelector("h1.title").textContent === "box.stl", null, { timeout: 120_000 });
+      await page.waitForFunction((before) => window.palpate.sceneView.graphs[0].frame?.generation > before, generation);
+      await page.waitForFunction(() => window.palpate.sceneView.graphs[0].frame?.contacts.length > 0, null, { timeout: 30_000 });
+      const about = await page.evaluate(() => window.palpate.sceneView.graphs[0].info.about);
+      assert(about.startsWith("Your own mesh. Press and drag it. Note: the surface was filled with"), about);
+      await screenshot(page, "recorded-in-page");
+      await page.locator('summary:has-text("Import a mesh")').click();
+      const [download] = await Promise.all([page.waitForEvent("download"), page.click('button:has-text("Save box.palp")')]);
+      const told = execFileSync(process.env.PALPATE, ["inspect", await download.path()], { encoding: "utf8" });
+      // 60 × 40 × 50 mm, filled exactly.
+      const [mass] = told.match(/(?<=mass +)[\d.]+/) ?? [];
+      const expected = 0.06 * 0.04 * 0.05 * LIVER.density;
+      assert(Math.abs(mass / expected - 1) < 1e-3, `mass ${mass} kg, expected ${expected}\n${told}`);
+      // It stays in the list.
+      await page.click(".scenes button >> nth=1");
+      await page.waitForFunction(() => document.querySelector("h1.title").textContent !== "box.stl");
+      await page.click('.scenes button:has-text("box.stl")');
+      await page.waitForFunction(() => document.querySelector("h1.title").textContent === "box.stl");
+      assertNoConsoleErrors(page);
+    },
+  },
+  {
+    name: "the recording of a dropped mesh is cancelled by its button, and bad meshes are told",
+    serverlessOnly: true,
+    async run(browser) {
+      const server = browser.keep(await start());
+      const page = await browser.page(server.url);
+      await waitForScene(page);
+      await record(page, "ball.stl", boxSurface([60, 60, 60], 12));
+      await page.click('.job [aria-label="Cancel: mesh"]');
+      await notificationOf(page, "the recording was cancelled");
+      await page.waitForSelector(".job", { state: "detached" });
+      for (const [name, bytes, text] of [
+        ["empty.stl", Buffer.alloc(0), "empty.stl was not recorded: "],
+        ["noise.obj", Buffer.from("v 1 2 nan\nf 1 2 3\n"), "noise.obj was not recorded: "],
+        ["open.stl", boxSurface([60, 60, 60], 2).subarray(0, 84), "open.stl was not recorded: "],
+      ]) {
+        await record(page, name, bytes);
+        const told = await notificationOf(page, text);
+        if (process.env.SHOTS) browser.note(told);
+        await page.waitForSelector(".job", { state: "detached" });
+      }
+      assert((await page.textContent("h1.title")) !== "ball.stl", "a cancelled recording opened");
+      await latestFrame(page);
       assertNoConsoleErrors(page);
     },
   },

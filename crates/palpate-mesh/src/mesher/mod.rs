@@ -28,11 +28,11 @@ use walls::Walls;
 use watch::Watch;
 pub use watch::WatchFn;
 
-/// Nodes that a body gets without a cell size: with quadratic elements recording takes one to two minutes on two cores.
+/// Nodes that a body gets by default: with quadratic elements recording takes one to two minutes on two cores.
 const DEFAULT_NODES: f64 = 2000.0;
 
-/// Nodes that a thin body may get by default, for cells no larger than it is thick.
-const DEFAULT_NODES_THIN: f64 = 15_000.0;
+/// Nodes that a thin body may get, for cells no larger than it is thick, as a multiple of those of others.
+const THIN: f64 = 7.5;
 
 /// Largest number of lattice points. A cube of 480,000 takes 24 CPU-seconds and 0.44 GB, so a full one about twice that.
 const MAX_POINTS: f64 = 1e6;
@@ -54,8 +54,10 @@ const LARGE_VOLUME_ERROR: f64 = 0.03;
 /// Parameters of [`tetrahedralise`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MeshingParameters {
-    /// Side of a cell [m]: edges are 0.87 to 1 of it long inside. By default for about 2,000 nodes.
+    /// Side of a cell [m]: edges are 0.87 to 1 of it long inside. None for a number of nodes.
     pub cell_size: Option<f64>,
+    /// About how many nodes the body gets without a cell size, more if it is thin. None for 2,000.
+    pub nodes: Option<u32>,
 }
 
 /// Report on a mesh that was made of a surface.
@@ -158,11 +160,12 @@ impl MeshingReport {
     }
 }
 
-/// Cell size of the parameters, or for the default number of nodes.
+/// Cell size of the parameters, or for their number of nodes.
 fn cell_size(prepared: &Prepared, parameters: &MeshingParameters) -> Result<f64, MeshError> {
     let &Prepared { volume, area, .. } = prepared;
     let cell = parameters.cell_size.unwrap_or_else(|| {
-        let [usual, thin] = [DEFAULT_NODES, DEFAULT_NODES_THIN].map(|nodes| cell_for(nodes, volume, area));
+        let nodes = parameters.nodes.map_or(DEFAULT_NODES, f64::from);
+        let [usual, thin] = [nodes, THIN * nodes].map(|nodes| cell_for(nodes, volume, area));
         usual.min(prepared.thickness()).max(thin)
     });
     if !(cell.is_finite() && cell > 0.0) {

@@ -16,7 +16,8 @@ const ANGLES_DEG: [f64; 2] = [25.0, 155.0];
 
 fn filled(surface: &SurfaceMesh, cell_size: Option<f64>) -> (Mesh, MeshingReport) {
     let watch = &mut |_| ControlFlow::Continue(());
-    tetrahedralise(surface, &MeshingParameters { cell_size }, watch).expect("a surface with an inside")
+    tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None }, watch)
+        .expect("a surface with an inside")
 }
 
 /// Signed volume of all tetrahedra [m³].

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 fn refusal(surface: &SurfaceMesh, cell_size: Option<f64>) -> String {
     let watch = &mut |_| ControlFlow::Continue(());
-    let result = tetrahedralise(surface, &MeshingParameters { cell_size }, watch);
+    let result = tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None }, watch);
     result.expect_err("no inside").to_string()
 }
 
@@ -97,7 +97,9 @@ fn a_body_is_read_from_a_file_of_either_kind() {
     let read = |name: &str, text: String, cell_size: Option<f64>| {
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("a file");
-        read_body(&path, 0.001, &MeshingParameters { cell_size }, &mut |_| ControlFlow::Continue(()))
+        read_body(&path, 0.001, &MeshingParameters { cell_size, nodes: None }, &mut |_| {
+            ControlFlow::Continue(())
+        })
     };
     let ball = shapes::ball();
     let vertices = ball.positions.iter().map(|p| format!("v {} {} {}\n", p.x * 1e3, p.y * 1e3, p.z * 1e3));

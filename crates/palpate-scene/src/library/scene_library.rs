@@ -4,6 +4,7 @@
 
 use super::built_in::{self, BUILT_IN_SCENES, BuiltInScene};
 use super::falling::falling_scene;
+use super::mesh_upload::{MeshUpload, UPLOAD_DAMPING};
 use super::settings::{SettingsChange, set};
 use super::touchable::{TouchableScene, read_touchable_scene};
 use crate::error::{SceneError, SceneErrorKind};
@@ -11,7 +12,7 @@ use crate::file::{PartsInMemory, read_text};
 use crate::recipe::{RecordingRecipe, cache_folder};
 use crate::recording_file::read_recording;
 use crate::scene::Scene;
-use palpate::{Damping, Material};
+use palpate::Material;
 use palpate_export::{TemporaryFolder, write_atomically};
 use palpate_fem::{ElementOrder, Progress};
 use palpate_mesh::read_regular_file;
@@ -43,23 +44,6 @@ pub struct OpenedScene {
     pub about: String,
     /// Whether an object can be recorded again with another material, by object.
     pub recordable: Vec<bool>,
-}
-
-/// Mesh to be recorded for a new scene.
-#[derive(Debug, Clone)]
-pub struct MeshUpload {
-    /// File name; the content tells the format.
-    pub name: String,
-    /// Content of the file.
-    pub bytes: Vec<u8>,
-    /// Scale to metres.
-    pub scale: f64,
-    /// Side of the cells that a surface is filled with [m]; none for the default.
-    pub cell_size: Option<f64>,
-    /// Material of the whole mesh.
-    pub material: Material,
-    /// Number of modes.
-    pub modes: usize,
 }
 
 /// Scene that was opened last.
@@ -261,7 +245,7 @@ impl SceneLibrary {
         progress: &mut dyn Progress,
     ) -> Result<OpenedScene, SceneError> {
         let refused = |message: String| SceneError::new(SceneErrorKind::Mesh, message);
-        let MeshUpload { name, bytes, scale, cell_size, material, modes } = upload;
+        let MeshUpload { name, bytes, scale, meshing, material, modes } = upload;
         let file = Path::new(&name).file_name().filter(|name| !name.is_empty());
         let Some(file) = file else { return Err(refused("the mesh file has no name".into())) };
         let number = {
@@ -273,12 +257,11 @@ impl SceneLibrary {
         make_folder(&folder)?;
         let source = folder.join(file);
         std::fs::write(&source, &bytes).map_err(|error| SceneError::io("keep the mesh", &source, &error))?;
-        let damping = Damping::Rayleigh { alpha: 2.0, beta: 2e-4 };
         let path = source.display().to_string();
         let recipe = RecordingRecipe {
             scale,
-            cell_size,
-            ..RecordingRecipe::new(path, material, ElementOrder::Quadratic, modes, damping)
+            meshing,
+            ..RecordingRecipe::new(path, material, ElementOrder::Quadratic, modes, UPLOAD_DAMPING)
         };
         // The sender knows the name of the file, not its folder.
         let without_folder = |error: SceneError| {

@@ -12,7 +12,7 @@ use clap::Args;
 use palpate::{Damping, Material};
 use palpate_export::{check_writable, write_atomically};
 use palpate_fem::{ElementOrder, ErrorTarget, Precision, Progress, RecordExtent, ResidualChoice};
-use palpate_mesh::{MergeNodes, PieceChoice, Repair};
+use palpate_mesh::{MergeNodes, MeshingParameters, PieceChoice, Repair};
 use palpate_scene::{BodySource, MaterialChoice, RecordOptions};
 use std::path::{Path, PathBuf};
 use table::{TableArguments, TableCommand};
@@ -242,7 +242,7 @@ fn options(arguments: &Arguments) -> Result<RecordOptions, Failure> {
         target: ErrorTarget { force_error: arguments.force_error, bandwidth_hz: arguments.bandwidth },
         order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
         scale: arguments.scale,
-        cell_size: arguments.cell_size,
+        meshing: MeshingParameters { cell_size: arguments.cell_size, nodes: None },
         repair: Repair {
             merge_nodes: arguments.merge_nodes.into(),
             piece: arguments.piece.unwrap_or_default(),

@@ -6,8 +6,8 @@ use crate::failure::Failure;
 use crate::terminal::notify;
 use palpate::{DeviceMode, Material};
 use palpate_scene::{
-    BUILT_IN_SCENES, MeshUpload, OpenedScene, Progress, ProgressFn, RealDevice, SceneDevice, SceneLibrary,
-    SceneLog, SettingsChange, attach_path,
+    BUILT_IN_SCENES, MeshUpload, MeshingParameters, OpenedScene, Progress, ProgressFn, RealDevice,
+    SceneDevice, SceneLibrary, SceneLog, SettingsChange, attach_path,
 };
 use palpate_viewer::{
     JobControl, JobReport, MaterialDescription, PhysicsSettings, SceneError, SceneProvider, SceneSummary,
@@ -99,7 +99,8 @@ impl SceneProvider for LibraryProvider {
     fn record(&self, upload: Upload, job: JobControl) -> Result<ViewerScene, SceneError> {
         let Upload { name, bytes, scale, material, modes } = upload;
         let material = uniform(material);
-        let upload = MeshUpload { name, bytes, scale, cell_size: None, material, modes };
+        let upload =
+            MeshUpload { name, bytes, scale, meshing: MeshingParameters::default(), material, modes };
         self.provided(self.library.record_upload(upload, &mut JobProgress::new(job)))
     }
 }
