@@ -133,12 +133,23 @@ fn an_uploaded_mesh_is_read_by_its_content_and_its_repairs_are_told() {
         meshing: MeshingParameters { cell_size: Some(0.03), nodes: None },
         ..upload("cube.stl", surface)
     };
+    let (in_memory, repairs) = upload.record(&mut SilentProgress).expect("a recording");
     let opened = library.record_upload(upload, &mut SilentProgress).expect("a scene");
     let told = "Your own mesh. Press and drag it. Note: 1 triangles faced the other way than their neighbours and were turned Note: the \
                 surface was filled with ";
     assert!(opened.about.starts_with(told), "{}", opened.about);
     let mass: f64 = opened.scene.model.recordings().map(|recording| recording.mass()).sum();
     assert!((mass - 1.0).abs() < 0.01, "{mass}");
+    // Recorded in memory, as a page without a server does, it is the same body with the same repairs.
+    assert!((in_memory.mass() / mass - 1.0).abs() < 1e-12);
+    assert_eq!(
+        ["Your own mesh. Press and drag it."]
+            .into_iter()
+            .chain(repairs.iter().map(String::as_str))
+            .collect::<Vec<_>>()
+            .join(" Note: "),
+        opened.about
+    );
     // Another material is recorded of the same cells.
     let soft = Material::isotropic(5e3, 0.3, 500.0);
     let softer = library.change_material(0, soft, &mut SilentProgress).expect("a scene");

@@ -85,6 +85,19 @@ fn clean_bodies_are_filled_to_their_surface() {
 }
 
 #[test]
+fn a_body_has_about_as_many_nodes_as_are_asked_for() {
+    for nodes in [150, 600, 5000] {
+        for (name, surface) in [("ball", shapes::ball()), ("box", shapes::slab([0.1, 0.06, 0.04]))] {
+            let watch = &mut |_| ControlFlow::Continue(());
+            let parameters = MeshingParameters { cell_size: None, nodes: Some(nodes) };
+            let (mesh, _) = tetrahedralise(&surface, &parameters, watch).expect("a surface with an inside");
+            let share = mesh.nodes.len() as f64 / f64::from(nodes);
+            assert!((0.7..1.4).contains(&share), "{name}: {} of {nodes}", mesh.nodes.len());
+        }
+    }
+}
+
+#[test]
 fn the_volume_of_a_ball_converges_with_the_square_of_the_cell() {
     let surface = shapes::ball();
     let error = |cell: f64| filled(&surface, Some(cell)).1.volume_error.expect("no overlap");
