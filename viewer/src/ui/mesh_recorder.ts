@@ -7,7 +7,7 @@ import type { FromRecorder, ToRecorder } from "../worker/record_messages";
 import type { JobList } from "./job_list";
 import type { Notifications } from "./notifications";
 
-/** What a user chooses for a mesh: metres per unit of the file, its material, and the number of modes. */
+/** Choice for a mesh: metres per unit of the file, its material, and the number of modes. */
 export interface MeshChoice extends Material {
   scale: number;
   modes: number;
