@@ -4,9 +4,11 @@
 
 use crate::exports::{DATA, TEXT, handle_or_error, or_error, send, send_json, text};
 use crate::live_scene::{LiveScene, RecordedRun, Rescaled, Titles};
+use glam::{DQuat, DVec3};
 use palpate::Recording;
+use palpate_haptics::device::Reading;
 use palpate_scene::{PartsInMemory, falling_scene};
-use palpate_viewer::{PageMessage, SceneSummary};
+use palpate_viewer::{DevicePlace, PageMessage, SceneSummary};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -135,4 +137,33 @@ pub unsafe extern "C" fn live_data(live: &LiveScene, address: *const u8, length:
     // SAFETY: as promised by the caller.
     let data = live.static_data(&unsafe { text(address, length) });
     data.inspect(|data| send(DATA, data)).is_some()
+}
+
+/// Attaches a haptic device: place of its first reading [m, world], orientation of its frame (w, x, y, z), and scale; false where the scene
+/// has no free pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_attach_device(live: &mut LiveScene, place: &[f64; 8]) -> bool {
+    let &[px, py, pz, w, x, y, z, scale] = place;
+    let (start, orientation) = (DVec3::new(px, py, pz), DQuat::from_xyzw(x, y, z, w));
+    live.attach_device(DevicePlace { start, orientation, scale }).is_some()
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_detach_device(live: &mut LiveScene) {
+    live.detach_device();
+}
+
+/// Update of the haptic device with a position [m, device frame] and pressed buttons, one bit each, if it gave them: returns three numbers, the
+/// force to command [N, device frame].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn live_exchange(
+    live: &mut LiveScene,
+    is_read: bool,
+    x: f64,
+    y: f64,
+    z: f64,
+    buttons: u32,
+) -> *const f64 {
+    let reading = Reading { position: DVec3::new(x, y, z), orientation: None, buttons };
+    live.exchange(is_read.then_some(reading), now()).as_ptr()
 }

@@ -2,10 +2,11 @@
 
 use palpate::Recording;
 use palpate_haptics::InputRecord;
+use palpate_haptics::device::Reading;
 use palpate_scene::{PartsInMemory, SettingsChange, TouchableScene, read_touchable_scene};
 use palpate_viewer::{
-    LocalRequest, LocalScene, MaterialDescription, PageMessage, PhysicsSettings, SceneSummary, ViewerDevice,
-    ViewerScene, describe_scene,
+    DevicePlace, LocalRequest, LocalScene, MaterialDescription, PageMessage, PhysicsSettings, SceneSummary,
+    ViewerDevice, ViewerScene, describe_scene,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -62,6 +63,8 @@ pub struct LiveScene {
     current: SceneText,
     /// Scene of the record.
     recorded: Option<SceneText>,
+    /// Last force on the haptic device [N, device frame].
+    force: [f64; 3],
 }
 
 /// Record of a run: the scene, and the inputs of its steps.
@@ -85,6 +88,7 @@ impl LiveScene {
             local: LocalScene::new(scene).map_err(|error| error.to_string())?,
             current,
             recorded: None,
+            force: [0.0; 3],
         })
     }
 
@@ -143,6 +147,23 @@ impl LiveScene {
     pub fn end_record(&mut self) -> Option<RecordedRun> {
         let SceneText { text, rescaled, .. } = self.recorded.take()?;
         Some(RecordedRun { text, rescaled, inputs: self.local.end_record()? })
+    }
+
+    /// Attaches a haptic device in place of a pointer, until a scene starts; returns its index, or none where the scene has no free one.
+    pub fn attach_device(&mut self, place: DevicePlace) -> Option<usize> {
+        self.local.attach_device(place)
+    }
+
+    /// Detaches the haptic device.
+    pub fn detach_device(&mut self) {
+        self.local.detach_device();
+    }
+
+    /// Update of the haptic device with its newest reading, or none if it gives none: returns the force to command [N, device frame],
+    /// zero where no device is attached.
+    pub fn exchange(&mut self, reading: Option<Reading>, now_s: f64) -> &[f64; 3] {
+        self.force = self.local.exchange(reading, now_s).unwrap_or_default().to_array();
+        &self.force
     }
 
     /// Makes the steps that are due; `now_s` reads the clock [s].

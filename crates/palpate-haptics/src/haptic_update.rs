@@ -251,6 +251,11 @@ impl HapticUpdate {
         *self.filtered_position.insert(filtered)
     }
 
+    /// Port, for another use.
+    pub fn into_port(self) -> DevicePort {
+        self.port
+    }
+
     /// Commands zero force.
     pub fn release(&mut self, now_s: f64) {
         self.set_force(DVec3::ZERO, now_s);

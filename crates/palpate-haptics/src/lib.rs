@@ -30,6 +30,7 @@
 // Parts that only drivers and links use.
 #![cfg_attr(not(feature = "real-time"), allow(dead_code))]
 
+mod attached_device;
 mod buffer_pool;
 #[cfg(feature = "real-time")]
 mod clock;
@@ -64,6 +65,7 @@ mod snapshot;
 pub mod stability;
 pub mod timing;
 
+pub use attached_device::AttachedDevice;
 pub use buffer_pool::{PoolConsumer, PoolProducer, buffer_pool};
 #[cfg(feature = "real-time")]
 pub use clock::Clock;
@@ -86,7 +88,7 @@ pub use scene_names::SceneNames;
 #[cfg(feature = "real-time")]
 pub use scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 #[cfg(feature = "real-time")]
-pub use session::{AttachedDevice, DeviceReport, Report, Session, SessionDevice, run_haptic_update};
+pub use session::{DeviceReport, Report, Session, SessionDevice, run_haptic_update};
 pub use snapshot::{Snapshot, SnapshotReader, SnapshotWriter, snapshot_buffer, steps_per_frame};
 #[doc(no_inline)]
 pub use timing::{Cycle, DurationHistogram, Overrun, Percentiles, Timing, percentile_us};

@@ -1,18 +1,17 @@
 //! Session: a run in real time, with the processes as threads.
 
+use crate::attached_device::AttachedDevice;
 use crate::clock::Clock;
 use crate::cycle_channel::CycleSender;
-use crate::device::{Device, DeviceSpec, Mount};
+use crate::device::DeviceSpec;
 use crate::error::{Error, SessionError};
 use crate::force_process::{ForceProcess, SceneMotion, StepListener};
 use crate::haptic_update::{HapticUpdate, UpdateCounts};
 use crate::log::{LogSender, LogSummary, LogWriter, WrittenLog};
 use crate::motion_path::MotionPath;
-use crate::passivity::PassivityController;
 use crate::playback::Playback;
-use crate::port::{DevicePort, ForcePort, port};
-use crate::safety::Safety;
-use crate::safety_limits::{RefusedMotions, SafetyLimits};
+use crate::port::{ForcePort, port};
+use crate::safety_limits::RefusedMotions;
 use crate::scheduling::{GrantedScheduling, Scheduling, steal_time_s};
 use crate::snapshot::{Snapshot, SnapshotWriter, snapshot_buffer, steps_per_frame};
 use crate::timing::{Cycle, DurationHistogram, Overrun, Timing};
@@ -25,27 +24,6 @@ use std::time::{Duration, Instant};
 
 /// Lead of the haptic updates over the force process.
 const HEAD_START: Duration = Duration::from_millis(20);
-
-/// Periods of the haptic update within its watchdog: one update may be missed.
-const MISSED_UPDATES: f64 = 2.0;
-
-/// Attached device: a driver with the settings of its haptic update.
-pub struct AttachedDevice {
-    /// Driver.
-    pub device: Box<dyn Device>,
-    /// Mode in the scene.
-    pub mode: DeviceMode,
-    /// Device frame in the world.
-    pub mount: Mount,
-    /// Update rate [Hz].
-    pub rate_hz: f64,
-    /// Safety limits.
-    pub limits: SafetyLimits,
-    /// Whether a passivity controller acts on its port.
-    pub passive: bool,
-    /// Whether a button press arms the force.
-    pub arm_by_button: bool,
-}
 
 /// Device of a session.
 pub enum SessionDevice {
@@ -455,23 +433,6 @@ impl SessionDevice {
             Self::Path(path, _) => Some(path.clone()),
             Self::Local(_) | Self::Remote(..) => None,
         }
-    }
-}
-
-impl AttachedDevice {
-    /// Haptic update of the device on a port, with a passivity controller if `passive` is set. The force limit is at most the
-    /// device's; the watchdog bears an update that is missed, also at a low rate.
-    pub fn update(self, port: DevicePort) -> HapticUpdate {
-        let Self { device, mount, rate_hz, limits, passive, arm_by_button, .. } = self;
-        let spec = device.spec();
-        let controller =
-            PassivityController::new(spec.mass_kg, spec.resolution_m * mount.scale, 1.0 / rate_hz);
-        let safety = Safety::new(SafetyLimits {
-            force_n: limits.force_n.min(spec.force_n),
-            watchdog_s: limits.watchdog_s.max(MISSED_UPDATES / rate_hz),
-            ..limits
-        });
-        HapticUpdate::new(device, port, mount, safety, passive.then_some(controller), arm_by_button)
     }
 }
 

@@ -20,6 +20,7 @@ mod describe;
 mod error;
 #[cfg(feature = "server")]
 mod live;
+mod local_device;
 mod local_log;
 #[cfg(feature = "logs")]
 mod local_logs;
@@ -41,6 +42,7 @@ pub use describe::describe_scene;
 pub use error::SceneError;
 #[cfg(feature = "server")]
 pub use error::{ServerError, TlsError, TokenError};
+pub use local_device::DevicePlace;
 pub use local_log::{LARGEST_RECORD_BYTES, LONGEST_RECORD_S};
 #[cfg(feature = "logs")]
 pub use local_logs::LocalLogs;

@@ -5,6 +5,7 @@
 
 use crate::current::CurrentScene;
 use crate::error::SceneError;
+use crate::local_device::{DevicePlace, LocalDevice};
 use crate::local_log::LocalRecord;
 use crate::page_requests::{Effect, SceneControls, SceneRequest, unreadable};
 use crate::pointers::{Pointers, lock};
@@ -15,7 +16,9 @@ use crate::protocol::{
 use crate::scene_provider::{ViewerDevice, ViewerScene};
 use crate::scene_start::{DEVICE_TIMEOUT_S, FRAME_RATE_HZ};
 use crate::static_data::StaticData;
+use glam::DVec3;
 use palpate::{DeviceMode, Model, State};
+use palpate_haptics::device::Reading;
 use palpate_haptics::{
     Cycle, DevicePort, ForcePort, ForceProcess, InputRecord, Overrun, Playback, Snapshot, Timing, port,
     steps_per_frame,
@@ -66,6 +69,8 @@ pub struct LocalScene {
     current: CurrentScene,
     process: ForceProcess,
     pointers: Mutex<Pointers>,
+    /// Haptic device, until the next start of a scene.
+    device: Option<LocalDevice>,
     playback: Playback,
     encoder: FrameEncoder,
     snapshot: Snapshot,
@@ -128,6 +133,7 @@ impl LocalScene {
             current: CurrentScene::new(generation, scene),
             process,
             pointers: Mutex::new(Pointers::new(ports)),
+            device: None,
             playback: Playback::default(),
             timing: Timing::default(),
             tick: 0,
@@ -249,6 +255,28 @@ impl LocalScene {
             }
         }
         None
+    }
+
+    /// Attaches a haptic device in place of a pointer; returns its index, or none where the scene has no free one. It stays until a scene
+    /// starts.
+    pub fn attach_device(&mut self, place: DevicePlace) -> Option<usize> {
+        self.detach_device();
+        let (device, port) = lock(&self.pointers).take_port()?;
+        self.device = Some(LocalDevice::new(device, port, place));
+        Some(device)
+    }
+
+    /// Update of the attached device with its newest reading, or none if it gives none: returns the force to command [N, device frame],
+    /// and none where no device is attached.
+    pub fn exchange(&mut self, reading: Option<Reading>, now_s: f64) -> Option<DVec3> {
+        Some(self.device.as_mut()?.exchange(reading, now_s))
+    }
+
+    /// Gives the slot of the attached device back to the pointers.
+    pub fn detach_device(&mut self) {
+        if let Some((device, port)) = self.device.take().and_then(LocalDevice::into_slot) {
+            lock(&self.pointers).give_back(device, port);
+        }
     }
 
     /// Makes the steps whose deadlines have passed; `now_s` reads the clock [s].

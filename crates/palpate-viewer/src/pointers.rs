@@ -25,9 +25,9 @@ pub(crate) type PointerId = (u64, u64);
 /// Pointers shared by the page sessions and the pointer thread.
 pub(crate) type SharedPointers = Arc<Mutex<Pointers>>;
 
-/// Locks the pointers; a panic of another holder leaves them valid.
-pub(crate) fn lock(pointers: &Mutex<Pointers>) -> MutexGuard<'_, Pointers> {
-    pointers.lock().unwrap_or_else(PoisonError::into_inner)
+/// Locks shared values; a panic of another holder leaves them valid.
+pub(crate) fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Device slots for pointers.
@@ -53,18 +53,21 @@ struct DeviceSlot {
 impl Pointers {
     /// Free slots for devices, given by index.
     pub fn new(ports: Vec<(usize, DevicePort)>) -> Self {
-        let slot = |(device, port)| DeviceSlot {
-            device,
-            port,
-            owner: None,
-            mode: DeviceMode::Inactive,
-            target: DVec3::ZERO,
-            position: DVec3::ZERO,
-            velocity: DVec3::ZERO,
-            sequence: 0,
-            press_sequence: 0,
-        };
-        Self(ports.into_iter().map(slot).collect())
+        Self(ports.into_iter().map(DeviceSlot::new).collect())
+    }
+
+    /// Takes the port of the last free slot, with its device index, for a device that is no pointer.
+    pub fn take_port(&mut self) -> Option<(usize, DevicePort)> {
+        let free = self.0.iter().rposition(|slot| slot.owner.is_none())?;
+        let DeviceSlot { device, port, .. } = self.0.remove(free);
+        Some((device, port))
+    }
+
+    /// Gives a slot back.
+    pub fn give_back(&mut self, device: usize, mut port: DevicePort) {
+        // Numbers of motions go on, so that a press waits for its own reply.
+        let sequence = port.newest().in_reply_to;
+        self.0.push(DeviceSlot { sequence, ..DeviceSlot::new((device, port)) });
     }
 
     /// Claims a free slot at a position [m, world]; returns its device index.
@@ -120,6 +123,20 @@ impl Pointers {
 }
 
 impl DeviceSlot {
+    fn new((device, port): (usize, DevicePort)) -> Self {
+        Self {
+            device,
+            port,
+            owner: None,
+            mode: DeviceMode::Inactive,
+            target: DVec3::ZERO,
+            position: DVec3::ZERO,
+            velocity: DVec3::ZERO,
+            sequence: 0,
+            press_sequence: 0,
+        }
+    }
+
     /// x − target = (a + b·t)·e^(−ωt)
     fn follow(&mut self, dt: f64) {
         let a = self.position - self.target;

@@ -1,9 +1,12 @@
 //! A live scene without threads: the protocol of the server, in simulated time.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
+use palpate_haptics::device::Reading;
 use palpate_scene::{PartsInMemory, read_touchable_scene};
 use palpate_testkit::FREE_BLOCK_FILE;
-use palpate_viewer::{LocalRequest, LocalScene, PageMessage, ViewerDevice, ViewerScene, describe_scene};
+use palpate_viewer::{
+    DevicePlace, LocalRequest, LocalScene, PageMessage, ViewerDevice, ViewerScene, describe_scene,
+};
 use serde_json::Value;
 use std::cell::Cell;
 use std::path::Path;
@@ -208,4 +211,58 @@ fn sound_goes_with_the_steps_while_the_page_wants_it() {
     let heard = page.sounds.len();
     page.run(0.2);
     assert_eq!(page.sounds.len(), heard);
+}
+
+/// Device above the block that lies on the floor, its frame turned a quarter about the vertical.
+const ABOVE: DevicePlace = DevicePlace {
+    start: DVec3::new(0.0, 0.15, 0.0),
+    orientation: DQuat::from_xyzw(0.0, std::f64::consts::FRAC_1_SQRT_2, 0.0, std::f64::consts::FRAC_1_SQRT_2),
+    scale: 1.0,
+};
+
+#[test]
+fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_place_back() {
+    let mut page = Page::new(&SCENE.replace("[0.0, 0.2, 0.0]", "[0.0, 0.05, 0.0]"));
+    page.run(1.0);
+    let device = page.scene.attach_device(ABOVE).expect("a free slot");
+    let scene = page.newest("scene");
+    let slots = scene["devices"].as_array().expect("devices").len();
+    assert_eq!(device, slots - 1, "the last one, so that pointers have the first");
+    // The vendor's origin is somewhere; the hand goes down at 5 cm/s and stays.
+    let first = DVec3::new(0.3, -0.2, 0.1);
+    let mut at = |page: &mut Page, depth: f64, buttons: u32| {
+        page.now_s.set(page.now_s.get() + 0.001);
+        page.call(|scene, now, send| scene.advance(&|| now.get(), send));
+        let reading = Reading { position: first - depth * DVec3::Y, orientation: None, buttons };
+        page.scene.exchange(Some(reading), page.now_s.get()).expect("an attached device")
+    };
+    let down = |step: u32| (5e-5 * f64::from(step)).min(0.06);
+    let forces: Vec<DVec3> = (0..1500).map(|step| at(&mut page, down(step), 0)).collect();
+    assert!(forces.iter().all(|force| *force == DVec3::ZERO), "no button was pressed");
+    let forces: Vec<DVec3> =
+        (0..1500).map(|step| at(&mut page, 0.06, u32::from((100..200).contains(&step)))).collect();
+    assert!(forces[..100].iter().all(|force| *force == DVec3::ZERO));
+    let last = forces[1499];
+    // The largest force, to round-off.
+    assert!(last.y > 0.1 && last.length() < 1.5 + 1e-12, "{last}");
+    // Without readings the force goes.
+    let mut force = last;
+    for _ in 0..200 {
+        page.now_s.set(page.now_s.get() + 0.001);
+        page.call(|scene, now, send| scene.advance(&|| now.get(), send));
+        force = page.scene.exchange(None, page.now_s.get()).expect("an attached device");
+    }
+    assert_eq!(force, DVec3::ZERO);
+    let press = |page: &mut Page, pointer: usize| {
+        page.receive(&format!(
+            r#"{{"type":"press","pointer":{pointer},"mode":"touch","position":[0,0.3,0]}}"#
+        ));
+        page.newest("assigned")["device"].as_u64()
+    };
+    let taken: Vec<_> = (0..slots).map(|pointer| press(&mut page, pointer)).collect();
+    assert_eq!(taken.iter().flatten().count(), slots - 1, "{taken:?}");
+    page.scene.detach_device();
+    assert_eq!(press(&mut page, slots - 1), Some(device as u64));
+    assert_eq!(page.scene.exchange(None, 0.0), None);
+    assert_eq!(page.scene.attach_device(ABOVE), None, "every slot is taken");
 }

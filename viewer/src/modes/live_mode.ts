@@ -3,6 +3,7 @@
 import type { Connection } from "../protocol/connection";
 import type { ClientMessage, DeviceAssigned, Hello, Progress, SceneMessage, Status } from "../protocol/messages";
 import type { Frame } from "../protocol/frame";
+import { HaplyPanel } from "../ui/haply_panel";
 import { PageRecorder, ServerRecorder, type MeshRecorder } from "../ui/mesh_recorder";
 import { MeshUpload } from "../ui/mesh_upload";
 import { OpenFiles } from "../ui/open_files";
@@ -55,7 +56,8 @@ export class LiveMode implements PageMode {
   private readonly meshUpload: MeshUpload;
   /** Recorder of the server, where there is one. */
   private readonly serverRecorder: ServerRecorder | null = null;
-  /** Files, on a page without a server. */
+  /** Haptic device and files, on a page without a server. */
+  private readonly haply: HaplyPanel | null = null;
   private readonly openFiles: OpenFiles | null = null;
   private readonly lostObjects: LostObjects;
   private lostCheckedAt = 0;
@@ -120,6 +122,7 @@ export class LiveMode implements PageMode {
         this.linked.end();
         worker.openRecording(name, recording, about);
       };
+      this.haply = new HaplyPanel(worker, sceneView);
       this.recorder = new PageRecorder(notifications, this.jobs, open);
       const meshUpload = new MeshUpload(notifications, this.recorder, "A surface is filled with about 600 nodes; palpate record makes finer ones. The file stays on this device.");
       this.meshUpload = meshUpload;
@@ -136,7 +139,7 @@ export class LiveMode implements PageMode {
     layout.viewArea.append(this.shown.box, new ScaleLock(sceneView).button);
     display.section.append(...this.pointers.vibrationRow);
     const { scenes, physics, material } = this.panels;
-    layout.controls.append(scenes.section, display.section, physics.section, material.section, meshUpload.section, ...(this.openFiles === null ? [] : [this.openFiles.section]));
+    layout.controls.append(scenes.section, display.section, physics.section, material.section, meshUpload.section, ...[this.openFiles, this.haply].flatMap((panel) => (panel === null ? [] : [panel.section])));
     layout.page.append(meshUpload.dialog, this.share.element);
   }
 
@@ -205,6 +208,7 @@ export class LiveMode implements PageMode {
       const viewpoint = this.linked.takeViewpoint();
       if (viewpoint !== null) this.sceneView.orbit.look(viewpoint);
       this.panels.shown(scene);
+      this.haply?.place();
       this.hint.show(scene);
     });
   }

@@ -1,6 +1,6 @@
 // Connection to a scene that the page runs by itself, in a Web Worker: the same messages as from a server.
 
-import type { FromWorker, ToWorker } from "../worker/messages";
+import type { FromWorker, HaplyPlace, ToWorker } from "../worker/messages";
 import type { ConnectionListener } from "./connection";
 import { deliver } from "./deliver";
 import type { ClientMessage } from "./messages";
@@ -25,6 +25,9 @@ export class WorkerConnection {
   private lastRequest = 0;
   /** Log that is awaited. */
   private log: { done: (log: { bytes: ArrayBuffer; steps: number }) => void; failed: (error: Error) => void } | null = null;
+
+  /** Listener of the Haply device's state. */
+  onHaply: (state: "connected" | "lost", text: string) => void = () => undefined;
 
   constructor(private readonly listener: WorkerListener) {
     setDataSource((path) => this.fetch(path));
@@ -56,6 +59,16 @@ export class WorkerConnection {
   /** Opens a recording as a scene of its own, with what is said about it. */
   openRecording(name: string, bytes: ArrayBuffer, about: string): void {
     this.post({ kind: "recording", name, bytes, about });
+  }
+
+  /** Connects a Haply device by the address of its service, or none. */
+  setHaply(address: string | null): void {
+    this.post({ kind: "haply", address });
+  }
+
+  /** Tells where the device is in the scene that is shown. */
+  placeHaply(place: HaplyPlace): void {
+    this.post({ kind: "haply_place", place });
   }
 
   send(message: ClientMessage): void {
@@ -96,6 +109,9 @@ export class WorkerConnection {
       case "log":
         this.log?.done({ bytes: message.bytes, steps: message.steps });
         this.log = null;
+        break;
+      case "haply":
+        this.onHaply(message.state, message.text);
         break;
       case "no_log":
         this.log?.failed(new Error(message.reason));

@@ -13,6 +13,9 @@ export interface LiveExports extends Exports {
   live_begin_record(live: number): number;
   live_end_record(live: number): number;
   live_advance(live: number): number;
+  live_attach_device(live: number, place: number): number;
+  live_detach_device(live: number): void;
+  live_exchange(live: number, isRead: number, x: number, y: number, z: number, buttons: number): number;
   live_data(live: number, address: number, length: number): number;
 }
 

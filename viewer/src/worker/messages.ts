@@ -1,5 +1,12 @@
 // Messages between the page and the worker that runs its scene.
 
+/** Place of a haptic device in a scene: that of its first reading [m, world], orientation of its frame (w, x, y, z), metres per metre. */
+export interface HaplyPlace {
+  start: readonly [number, number, number];
+  orientation: readonly [number, number, number, number];
+  scale: number;
+}
+
 /** Message to the worker. */
 export type ToWorker =
   /** Start: address of the folder of `palpate.wasm` and `scenes/`, and the scene to open, or the first. */
@@ -11,6 +18,9 @@ export type ToWorker =
   /** Begin and end of a record for a log. */
   | { kind: "begin_log" }
   | { kind: "end_log" }
+  /** Haply device of the Inverse Service at an address, or none; and where it is in the scene. */
+  | { kind: "haply"; address: string | null }
+  | { kind: "haply_place"; place: HaplyPlace }
   /** Message of the viewer protocol, as JSON. */
   | { kind: "message"; text: string }
   /** A frame was shown. */
@@ -29,6 +39,8 @@ export type FromWorker =
   /** Log of a record, or the reason that there is none. */
   | { kind: "log"; steps: number; bytes: ArrayBuffer }
   | { kind: "no_log"; reason: string }
+  /** State of the Haply device, for its user. */
+  | { kind: "haply"; state: "connected" | "lost"; text: string }
   /** Answer to a request; null if there is no such data. */
   | { kind: "data"; request: number; bytes: ArrayBuffer | null }
   /** The scene has ended. */

@@ -1,11 +1,12 @@
 // Web Worker that runs a live scene: the force process in WebAssembly, speaking the protocol of the server.
 
-import { type Instance, Sent, textOf } from "../../../bindings/web/palpate/memory";
+import { type Instance, Sent, textOf, unsigned } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
 import type { ClientMessage, SceneSummary } from "../protocol/messages";
+import { HaplyConnection, type Reading, type Vector } from "./haply_device";
 import { liveExports, loadLiveModule } from "./live_module";
 import { makeLog, type RecordedRun } from "./log_writer";
-import type { ToWorker } from "./messages";
+import type { HaplyPlace, ToWorker } from "./messages";
 import { post, reasonOf, tell } from "./posting";
 import { fetchScene, fetchScenes, type SceneFiles } from "./scene_files";
 import { Ticker } from "./ticker";
@@ -46,6 +47,7 @@ class SceneRunner {
   /** Files of the scene, and those of the scene that is recorded for a log, with the time of its start [s since 1970]. */
   private files: SceneFiles | null = null;
   private recorded: { files: SceneFiles; startS: number } | null = null;
+  private haply: HaplyConnection | null = null;
   private readonly frames = new FrameStream();
   private readonly ticker = new Ticker(() => this.advance());
 
@@ -171,6 +173,42 @@ class SceneRunner {
     this.frames.shown();
   }
 
+  /** Connects a Haply device, or none. */
+  setHaply(address: string | null): void {
+    this.haply?.close();
+    this.haply = null;
+    if (this.live !== 0) liveExports(this.instance).live_detach_device(this.live);
+    if (address === null) return;
+    const tellState = (state: "connected" | "lost", text: string) => post({ kind: "haply", state, text });
+    try {
+      this.haply = new HaplyConnection(address, {
+        connected: (device) => tellState("connected", `Inverse3 ${device}`),
+        exchange: (reading) => this.exchange(reading),
+        lost: (reason) => tellState("lost", reason),
+      });
+    } catch (error) {
+      tellState("lost", reasonOf(error));
+    }
+  }
+
+  /** Attaches the Haply device to the scene, at a place. */
+  placeHaply({ start, orientation, scale }: HaplyPlace): void {
+    if (this.haply === null || this.live === 0) return;
+    const numbers = new Uint8Array(new Float64Array([...start, ...orientation, scale]).buffer);
+    const { instance, live } = this;
+    const isAttached = instance.withBytes(numbers, (place) => instance.call(() => liveExports(instance).live_attach_device(live, place)));
+    if (isAttached === 0) tell({ type: "error", text: "the scene has no free device for the Inverse3" });
+  }
+
+  private exchange(reading: Reading | null): Vector {
+    const { instance, live } = this;
+    if (live === 0 || instance.stopped !== null) return [0, 0, 0];
+    const [x, y, z] = reading?.position ?? [0, 0, 0];
+    const force = unsigned(instance.guard(() => liveExports(instance).live_exchange(live, reading === null ? 0 : 1, x, y, z, reading?.buttons ?? 0)));
+    const [fx = 0, fy = 0, fz = 0] = new Float64Array(instance.exports.memory.buffer, force, 3);
+    return [fx, fy, fz];
+  }
+
   answer(request: number, path: string): void {
     const { instance, live } = this;
     let bytes: ArrayBuffer | null = null;
@@ -262,5 +300,7 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
   else if (message.kind === "begin_log") runner?.beginLog();
   else if (message.kind === "end_log") void runner?.endLog();
   else if (message.kind === "shown") runner?.shown();
+  else if (message.kind === "haply") runner?.setHaply(message.address);
+  else if (message.kind === "haply_place") runner?.placeHaply(message.place);
   else if (message.kind === "data") runner?.answer(message.request, message.path);
 };

@@ -17,6 +17,7 @@ import { filmSoundCases } from "./film_sound.mjs";
 import { firstLoadCases } from "./first_load.mjs";
 import { firstViewCases } from "./first_view.mjs";
 import { handCases } from "./hand.mjs";
+import { haplyCases } from "./haply.mjs";
 import { liveCases } from "./live.mjs";
 import { logCases } from "./logs.mjs";
 import { NeedsServer } from "./servers.mjs";
@@ -38,7 +39,7 @@ const serverless = Boolean(process.env.PAGE);
 const WORKERS = Number(process.env.WORKERS ?? Math.min(4, availableParallelism() + (real ? 0 : 1)));
 const standinOnlyRun = process.argv[2] === "--standin-only";
 const filter = standinOnlyRun ? "" : (process.argv[2] ?? "");
-const all = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...recordedLogCases];
+const all = [...firstViewCases, ...liveCases, ...touchCases, ...handCases, ...reconstructionCases, ...logCases, ...comparisonCases, ...droppedCases, ...firstLoadCases, ...robustCases, ...soundCases, ...shareCases, ...sharedMaterialCases, ...filmSoundCases, ...vrCases, ...vibrationCases, ...haplyCases, ...recordedLogCases];
 
 /** Why a case is left out; none where it runs. */
 function reasonToSkip({ standinOnly, realOnly, serverOnly, serverlessOnly, once }) {

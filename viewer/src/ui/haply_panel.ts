@@ -1,0 +1,64 @@
+// Haptic device of a page without a server: a Haply Inverse3 on this computer, by its service.
+
+import { Quaternion, Vector3 } from "three";
+import type { WorkerConnection } from "../protocol/worker_connection";
+import type { SceneView } from "../rendering/scene_view";
+import type { HaplyPlace } from "../worker/messages";
+import { turnToCamera } from "../xr/vr_stage";
+import { element, section } from "./elements";
+
+const ADDRESS = "ws://localhost:10001";
+/** Radius of the device's workspace that covers the scene's [m]. */
+const REACH = 0.1;
+/** Height of the first reading above the scene's centre, in radii of the scene. */
+const START = 1.2;
+
+/** Place of a device: its first reading above the scene, its directions those of the page's camera. */
+export function placeAbove(center: Vector3, radius: number, up: Vector3, toCamera: Vector3): HaplyPlace {
+  const start = center.clone().addScaledVector(up, START * radius);
+  const { w, x, y, z } = new Quaternion().setFromRotationMatrix(turnToCamera(up, toCamera));
+  return { start: start.toArray(), orientation: [w, x, y, z], scale: radius / REACH };
+}
+
+export class HaplyPanel {
+  readonly section: HTMLElement;
+  private readonly address = element("input", { type: "url", attributes: { value: ADDRESS, "aria-label": "Address of the Inverse Service" } });
+  private readonly button = element("button", { class: "button wide", type: "button", text: "Connect", on: { click: () => this.toggle() } });
+  private readonly state = element("p", { class: "secondary", role: "status" });
+  private isOn = false;
+
+  constructor(
+    private readonly worker: WorkerConnection,
+    private readonly sceneView: SceneView,
+  ) {
+    worker.onHaply = (state, text) => {
+      if (!this.isOn) return;
+      if (state === "connected") this.place();
+      this.state.textContent = state === "connected" ? `${text}: press a button of its grip to switch the force on (1.5 N at most).` : `Waiting: ${text}.`;
+    };
+    this.section = section(
+      "Haptic device",
+      false,
+      element("p", { class: "secondary", text: "A Haply Inverse3 on this computer touches the scene, and feels it. Its place is above the scene as it is seen now." }),
+      element("label", { class: "field" }, element("span", { class: "name", text: "Service" }), this.address),
+      this.button,
+      this.state,
+    );
+  }
+
+  /** Puts the device into the scene that is shown. */
+  place(): void {
+    const view = this.sceneView.graphs[0]?.info.view;
+    if (!this.isOn || view === undefined) return;
+    const { up, viewDirection } = this.sceneView.orbit;
+    this.worker.placeHaply(placeAbove(new Vector3(...view.center), view.radius, up, viewDirection.negate()));
+  }
+
+  private toggle(): void {
+    this.isOn = !this.isOn;
+    this.address.disabled = this.isOn;
+    this.button.textContent = this.isOn ? "Disconnect" : "Connect";
+    this.state.textContent = this.isOn ? "Connecting …" : "";
+    this.worker.setHaply(this.isOn ? this.address.value : null);
+  }
+}

@@ -1,0 +1,148 @@
+// Haply Inverse3, through the WebSocket of Haply's Inverse Service on this computer: on connection an inventory, then a state for each command.
+//
+// The service has x to the right, y forward and z up; the device frame has y up and z towards the user, so that it is (x, z, −y).
+
+/** Vector [m] or [N]. */
+export type Vector = readonly [number, number, number];
+
+/** Reading of the device: position [m, device frame], and pressed buttons, one bit each. */
+export interface Reading {
+  position: Vector;
+  buttons: number;
+}
+
+interface Xyz {
+  x: number;
+  y: number;
+  z: number;
+}
+
+interface Grip {
+  state?: { button?: boolean; buttons?: { a?: boolean; b?: boolean; c?: boolean } };
+}
+
+/** Message of the service, as far as it is used. */
+export interface ServiceState {
+  inverse3?: { device_id: string; config?: { type?: string; basis?: { permutation: string } }; state?: { cursor_position?: Xyz } }[];
+  verse_grip?: Grip[];
+  wireless_verse_grip?: Grip[];
+}
+
+/** Name of this program in the vendor's tools. */
+const PROFILE = "palpate:page";
+const RETRY_MS = 1000;
+const SILENCE_MS = 1000;
+
+/** Device of an inventory, by its identifier; an error says what is missing. */
+export function deviceOf({ inverse3 }: ServiceState): string {
+  const device = inverse3?.[0];
+  if (device === undefined) throw new Error("the Inverse Service has no Inverse3: connect one, and look at Haply Hub");
+  const basis = device.config?.basis?.permutation ?? "XYZ";
+  if (basis !== "XYZ") throw new Error(`the service turns its axes to ${basis}: set its basis to XYZ in Haply Hub`);
+  return device.device_id;
+}
+
+/** Reading of a device, and of the grip with the same index, a wireless one first; null where the message has none. */
+export function readingOf(state: ServiceState, device: string): Reading | null {
+  const at = state.inverse3?.findIndex(({ device_id }) => device_id === device) ?? -1;
+  const cursor = state.inverse3?.[at]?.state?.cursor_position;
+  if (cursor === undefined || ![cursor.x, cursor.y, cursor.z].every(Number.isFinite)) return null;
+  const grip = (state.wireless_verse_grip?.[at] ?? state.verse_grip?.[at])?.state;
+  const { a, b, c } = grip?.buttons ?? {};
+  const bits = [a === true || grip?.button === true, b === true, c === true];
+  return { position: [cursor.x, cursor.z, -cursor.y], buttons: bits.reduce((sum, pressed, bit) => sum + (pressed ? 1 << bit : 0), 0) };
+}
+
+/** Command of a force [N, device frame]. Only the first configures the session. */
+export function commandOf(device: string, [x, y, z]: Vector, isFirst: boolean): string {
+  const session = isFirst ? { session: { configure: { profile: { name: PROFILE } } } } : {};
+  return JSON.stringify({ ...session, inverse3: [{ device_id: device, commands: { set_cursor_force: { vector: { x, y: -z, z: y } } } }] });
+}
+
+/** Callbacks of a connection. */
+export interface HaplyListener {
+  /** A device is there. */
+  connected(device: string): void;
+  /** Update with a reading, or none: returns the force to command [N, device frame]. */
+  exchange(reading: Reading | null): Vector;
+  /** The connection is lost, and is tried again. */
+  lost(reason: string): void;
+}
+
+/** Connection to the service, which is tried again until it is closed. */
+export class HaplyConnection {
+  private socket: WebSocket | null = null;
+  private device: string | null = null;
+  private isFirst = true;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+  private isClosed = false;
+
+  constructor(
+    private readonly address: string,
+    private readonly listener: HaplyListener,
+  ) {
+    this.connect();
+  }
+
+  /** Commands zero force and closes the connection, which ends the session. */
+  close(): void {
+    this.isClosed = true;
+    clearTimeout(this.timer);
+    const { socket, device } = this;
+    if (socket?.readyState === WebSocket.OPEN && device !== null) socket.send(commandOf(device, [0, 0, 0], this.isFirst));
+    socket?.close();
+  }
+
+  private connect(): void {
+    this.device = null;
+    this.isFirst = true;
+    const socket = new WebSocket(this.address);
+    this.socket = socket;
+    socket.onmessage = ({ data }: MessageEvent<unknown>) => {
+      if (socket !== this.socket) return;
+      try {
+        this.receive(socket, JSON.parse(String(data)) as ServiceState);
+      } catch (error) {
+        // A reply that cannot be read is no reading; an inventory without a device is a failure.
+        if (this.device === null) this.lose(error instanceof Error ? error.message : String(error));
+        else this.command(socket, this.device, this.listener.exchange(null));
+      }
+    };
+    socket.onclose = () => {
+      if (socket === this.socket) this.lose(this.device === null ? `no Inverse Service answers at ${this.address}: start Haply Hub` : "the Inverse Service is gone");
+    };
+    this.watch();
+  }
+
+  private receive(socket: WebSocket, state: ServiceState): void {
+    this.watch();
+    if (this.device === null) {
+      this.device = deviceOf(state);
+      this.listener.connected(this.device);
+    }
+    this.command(socket, this.device, this.listener.exchange(readingOf(state, this.device)));
+  }
+
+  private command(socket: WebSocket, device: string, force: Vector): void {
+    if (socket.readyState !== WebSocket.OPEN) return;
+    socket.send(commandOf(device, force, this.isFirst));
+    this.isFirst = false;
+  }
+
+  /** Gives a service up that falls silent. */
+  private watch(): void {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.lose("the Inverse Service does not answer"), SILENCE_MS);
+  }
+
+  private lose(reason: string): void {
+    clearTimeout(this.timer);
+    const { socket } = this;
+    this.socket = null;
+    socket?.close();
+    if (this.isClosed) return;
+    this.listener.exchange(null);
+    this.listener.lost(reason);
+    this.timer = setTimeout(() => this.connect(), RETRY_MS);
+  }
+}
