@@ -271,9 +271,18 @@ export const droppedCases = [
     serverlessOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
-      const page = await browser.page(server.url);
+      const page = await browser.page(server.url, { width: 360, height: 740, touch: true });
       await waitForScene(page);
-      await record(page, "ball.stl", boxSurface([60, 60, 60], 12));
+      const name = "scan_of_a_box_with_a_name_that_is_rather_long.stl";
+      await drop(page, { [name]: boxSurface([60, 60, 60], 12) });
+      await page.waitForSelector("dialog.upload-dialog[open]");
+      const [width, room] = await page.evaluate(() => {
+        const dialog = document.querySelector("dialog.upload-dialog");
+        return [dialog.scrollWidth, dialog.clientWidth];
+      });
+      assert(width <= room, `the dialog is ${width} px wide, and shows ${room}`);
+      await screenshot(page, "record-dialog-phone");
+      await page.click("dialog.upload-dialog .primary");
       await page.click('.job [aria-label="Cancel: mesh"]');
       await notificationOf(page, "the recording was cancelled");
       await page.waitForSelector(".job", { state: "detached" });
@@ -287,7 +296,7 @@ export const droppedCases = [
         if (process.env.SHOTS) browser.note(told);
         await page.waitForSelector(".job", { state: "detached" });
       }
-      assert((await page.textContent("h1.title")) !== "ball.stl", "a cancelled recording opened");
+      assert((await page.textContent("h1.title")) !== name, "a cancelled recording opened");
       await latestFrame(page);
       assertNoConsoleErrors(page);
     },
