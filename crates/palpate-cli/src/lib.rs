@@ -9,6 +9,7 @@ mod documentation;
 mod failure;
 mod interrupt;
 mod log_kind;
+mod panic_hook;
 mod progress;
 mod secret_file;
 mod standard_streams;
@@ -72,6 +73,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => error.exit(),
     };
+    panic_hook::install();
     // A guardian outlives what ends the others.
     if !matches!(arguments.command, Command::Guard(_)) {
         interrupt::install_handler();

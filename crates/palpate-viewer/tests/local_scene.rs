@@ -230,7 +230,7 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
     assert_eq!(device, slots - 1, "the last one, so that pointers have the first");
     // The vendor's origin is somewhere; the hand goes down at 5 cm/s and stays.
     let first = DVec3::new(0.3, -0.2, 0.1);
-    let mut at = |page: &mut Page, depth: f64, buttons: u32| {
+    let at = |page: &mut Page, depth: f64, buttons: u32| {
         page.now_s.set(page.now_s.get() + 0.001);
         page.call(|scene, now, send| scene.advance(&|| now.get(), send));
         let reading = Reading { position: first - depth * DVec3::Y, orientation: None, buttons };

@@ -265,6 +265,8 @@ fn outputs_are_whole_or_not_there_wherever_memory_runs_out() {
             let ended = with_memory(kilobytes)
                 .args(arguments)
                 .current_dir(workplace.path("."))
+                // A panic for want of memory has none for its backtrace.
+                .env("RUST_BACKTRACE", "1")
                 .output()
                 .expect("a shell");
             if ended.status.success() {
