@@ -30,6 +30,8 @@ export interface ServiceState {
 
 /** Name of this program in the vendor's tools. */
 const PROFILE = "palpate:page";
+/** Shortest interval between two commands: while the scene does not step, states would come by the ten thousand a second. */
+const PERIOD_MS = 0.5;
 const RETRY_MS = 1000;
 const SILENCE_MS = 1000;
 
@@ -74,6 +76,8 @@ export class HaplyConnection {
   private socket: WebSocket | null = null;
   private device: string | null = null;
   private isFirst = true;
+  /** Time of the last command [ms, performance.now]. */
+  private sentAt = Number.NEGATIVE_INFINITY;
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isClosed = false;
 
@@ -100,13 +104,9 @@ export class HaplyConnection {
     this.socket = socket;
     socket.onmessage = ({ data }: MessageEvent<unknown>) => {
       if (socket !== this.socket) return;
-      try {
-        this.receive(socket, JSON.parse(String(data)) as ServiceState);
-      } catch (error) {
-        // A reply that cannot be read is no reading; an inventory without a device is a failure.
-        if (this.device === null) this.lose(error instanceof Error ? error.message : String(error));
-        else this.command(socket, this.device, this.listener.exchange(null));
-      }
+      this.watch();
+      if (performance.now() - this.sentAt < PERIOD_MS) setTimeout(() => this.receive(socket, data), 1);
+      else this.receive(socket, data);
     };
     socket.onclose = () => {
       if (socket === this.socket) this.lose(this.device === null ? `no Inverse Service answers at ${this.address}: start Haply Hub` : "the Inverse Service is gone");
@@ -114,19 +114,28 @@ export class HaplyConnection {
     this.watch();
   }
 
-  private receive(socket: WebSocket, state: ServiceState): void {
-    this.watch();
-    if (this.device === null) {
-      this.device = deviceOf(state);
-      this.listener.connected(this.device);
+  /** Answers a message with a command. One that cannot be read is no reading; an inventory without a device is a failure. */
+  private receive(socket: WebSocket, data: unknown): void {
+    if (socket !== this.socket) return;
+    let reading: Reading | null = null;
+    try {
+      const state = JSON.parse(String(data)) as ServiceState;
+      if (this.device === null) {
+        this.device = deviceOf(state);
+        this.listener.connected(this.device);
+      }
+      reading = readingOf(state, this.device);
+    } catch (error) {
+      if (this.device === null) this.lose(error instanceof Error ? error.message : String(error));
     }
-    this.command(socket, this.device, this.listener.exchange(readingOf(state, this.device)));
+    if (this.device !== null) this.command(socket, this.device, this.listener.exchange(reading));
   }
 
   private command(socket: WebSocket, device: string, force: Vector): void {
     if (socket.readyState !== WebSocket.OPEN) return;
     socket.send(commandOf(device, force, this.isFirst));
     this.isFirst = false;
+    this.sentAt = performance.now();
   }
 
   /** Gives a service up that falls silent. */

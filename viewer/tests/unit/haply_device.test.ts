@@ -1,9 +1,9 @@
 // Messages of Haply's Inverse Service, and the place of the device in a scene.
 
 import { Vector3 } from "three";
-import { expect, test } from "vitest";
+import { afterEach, expect, test, vi } from "vitest";
 import { placeAbove } from "../../src/ui/haply_panel";
-import { commandOf, deviceOf, readingOf, type ServiceState } from "../../src/worker/haply_device";
+import { commandOf, deviceOf, HaplyConnection, readingOf, type ServiceState } from "../../src/worker/haply_device";
 
 const state = (change: Partial<ServiceState> = {}): ServiceState => ({
   inverse3: [{ device_id: "049D", config: { type: "inverse3", basis: { permutation: "XYZ" } }, state: { cursor_position: { x: 0.01, y: -0.12, z: 0.15 } } }],
@@ -38,4 +38,72 @@ test("the device begins above the scene, with z towards the camera", () => {
   expect(scale).toBeCloseTo(2);
   // A quarter turn about y takes z to x.
   [Math.SQRT1_2, 0, Math.SQRT1_2, 0].forEach((number, at) => expect(orientation[at]).toBeCloseTo(number));
+});
+
+/** Service that answers every command at once, in the place of a WebSocket. */
+class FakeSocket {
+  static readonly OPEN = 1;
+  static last: FakeSocket;
+  readyState = FakeSocket.OPEN;
+  onmessage: (event: { data: unknown }) => void = () => undefined;
+  onclose: () => void = () => undefined;
+  commands: string[] = [];
+
+  constructor() {
+    FakeSocket.last = this;
+  }
+
+  send(command: string): void {
+    this.commands.push(command);
+    setTimeout(() => this.say(state()), 0);
+  }
+
+  say(content: unknown): void {
+    this.onmessage({ data: JSON.stringify(content) });
+  }
+
+  close(): void {
+    this.readyState = 3;
+  }
+}
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("commands are paced, a silent service is lost and tried again, and the last command has no force", () => {
+  vi.useFakeTimers();
+  vi.stubGlobal("WebSocket", FakeSocket);
+  const told: string[] = [];
+  const readings: unknown[] = [];
+  const connection = new HaplyConnection("ws://localhost:10001", {
+    connected: (device) => told.push(device),
+    exchange: (reading) => (readings.push(reading), [0, 1, 0]),
+    lost: (reason) => told.push(reason),
+  });
+  const first = FakeSocket.last;
+  first.say(state());
+  vi.advanceTimersByTime(100);
+  // Each command waits a millisecond for the one before.
+  expect(first.commands.length).toBeGreaterThan(50);
+  expect(first.commands.length).toBeLessThan(110);
+  expect(readings).not.toContain(null);
+  first.send = () => undefined;
+  first.onmessage({ data: "{" });
+  vi.advanceTimersByTime(5);
+  expect(readings).toContain(null);
+  vi.advanceTimersByTime(2500);
+  const second = FakeSocket.last;
+  expect(second).not.toBe(first);
+  second.say({ inverse3: [] });
+  expect(told).toEqual(["049D", "the Inverse Service does not answer", "the Inverse Service has no Inverse3: connect one, and look at Haply Hub"]);
+  vi.advanceTimersByTime(1000);
+  const third = FakeSocket.last;
+  third.say(state());
+  connection.close();
+  expect(third.commands.at(-1)).toContain('"vector":{"x":0,"y":0,"z":0}');
+  expect(third.readyState).toBe(3);
+  vi.advanceTimersByTime(5000);
+  expect(FakeSocket.last).toBe(third);
 });
