@@ -2,6 +2,8 @@
 //
 // The service has x to the right, y forward and z up; the device frame has y up and z towards the user, so that it is (x, z, −y).
 
+import { reasonOf } from "./posting";
+
 /** Vector [m] or [N]. */
 export type Vector = readonly [number, number, number];
 
@@ -126,7 +128,7 @@ export class HaplyConnection {
       }
       reading = readingOf(state, this.device);
     } catch (error) {
-      if (this.device === null) this.lose(error instanceof Error ? error.message : String(error));
+      if (this.device === null) this.lose(reasonOf(error));
     }
     if (this.device !== null) this.command(socket, this.device, this.listener.exchange(reading));
   }

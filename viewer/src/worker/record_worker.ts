@@ -1,6 +1,7 @@
 // Web Worker that records one mesh by finite elements; whoever started it ends it.
 
 import { Sent, textOf } from "../../../bindings/web/palpate/memory";
+import { reasonOf } from "./posting";
 import { loadRecordModule, recordExports } from "./record_module";
 import type { FromRecorder, ToRecorder } from "./record_messages";
 
@@ -31,7 +32,7 @@ async function record({ base, mesh, file }: ToRecorder): Promise<void> {
     if (recording === null) throw new Error("the recording did not come");
     post({ kind: "recorded", recording, repairs }, [recording]);
   } catch (error) {
-    post({ kind: "failed", reason: error instanceof Error ? error.message : String(error) });
+    post({ kind: "failed", reason: reasonOf(error) });
   }
 }
 
