@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 
 /// Records the mesh of a file; false after an error was sent.
 ///
-/// `about` is JSON: `{ "name", "scale", "young", "poisson", "density", "modes" }`, in metres, Pa and kg/m³. Sent are texts in JSON for the
+/// `about` is JSON: `{ "name", "scale", "young", "poisson", "density", "modes", "nodes" }`, in metres per unit, Pa and kg/m³; without `nodes` a
+/// surface is filled with 2,000. Sent are texts in JSON for the
 /// progress, `{ "phase", "fraction" }`, the bytes of the recording, and as JSON what was repaired, in sentences.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn mesh_record(

@@ -54,8 +54,6 @@ export class LiveMode implements PageMode {
   private readonly jobs = new JobList((job) => this.cancelJob(job));
   private readonly recorder: MeshRecorder;
   private readonly meshUpload: MeshUpload;
-  /** Recorder of the server, where there is one. */
-  private readonly serverRecorder: ServerRecorder | null = null;
   /** Haptic device and files, on a page without a server. */
   private readonly haply: HaplyPanel | null = null;
   private readonly openFiles: OpenFiles | null = null;
@@ -113,9 +111,8 @@ export class LiveMode implements PageMode {
       this.hint.dismiss();
     });
     if (worker === null) {
-      this.serverRecorder = new ServerRecorder(notifications, this.jobs);
-      this.recorder = this.serverRecorder;
-      this.meshUpload = new MeshUpload(notifications, this.recorder, "A surface is filled with about 2,000 nodes.");
+      this.recorder = new ServerRecorder(notifications, this.jobs);
+      this.meshUpload = new MeshUpload(notifications, this.recorder);
       this.meshUpload.listenForDrops();
     } else {
       const open = (name: string, recording: ArrayBuffer, about: string) => {
@@ -124,7 +121,7 @@ export class LiveMode implements PageMode {
       };
       this.haply = new HaplyPanel(worker, sceneView);
       this.recorder = new PageRecorder(notifications, this.jobs, open);
-      const meshUpload = new MeshUpload(notifications, this.recorder, "A surface is filled with about 600 nodes; palpate record makes finer ones. The file stays on this device.");
+      const meshUpload = new MeshUpload(notifications, this.recorder);
       this.meshUpload = meshUpload;
       this.openFiles = new OpenFiles(notifications, {
         openRecording: async (file) => open(file.name, await file.arrayBuffer(), "Your own recording. Press and drag it."),
@@ -162,10 +159,7 @@ export class LiveMode implements PageMode {
     this.suspend();
     this.panels.scenes.setScenes(hello.scenes);
     this.linked.hello(hello);
-    if (this.serverRecorder !== null) {
-      this.serverRecorder.viewer = hello.viewer;
-      this.meshUpload.section.hidden = !hello.records;
-    }
+    this.meshUpload.section.hidden = !this.recorder.hello(hello);
     this.panels.material.records = hello.records;
     this.sound.connected();
     this.stream();

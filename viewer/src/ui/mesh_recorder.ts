@@ -1,6 +1,6 @@
 // Recording of meshes: by the server, or by a worker of the page.
 
-import type { Material } from "../protocol/messages";
+import type { Hello, Material } from "../protocol/messages";
 import { scenesAddress } from "../protocol/local_logs";
 import { serverUrl } from "../protocol/urls";
 import type { FromRecorder, ToRecorder } from "../worker/record_messages";
@@ -15,6 +15,10 @@ export interface MeshChoice extends Material {
 
 /** Recorder of meshes. */
 export interface MeshRecorder {
+  /** Sentences on how fine a surface is filled, and where the file goes. */
+  readonly about: string;
+  /** Takes the greeting of the server or worker; returns whether meshes can be recorded. */
+  hello(hello: Hello): boolean;
   /** Records a mesh, which then opens as a scene; returns the recording where it is made in the page. */
   record(file: File, choice: MeshChoice): Promise<ArrayBuffer | null>;
   /** Cancels a job, if it is of this recorder. */
@@ -25,16 +29,22 @@ export interface MeshRecorder {
 
 /** Recorder of a page with a server, to which meshes are uploaded. */
 export class ServerRecorder implements MeshRecorder {
+  readonly about = "A surface is filled with about 2,000 nodes.";
   private upload: AbortController | null = null;
   /** Uploads that the server has taken, by file name. */
   private readonly accepted = new Map<string, () => void>();
   /** Number of this viewer: the recording is cancelled when the page leaves. */
-  viewer = 0;
+  private viewer = 0;
 
   constructor(
     private readonly notifications: Notifications,
     private readonly jobs: JobList,
   ) {}
+
+  hello({ viewer, records }: Hello): boolean {
+    this.viewer = viewer;
+    return records;
+  }
 
   async record(file: File, choice: MeshChoice): Promise<ArrayBuffer | null> {
     const job = { type: "progress", job: "upload", phase: file.name, fraction: null } as const;
@@ -76,6 +86,7 @@ const JOB = "mesh";
 
 /** Recorder of a page without a server: a worker of its own for each mesh, so that its memory is given back. */
 export class PageRecorder implements MeshRecorder {
+  readonly about = `A surface is filled with about ${NODES} nodes; palpate record makes finer ones. The file stays on this device.`;
   private running: { worker: Worker; end: (reason: string | null) => void } | null = null;
   private readonly recorded = new Map<string, () => void>();
 
@@ -85,6 +96,10 @@ export class PageRecorder implements MeshRecorder {
     private readonly jobs: JobList,
     private readonly open: (name: string, recording: ArrayBuffer, about: string) => void,
   ) {}
+
+  hello(): boolean {
+    return true;
+  }
 
   async record(file: File, choice: MeshChoice): Promise<ArrayBuffer | null> {
     if (this.running !== null) {

@@ -27,11 +27,9 @@ export class MeshUpload {
   private readonly saves = element("div");
   private file: File | null = null;
 
-  /** `about` says where the mesh is recorded, and how fine a surface is filled. */
   constructor(
     private readonly notifications: Notifications,
     private readonly recorder: MeshRecorder,
-    about: string,
   ) {
     const input = element("input", { type: "file", attributes: { accept: EXTENSIONS.join(","), hidden: true } });
     input.addEventListener("change", () => {
@@ -42,7 +40,7 @@ export class MeshUpload {
     this.section = section(
       "Import a mesh",
       false,
-      element("p", { class: "secondary", text: `Drop a mesh onto the page, or choose a file: solid elements (Gmsh, VTK, VTU, MEDIT, Vega, Abaqus), or a closed surface (STL, OBJ, PLY, OFF, glTF). ${about}` }),
+      element("p", { class: "secondary", text: `Drop a mesh onto the page, or choose a file: solid elements (Gmsh, VTK, VTU, MEDIT, Vega, Abaqus), or a closed surface (STL, OBJ, PLY, OFF, glTF). ${recorder.about}` }),
       button,
       input,
       this.saves,

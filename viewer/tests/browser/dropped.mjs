@@ -258,7 +258,7 @@ export const droppedCases = [
       const [mass] = told.match(/(?<=mass +)[\d.]+/) ?? [];
       const expected = 0.06 * 0.04 * 0.05 * LIVER.density;
       assert(Math.abs(mass / expected - 1) < 1e-3, `mass ${mass} kg, expected ${expected}\n${told}`);
-      // It stays in the list.
+      // The scene stays in the list.
       await page.click(".scenes button >> nth=1");
       await page.waitForFunction(() => document.querySelector("h1.title").textContent !== "box.stl");
       await page.click('.scenes button:has-text("box.stl")');

@@ -41,9 +41,10 @@ impl MeshUpload {
             meshing: self.meshing,
             ..RecordOptions::default()
         };
-        let body = options.prepare(BodySource::Bytes(&self.bytes, &self.name), progress)?;
+        let mut body = options.prepare(BodySource::Bytes(&self.bytes, &self.name), progress)?;
         let refused = |error| SceneError::new(SceneErrorKind::Mesh, format!("{}: {error}", self.name));
-        let repairs = body.mesh.clone().checked().map_err(refused)?.warnings.clone();
+        body.mesh = body.mesh.checked().map_err(refused)?;
+        let repairs = body.mesh.warnings.clone();
         Ok((body.record(progress)?.recording, repairs))
     }
 }
