@@ -1,7 +1,8 @@
 //! Levels of detail of objects against obstacles and each other: all surface nodes, or ever fewer contact samples.
 //!
 //! A level is coarsened as soon as too many samples come near; the next finer one is tried every now and then. Nodes between
-//! the samples that penetrate are added (`narrow_phase/refinement`).
+//! the samples that penetrate are added (`narrow_phase/refinement`): where samples and added nodes are as many as all nodes
+//! that are near, all nodes take their place, since the same contacts without overlapping patches are better conditioned.
 //!
 //! Equations: docs/theory.md (C30).
 
@@ -29,26 +30,36 @@ pub(crate) struct LevelOfDetail {
     trial_interval: u64,
     /// Whether the level is tried in this step.
     is_trial: bool,
+    /// Number of contacts, added nodes among them, when all nodes were tried: as many may be near.
+    replaced: usize,
 }
 
 impl Default for LevelOfDetail {
     fn default() -> Self {
-        Self { level: 0, since: 0, trial_interval: COLLISION.refine_after_steps, is_trial: false }
+        Self {
+            level: 0,
+            since: 0,
+            trial_interval: COLLISION.refine_after_steps,
+            is_trial: false,
+            replaced: 0,
+        }
     }
 }
 
 impl LevelOfDetail {
-    /// Begin a step, with the next finer level if it is time to try it.
-    pub(super) fn begin(&mut self, step: u64) {
+    /// Begin a step with so many contacts, with the next finer level if it is time to try it.
+    pub(super) fn begin(&mut self, step: u64, contacts: usize) {
         self.is_trial = self.level > 0 && step - self.since >= self.trial_interval;
         if self.is_trial {
             (self.level, self.since) = (self.level - 1, step);
+            self.replaced = if self.level == 0 { contacts } else { 0 };
         }
     }
 
     /// Upper limit of samples that may be near at this level, where a coarser one has room for `max`.
     pub(super) fn allowed(&self, max: usize) -> usize {
-        if self.is_trial { (COLLISION.refine_below * max as f64) as usize } else { max }
+        let max = if self.is_trial { (COLLISION.refine_below * max as f64) as usize } else { max };
+        max.max(self.replaced)
     }
 
     /// Go to the next coarser level, in a step in which too many samples are near.
@@ -59,7 +70,7 @@ impl LevelOfDetail {
         } else {
             (2 * self.trial_interval).min(MAX_TRIAL_INTERVAL)
         };
-        (self.level, self.since, self.is_trial) = (self.level + 1, step, false);
+        (self.level, self.since, self.is_trial, self.replaced) = (self.level + 1, step, false, 0);
     }
 }
 
@@ -151,7 +162,7 @@ mod tests {
     fn trials(steps: u64) -> Vec<u64> {
         let (mut detail, mut tried) = (LevelOfDetail { level: 2, ..LevelOfDetail::default() }, Vec::new());
         for step in 1..=steps {
-            detail.begin(step);
+            detail.begin(step, 0);
             if detail.is_trial {
                 assert!(detail.allowed(100) < 100);
                 tried.push(step);
@@ -159,6 +170,25 @@ mod tests {
             }
         }
         tried
+    }
+
+    #[test]
+    fn all_nodes_take_the_place_of_as_many_contacts() {
+        let mut detail = LevelOfDetail { level: 1, ..LevelOfDetail::default() };
+        detail.begin(COLLISION.refine_after_steps, 121);
+        assert_eq!((detail.level, detail.allowed(48)), (0, 121));
+        detail.begin(COLLISION.refine_after_steps + 1, 121);
+        assert_eq!(detail.allowed(48), 121, "they stay");
+        detail.coarsen(COLLISION.refine_after_steps + 2);
+        assert_eq!(detail.allowed(48), 48);
+    }
+
+    #[test]
+    fn a_coarser_level_is_tried_with_few_samples_only() {
+        let mut detail = LevelOfDetail { level: 2, ..LevelOfDetail::default() };
+        detail.begin(COLLISION.refine_after_steps, 121);
+        assert_eq!(detail.level, 1);
+        assert!(detail.allowed(48) < 48);
     }
 
     #[test]

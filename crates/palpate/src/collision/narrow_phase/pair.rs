@@ -21,7 +21,7 @@ impl CollisionContext<'_> {
         let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
         let mut pair = self.levels.of_pair(objects, self.step);
-        pair.details.iter_mut().for_each(|detail| detail.begin(self.step));
+        pair.details.iter_mut().for_each(|detail| detail.begin(self.step, 0));
         loop {
             let overlap = self.overlap(&pair);
             pair.is_near |= overlap.is_some();
