@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    palpate_haptics::link::decodes(bytes);
+    palpate_haptics::decodes_link_message(bytes);
     if let Ok(text) = std::str::from_utf8(bytes) {
         palpate_viewer::decodes(text);
     }

@@ -127,12 +127,13 @@ pub fn run_targets(target: Option<&str>, seconds: Option<&str>, arguments: &[&st
     Ok(())
 }
 
-/// Build targets. For a target by name, so that build scripts and macros have no counters.
+/// Build targets. For a target by name, so that build scripts and macros have no counters, beside the workspace's own, whose versions
+/// `fuzz/Cargo.lock` repeats: what it has built of them is used.
 fn build(folder: &Path, targets: &[&&str]) -> Result<(), String> {
     let mut cargo = cargo_command();
     cargo.args(["build", "--release", "--locked", "--target", &host()?]);
     cargo.args(targets.iter().flat_map(|name| ["--bin", name]));
-    cargo.env("CARGO_TARGET_DIR", folder.join("target"));
+    cargo.env("CARGO_TARGET_DIR", root().join("target"));
     run_in(folder, cargo.env("CARGO_ENCODED_RUSTFLAGS", FLAGS.join("\u{1f}")))
 }
 
@@ -141,7 +142,7 @@ fn start(folder: &Path, name: &str, seconds: &str, arguments: &[&str]) -> Result
     let corpus = sow(name).map_err(|error| format!("the seeds of {name}: {error}"))?;
     let artifacts = folder.join("artifacts").join(name);
     std::fs::create_dir_all(&artifacts).map_err(|error| format!("{}: {error}", artifacts.display()))?;
-    let mut fuzzer = Command::new(folder.join("target").join(host()?).join("release").join(name));
+    let mut fuzzer = Command::new(root().join("target").join(host()?).join("release").join(name));
     fuzzer.arg(&corpus).arg(format!("-artifact_prefix={}/", artifacts.display()));
     fuzzer.arg(format!("-max_total_time={seconds}")).arg(format!("-timeout={SECONDS_PER_INPUT}"));
     fuzzer.arg(format!("-rss_limit_mb={MEGABYTES}")).arg(format!("-max_len={LARGEST_INPUT}"));

@@ -47,6 +47,8 @@ mod input_record;
 #[cfg(feature = "real-time")]
 pub mod link;
 #[cfg(feature = "logs")]
+mod link_messages;
+#[cfg(feature = "logs")]
 pub mod log;
 mod motion_check;
 mod motion_path;
@@ -77,6 +79,9 @@ pub use error::{Error, LogError};
 pub use force_process::{ForceProcess, SceneMotion, StepListener};
 pub use haptic_update::{HapticUpdate, UpdateCounts};
 pub use input_record::{InputReader, InputRecord};
+#[cfg(feature = "logs")]
+#[doc(hidden)]
+pub use link_messages::decodes_link_message;
 pub use motion_path::{Columns, MotionPath, PathError, PoseTrajectory, QuaternionError, unit_quaternion};
 pub use passivity::PassivityController;
 pub use playback::Playback;

@@ -2,7 +2,7 @@
 
 use super::identity::Secret;
 use super::lock;
-use super::messages::{Hello, Welcome, effort, motion_bytes, taken};
+use crate::link_messages::{Hello, Welcome, effort, motion_bytes, taken};
 use super::sequence::SequenceFilter;
 use super::server::runtime;
 use super::transport::transport;

@@ -6,7 +6,6 @@
 
 mod client;
 mod identity;
-mod messages;
 mod sequence;
 mod server;
 #[cfg(test)]
@@ -18,14 +17,6 @@ pub use identity::Secret;
 pub use server::{LinkCounts, LinkServer};
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-/// Whether bytes are a message of either end: entry of the fuzzer.
-#[doc(hidden)]
-pub fn decodes(bytes: &[u8]) -> bool {
-    let greets = serde_json::from_slice::<messages::Hello>(bytes).is_ok()
-        || serde_json::from_slice::<messages::Welcome>(bytes).is_ok();
-    greets || messages::motion(bytes, 0.0).is_some() || messages::effort(bytes, 0.0).is_some()
-}
 
 /// Locks a mutex, also after a panic of another thread: all guarded values are replaced whole.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

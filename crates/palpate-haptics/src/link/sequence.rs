@@ -17,7 +17,7 @@ impl SequenceFilter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::messages::{effort, effort_bytes, motion, motion_bytes};
+    use crate::link_messages::{effort, effort_bytes, motion, motion_bytes};
     use super::*;
     use crate::device::{DeviceSpec, Hand, Mount, SimulatedDevice};
     use crate::{

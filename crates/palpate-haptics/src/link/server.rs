@@ -2,7 +2,7 @@
 
 use super::identity::Secret;
 use super::lock;
-use super::messages::{Hello, Welcome, effort_bytes, motion, taken};
+use crate::link_messages::{Hello, Welcome, effort_bytes, motion, taken};
 use super::sequence::SequenceFilter;
 use super::transport::transport;
 use crate::clock::Clock;

@@ -10,24 +10,24 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Size of a motion [bytes], tag included.
-pub(super) const MOTION: usize = 1 + 8 + 7 * 8 + 4;
+pub(crate) const MOTION: usize = 1 + 8 + 7 * 8 + 4;
 
 /// Size of an effort [bytes], tag included.
-pub(super) const EFFORT: usize = 1 + 8 + 8 + 4 * 8;
+pub(crate) const EFFORT: usize = 1 + 8 + 8 + 4 * 8;
 
 const MOTION_TAG: u8 = 0x4d;
 const EFFORT_TAG: u8 = 0x45;
 
 /// Greeting of a device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Hello {
+pub(crate) struct Hello {
     /// Name of the device in the scene.
     pub device: String,
 }
 
 /// Reply to a greeting. The names on the wire are those of the first version.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) enum Welcome {
+pub(crate) enum Welcome {
     /// The device is connected.
     #[serde(rename = "Taken")]
     Accepted,
@@ -36,7 +36,7 @@ pub(super) enum Welcome {
 }
 
 /// Reason of a refusal while another device has the name.
-pub(super) fn taken(device: &str) -> String {
+pub(crate) fn taken(device: &str) -> String {
     format!("the device {device:?} is taken")
 }
 
@@ -48,7 +48,7 @@ fn numbers<const N: usize>(bytes: &[u8]) -> Option<[f64; N]> {
 }
 
 /// Bytes of a motion. Its time is not sent: the receiver stamps it.
-pub(super) fn motion_bytes(motion: &Motion) -> [u8; MOTION] {
+pub(crate) fn motion_bytes(motion: &Motion) -> [u8; MOTION] {
     let mut bytes = [0; MOTION];
     bytes[0] = MOTION_TAG;
     bytes[1..9].copy_from_slice(&motion.sequence.to_le_bytes());
@@ -61,7 +61,7 @@ pub(super) fn motion_bytes(motion: &Motion) -> [u8; MOTION] {
 }
 
 /// Motion from bytes received at a time [s]; `None` if they are no valid motion.
-pub(super) fn motion(bytes: &[u8], time_s: f64) -> Option<Motion> {
+pub(crate) fn motion(bytes: &[u8], time_s: f64) -> Option<Motion> {
     if bytes.len() != MOTION || bytes[0] != MOTION_TAG {
         return None;
     }
@@ -74,7 +74,7 @@ pub(super) fn motion(bytes: &[u8], time_s: f64) -> Option<Motion> {
 }
 
 /// Bytes of an effort. Its time is not sent: the receiver stamps it.
-pub(super) fn effort_bytes(effort: &Effort) -> [u8; EFFORT] {
+pub(crate) fn effort_bytes(effort: &Effort) -> [u8; EFFORT] {
     let mut bytes = [0; EFFORT];
     bytes[0] = EFFORT_TAG;
     bytes[1..9].copy_from_slice(&effort.sequence.to_le_bytes());
@@ -88,7 +88,7 @@ pub(super) fn effort_bytes(effort: &Effort) -> [u8; EFFORT] {
 }
 
 /// Effort from bytes received at a time [s]; `None` if they are no valid effort.
-pub(super) fn effort(bytes: &[u8], time_s: f64) -> Option<Effort> {
+pub(crate) fn effort(bytes: &[u8], time_s: f64) -> Option<Effort> {
     if bytes.len() != EFFORT || bytes[0] != EFFORT_TAG {
         return None;
     }
@@ -98,6 +98,14 @@ pub(super) fn effort(bytes: &[u8], time_s: f64) -> Option<Effort> {
     let force = DVec3::new(x, y, z);
     let good = sequence > 0 && force.is_finite() && absorbed_j.is_finite();
     good.then_some(Effort { sequence, in_reply_to, time_s, force, absorbed_j })
+}
+
+/// Whether bytes are a message of either end: entry of the fuzzer.
+#[doc(hidden)]
+pub fn decodes_link_message(bytes: &[u8]) -> bool {
+    let greets = serde_json::from_slice::<Hello>(bytes).is_ok()
+        || serde_json::from_slice::<Welcome>(bytes).is_ok();
+    greets || motion(bytes, 0.0).is_some() || effort(bytes, 0.0).is_some()
 }
 
 #[cfg(test)]
