@@ -36,16 +36,18 @@ struct Module {
 /// Module of the npm package.
 const PACKAGE: Module = Module { features: &["--no-default-features"], profile: "web", name: "package.wasm" };
 
-/// Modules of the page: live scenes; logs; recording of meshes, which is built for speed.
-const PAGE: [Module; 3] = [
+/// Modules of the page: live scenes; logs.
+const PAGE: [Module; 2] = [
     Module { features: &[], profile: "web", name: "palpate.wasm" },
     Module { features: &["--features", "logs"], profile: "web", name: "palpate-logs.wasm" },
-    Module {
-        features: &["--no-default-features", "--features", "record"],
-        profile: "web-record",
-        name: "palpate-record.wasm",
-    },
 ];
+
+/// Module of the page that records meshes, which is built for speed.
+const RECORDING: Module = Module {
+    features: &["--no-default-features", "--features", "record"],
+    profile: "web-record",
+    name: "palpate-record.wasm",
+};
 
 /// Folder of the npm package.
 pub fn package() -> PathBuf {
@@ -73,10 +75,16 @@ pub fn build() -> Result<bool, String> {
     for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
         copy(&root().join(licence), &package.join("dist").join(licence))?;
     }
-    let mut modules = Vec::new();
-    for module in &PAGE {
-        modules.extend(build_module(module)?);
-    }
+    // Of another profile, so that no build waits for the other: each ends with one core that links.
+    let (modules, recording) = std::thread::scope(|scope| {
+        let recording = scope.spawn(|| build_module(&RECORDING));
+        let modules: Result<Vec<_>, String> = PAGE.iter().map(build_module).collect();
+        (
+            modules,
+            recording.join().unwrap_or_else(|_| Err("the build of the recording module panicked".into())),
+        )
+    });
+    let modules: Vec<_> = modules?.into_iter().chain([recording?]).flatten().collect();
     build_page(&modules)?;
     report(&package)?;
     Ok(true)

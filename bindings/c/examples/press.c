@@ -51,6 +51,7 @@ int main(int argc, char **argv) {
       printf("%ld %.17g %.17g %.17g %zu\n", i, force.x, force.y, force.z, contacts);
     }
   }
+  for (size_t i = 0; palpate_state_warning(state, i) != NULL; i++) fprintf(stderr, "warning: %s\n", palpate_state_warning(state, i));
   const PalpateStepStatus *status = palpate_state_status(state);
   if (status->rejected_inputs != 0 || status->dropped_contacts != 0) return 1;
   palpate_state_free(state);

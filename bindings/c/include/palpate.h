@@ -450,6 +450,13 @@ void palpate_state_free(PalpateState *state);
 // state is a state or null.
 PalpateStatus palpate_state_step(PalpateState *state);
 
+// Warning about the steps so far, as those of palpate run but for large deformation: positions that look like millimetres, penetration, contacts that were not
+// solved or left out, a tip that moved and touched nothing. Ask from 0 on; null after the last. Texts live until 0 is asked for again.
+//
+// state is a state or null.
+const char *palpate_state_warning(PalpateState *state,
+                                  size_t number);
+
 // Positions of the nodes of an object's surface at the end of the last step [m]: count numbers, three for each of the
 // palpate_scene_node_count nodes. Costs nodes × modes: for drawing, not for each step.
 //

@@ -38,7 +38,7 @@ pub use scene::{
 };
 pub use state::{
     State, palpate_state_copy, palpate_state_free, palpate_state_nearest_point, palpate_state_new,
-    palpate_state_point_position, palpate_state_step, palpate_state_surface,
+    palpate_state_point_position, palpate_state_step, palpate_state_surface, palpate_state_warning,
 };
 pub use types::{
     ClampOutput, Collider, ContactOutput, DeviceInput, DeviceMode, DeviceOutput, Energy, ObjectOutput,

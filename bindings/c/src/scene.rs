@@ -42,7 +42,7 @@ pub(crate) fn no_part(what: &str, number: usize) -> Failure {
 }
 
 /// Texts for C; one with a zero byte, which no scene file can hold, is cut there.
-fn texts(texts: impl IntoIterator<Item = String>) -> Vec<CString> {
+pub(crate) fn texts(texts: impl IntoIterator<Item = String>) -> Vec<CString> {
     let text = |text: String| CString::new(text.split('\0').next().unwrap_or_default()).unwrap_or_default();
     texts.into_iter().map(text).collect()
 }

@@ -2,10 +2,12 @@
 
 use crate::buffers::Buffers;
 use crate::error::{Error, Failure, Status, checked, put};
-use crate::scene::{Loaded, Scene, no_part};
+use crate::scene::{Loaded, Scene, no_part, texts};
 use crate::types::{SurfacePoint, Vector};
 use glam::DVec3;
 use palpate::{DeviceInput, Grasp, Input, ModelError, ResidualFieldCache, step};
+use palpate_scene::RunCheck;
+use std::ffi::{CString, c_char};
 use std::ptr;
 use std::sync::Arc;
 
@@ -20,6 +22,9 @@ pub struct State {
     pub(crate) buffers: Buffers,
     /// Whether a step has failed, by a bug: what is left of the state is of no use.
     has_failed: bool,
+    /// Check of the steps so far, and the texts of its warnings when these were asked for last.
+    check: RunCheck,
+    warnings: Vec<CString>,
     /// Displacements of an object's nodes, and what they share from one surface to the next.
     displacements: Vec<DVec3>,
     residual_fields: Vec<ResidualFieldCache>,
@@ -40,6 +45,8 @@ impl State {
         let residual_fields =
             scene.scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect();
         Self {
+            check: RunCheck::new(&scene.scene),
+            warnings: Vec::new(),
             scene,
             state,
             input,
@@ -63,6 +70,8 @@ impl State {
             waiting: self.waiting.clone(),
             buffers,
             has_failed: self.has_failed,
+            check: self.check.clone(),
+            warnings: Vec::new(),
             displacements: Vec::new(),
             residual_fields: self.residual_fields.clone(),
         }
@@ -175,8 +184,10 @@ pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
         if state.has_failed {
             return Err(Failure::panic("an earlier step has failed"));
         }
+        state.check.add_input(&state.scene.scene, &state.input, &state.state);
         let output = step(state.scene.model(), &mut state.state, &state.input);
         state.buffers.update(output);
+        state.check.add(&state.input, &state.state);
         Ok(())
     };
     // SAFETY: no error is written.
@@ -186,6 +197,21 @@ pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
         state.buffers.release();
     }
     status
+}
+
+/// Warning about the steps so far, as those of `palpate run` but for large deformation: positions that look like millimetres, penetration, contacts that were not
+/// solved or left out, a tip that moved and touched nothing. Ask from 0 on; null after the last. Texts live until 0 is asked for again.
+///
+/// # Safety
+/// `state` is a state or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn palpate_state_warning(state: *mut State, number: usize) -> *const c_char {
+    // SAFETY: as promised by the caller.
+    let Some(state) = (unsafe { state.as_mut() }) else { return ptr::null() };
+    if number == 0 {
+        state.warnings = texts(state.check.warnings(&state.scene.scene).iter().map(ToString::to_string));
+    }
+    state.warnings.get(number).map_or(ptr::null(), |text| text.as_ptr())
 }
 
 /// Positions of the nodes of an object's surface at the end of the last step [m]: `count` numbers, three for each of the

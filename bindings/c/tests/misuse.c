@@ -63,6 +63,14 @@ int main(int argc, char **argv) {
   show("nan", palpate_state_set_position(state, 0, nowhere));
   show("step", palpate_state_step(state));
   printf("rejected: %u\n", (unsigned)palpate_state_status(state)->rejected_inputs);
+  /* A hand in millimetres is told of once. */
+  PalpateVector millimetres = {0.0, 0.0, 200.0};
+  show("copy", palpate_state_copy(state, &copy, &error));
+  palpate_state_set_position(copy, 0, millimetres);
+  for (int i = 0; i < 3; i++) palpate_state_step(copy);
+  for (size_t i = 0; palpate_state_warning(copy, i) != NULL; i++) printf("warning: %s\n", palpate_state_warning(copy, i));
+  printf("warnings before: %d, of no state: %d\n", palpate_state_warning(state, 0) != NULL, palpate_state_warning(NULL, 0) != NULL);
+  palpate_state_free(copy);
   show("no state", palpate_state_step(NULL));
   double number;
   show("surface", palpate_state_surface(state, 0, &number, 1));

@@ -187,6 +187,9 @@ input: 0 \nbegins in mode 2\nforce: 1 \ndevice 5: 1 \nmode 77: 1 there is no mod
 object 3: 13 object 3: there is no point in triangle 0 with such weights where a force may enter
 triangle 1000000: 13 object \"cube\": there is no point in triangle 1000000 with such weights where a force may enter
 obstacle 9: 1 \nnan: 0 \nstep: 0 \nrejected: 1
+copy: 0 
+warning: the motion of \"finger\" goes 199.9 m away from the objects, which span 0.245 m: positions are in metres; if these are in millimetres, divide them by 1000
+warnings before: 0, of no state: 0
 no state: 1 \nsurface: 1 \nsurface of 4: 1 \nnowhere: 1 \nnearest: 0 \nposition: 0 \nheld: 0 \ncopy: 0 \npulled: 1, alike: 1, time: 0.022
 obstacles: 1, pressed: 1, by its contacts: 1
 "

@@ -118,7 +118,10 @@ impl Session {
 
     /// Warnings about positions of a move that look like millimetres.
     fn far_positions(&self, given: &Move, hands: &Hands) -> Vec<Warning> {
-        let poses = || self.running.newest().output.objects.iter().map(|object| object.pose).collect();
+        let poses = || {
+            let objects = &self.running.newest().output.objects;
+            objects.iter().map(|object| object.pose).collect::<Vec<_>>().into_iter()
+        };
         let positions = given.positions(&self.inner, &hands.modes);
         let far = |(name, x)| self.inner.far_positions(name, std::iter::once(x), poses);
         positions.filter_map(far).collect()

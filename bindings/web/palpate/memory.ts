@@ -37,6 +37,7 @@ export interface Exports {
   simulation_reset(simulation: number): void;
   simulation_step(simulation: number): number;
   simulation_time(simulation: number): number;
+  simulation_warnings(simulation: number): void;
   simulation_array(simulation: number, array: number): number;
   simulation_array_length(simulation: number, array: number): number;
   simulation_surface(simulation: number, object: number): number;

@@ -89,6 +89,14 @@ export class Simulation {
     return library().exports.simulation_time(this.handle);
   }
 
+  /**
+   * Warnings about the steps since the start: positions that look like millimetres, penetration, contacts that were not solved or left out, a tip that
+   * moved and touched nothing. For looking, not for each step; those of the scene are in {@link Scene.warnings}.
+   */
+  get warnings(): string[] {
+    return library().described<string[]>((exports) => exports.simulation_warnings(this.handle));
+  }
+
   /** Input: positions of the hands at the end of the next step, rows of 3 [m]; of a device of mode "force" its force [N]. NaN: takes no part. */
   get positions(): Float64Array {
     return this.view(Place.Positions);

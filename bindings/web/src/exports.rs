@@ -224,6 +224,12 @@ pub unsafe extern "C" fn simulation_time(simulation: &Simulation) -> f64 {
     simulation.time_s()
 }
 
+/// Sends the warnings about the steps since the start.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn simulation_warnings(simulation: &Simulation) {
+    send_json(&json!(simulation.warnings()));
+}
+
 /// Address of an array, by its place in [`Array::ALL`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn simulation_array(simulation: &Simulation, array: usize) -> *const f64 {

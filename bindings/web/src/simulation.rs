@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate::{Collider, DeviceInput, DeviceMode, Grasp, Input, ResidualFieldCache, State, step};
-use palpate_scene::{Scene, pose_of_row, pose_row, twist_row};
+use palpate_scene::{RunCheck, Scene, pose_of_row, pose_row, twist_row};
 use std::sync::Arc;
 
 /// Array of a simulation. The order of its rows is the scene's.
@@ -73,6 +73,8 @@ pub struct Simulation {
     surface: Vec<f32>,
     displacements: Vec<DVec3>,
     residual_fields: Vec<ResidualFieldCache>,
+    /// Check of the steps since the start.
+    check: RunCheck,
 }
 
 impl Simulation {
@@ -82,6 +84,7 @@ impl Simulation {
         let input = scene.input_at(0.0);
         let modes: Vec<DeviceMode> = scene.devices.iter().map(|device| device.mode).collect();
         let mut made = Self {
+            check: RunCheck::new(&scene),
             residual_fields: scene.object_names.iter().map(|_| ResidualFieldCache::default()).collect(),
             scene,
             state,
@@ -131,9 +134,16 @@ impl Simulation {
     /// Text, for a motion that cannot be followed.
     pub fn step(&mut self) -> Result<(), String> {
         self.read_input();
+        self.check.add_input(&self.scene, &self.input, &self.state);
         step(&self.scene.model, &mut self.state, &self.input);
         self.write_output();
+        self.check.add(&self.input, &self.state);
         self.scene.check_step(&self.input, &self.state)
+    }
+
+    /// Warnings about the steps since the start, but for large deformation.
+    pub fn warnings(&self) -> Vec<String> {
+        self.check.warnings(&self.scene).iter().map(ToString::to_string).collect()
     }
 
     /// Lets a device hold the point of an object's surface that is nearest to a position [m, world].

@@ -54,6 +54,19 @@ describe("a simulation", () => {
     expect(largest, "the fingers touch").toBeGreaterThan(0.1);
   });
 
+  it("tells once of positions in millimetres, and of a tip that touches nothing", () => {
+    const simulation = new Simulation(new Scene(pressed()));
+    simulation.step([0, 0.2, 0]);
+    expect(simulation.warnings).toEqual([]);
+    for (let step = 0; step < 3; step++) simulation.step([0, 200, 0]);
+    const [units, nothing, ...others] = simulation.warnings;
+    expect(units).toMatch(/the motion of "finger" goes 19\d\.\d m away .*millimetres, divide them by 1000/);
+    expect(nothing).toMatch(/finger touched nothing/);
+    expect(others).toEqual([]);
+    simulation.reset();
+    expect(simulation.warnings).toEqual([]);
+  });
+
   it("carries its weight on the floor, and its contacts add up to the net forces", () => {
     const scene = new Scene(pressed());
     const simulation = new Simulation(scene);

@@ -69,13 +69,32 @@ impl RunCheck {
         positions: impl Iterator<Item = DVec3> + Clone,
         state: &State,
     ) -> Option<&Warning> {
-        let poses = || state.output().objects.iter().map(|object| object.pose).collect();
-        let warning = scene.far_positions(name, positions, poses)?;
-        if self.far.iter().any(|told| told.part == warning.part) {
+        if self.far.iter().any(|told| told.part == name) {
             return None;
         }
-        self.far.push(warning);
+        let poses = || state.output().objects.iter().map(|object| object.pose);
+        self.far.push(scene.far_positions(name, positions, poses)?);
         self.far.last()
+    }
+
+    /// Check the positions of an input that a caller gives for the next step: those of hands, and of obstacles and clamps that move, without a
+    /// path.
+    ///
+    /// # Real time
+    /// No allocation but for a warning, one a part.
+    pub fn add_input(&mut self, scene: &Scene, input: &Input, state: &State) {
+        let has_position = |mode| matches!(mode, DeviceMode::Touch | DeviceMode::Held(_));
+        let devices = scene.devices.iter().zip(&input.devices);
+        let hands = devices.filter(|(own, given)| own.path.is_none() && has_position(given.mode));
+        let hands = hands.map(|(own, given)| (&own.name, given.position));
+        let obstacles = scene.obstacles.iter().zip(&input.obstacles);
+        let obstacles = obstacles.filter(|(own, at)| own.path.is_none() && own.start.position != at.position);
+        let obstacles = obstacles.map(|(own, at)| (&own.name, at.position));
+        let clamps = scene.clamps.iter().zip(&input.clamps).filter(|(own, _)| own.path.is_none());
+        let clamps = clamps.map(|(own, at)| (&own.name, at.position));
+        for (name, position) in hands.chain(obstacles).chain(clamps) {
+            self.add_positions(scene, name, std::iter::once(position), state);
+        }
     }
 
     /// Add the last step of a state.
@@ -88,7 +107,7 @@ impl RunCheck {
             *largest = largest.max(object.penetration_m);
         }
         for (tip, device) in self.tips.iter_mut().zip(&input.devices) {
-            if device.mode == DeviceMode::Touch {
+            if device.mode == DeviceMode::Touch && device.position.is_finite() {
                 tip.has_moved |= *tip.first.get_or_insert(device.position) != device.position;
             }
         }

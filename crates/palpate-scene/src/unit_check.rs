@@ -27,18 +27,16 @@ const FRICTION_PERCENT: std::ops::RangeInclusive<f64> = 5.0..=100.0;
 impl Scene {
     /// Warning about positions [m, world] that a caller gives to a part, if some are far from the objects at the start and from where these
     /// are now. Their poses are asked for only then.
-    pub fn far_positions(
+    pub fn far_positions<P: Iterator<Item = Pose> + Clone>(
         &self,
         name: &str,
         mut positions: impl Iterator<Item = DVec3> + Clone,
-        poses: impl FnOnce() -> Vec<Pose>,
+        poses: impl FnOnce() -> P,
     ) -> Option<Warning> {
         let bounds = &self.object_bounds;
         let farthest = bounds.farthest(positions.clone())?;
-        let objects = poses().into_iter().zip(self.model.recordings());
-        let now: Vec<(Pose, f64)> = objects.map(|(pose, own)| (pose, own.surface.radius())).collect();
-        let is_far =
-            |x: DVec3| now.iter().all(|(pose, radius)| (x - pose.position).length() - radius > bounds.far());
+        let now = poses();
+        let is_far = |x: DVec3| now.clone().all(|pose| (x - pose.position).length() > bounds.far());
         positions.any(is_far).then(|| bounds.warning("the motion", name, farthest))
     }
 }

@@ -110,13 +110,13 @@ fn positions_of_a_program_are_checked_as_those_of_a_path() {
     assert_eq!(check.add_positions(&scene, "finger", hand.into_iter(), &state), None, "it is told once");
     // One that follows an object is near it, however far this has gone.
     let object = Pose { position: DVec3::Z * 3000.0, ..Pose::IDENTITY };
-    let following = scene.far_positions("finger", hand[..2].iter().copied(), || vec![object]);
+    let following = scene.far_positions("finger", hand[..2].iter().copied(), || std::iter::once(object));
     assert!(
         following.is_some_and(|warning| warning.message == about("the motion", "finger")),
         "it left the start"
     );
-    assert_eq!(scene.far_positions("finger", hand[1..2].iter().copied(), || vec![object]), None);
-    assert_eq!(scene.far_positions("finger", [DVec3::Z * 7.0].into_iter(), Vec::new), None);
+    assert_eq!(scene.far_positions("finger", hand[1..2].iter().copied(), || std::iter::once(object)), None);
+    assert_eq!(scene.far_positions("finger", [DVec3::Z * 7.0].into_iter(), std::iter::empty), None);
 }
 
 #[test]
