@@ -10,6 +10,7 @@ use super::residual::lower_block;
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
+use alloc::vec;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 use miniz_oxide::deflate::{CompressionLevel, compress_to_vec_zlib};
@@ -39,6 +40,36 @@ impl QuantisedCompliance {
             DVec3::new(f64::from(q[at]), f64::from(q[3 + at]), f64::from(q[6 + at])) * rows * columns[at]
         };
         DMat3::from_cols(column(0), column(1), column(2))
+    }
+
+    /// Add the displacements of all nodes under nodal forces [N] to `out` [m]: u_i = s_i·Σ_j q_ij·(s_j·f_j), with the scales outside the sum.
+    pub(crate) fn add_displacements(&self, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
+        let mut sums = vec![DVec3::ZERO; out.len()];
+        for &(node, force) in loads {
+            let node = node as usize;
+            let scaled = self.scales_of(node) * force;
+            let (below, above) = sums.split_at_mut(node);
+            // The node's row, whose blocks are transposed, and then its column.
+            let row = &self.blocks[9 * lower_block(node, 0)..];
+            let (row, _) = row.as_chunks::<9>();
+            for (sum, q) in below.iter_mut().zip(row) {
+                let [a, b, c, d, e, f, g, h, i] = q.map(f64::from);
+                sum.x += a * scaled.x + d * scaled.y + g * scaled.z;
+                sum.y += b * scaled.x + e * scaled.y + h * scaled.z;
+                sum.z += c * scaled.x + f * scaled.y + i * scaled.z;
+            }
+            for (other, sum) in (node..).zip(above) {
+                let first = 9 * lower_block(other, node);
+                let Some(q) = self.blocks[first..].first_chunk::<9>() else { continue };
+                let [a, b, c, d, e, f, g, h, i] = q.map(f64::from);
+                sum.x += a * scaled.x + b * scaled.y + c * scaled.z;
+                sum.y += d * scaled.x + e * scaled.y + f * scaled.z;
+                sum.z += g * scaled.x + h * scaled.y + i * scaled.z;
+            }
+        }
+        for (node, (u, sum)) in out.iter_mut().zip(sums).enumerate() {
+            *u += self.scales_of(node) * sum;
+        }
     }
 
     /// Scales of a node's three degrees of freedom [√(m/N)].

@@ -81,6 +81,24 @@ impl ResidualCompliance {
         }
     }
 
+    /// Add the displacements of all nodes under nodal forces [N] to `out` [m]. Costs nodes × forces, or for a near field the blocks of the
+    /// loaded nodes.
+    pub(crate) fn add_displacements(&self, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
+        if let Self::Quantised(quantised) = self {
+            return quantised.add_displacements(loads, out);
+        }
+        for &(node, force) in loads {
+            let node = node as usize;
+            match self {
+                // S is symmetric: the blocks of a column are those of the row, transposed.
+                Self::NearField(near) => {
+                    near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
+                }
+                _ => out.iter_mut().enumerate().for_each(|(i, u)| *u += self.block(i, node) * force),
+            }
+        }
+    }
+
     /// Whole S between a number of nodes from its lower triangle, entry (i, j ≤ i) at i(i+1)/2 + j [m/N], as files hold it.
     ///
     /// # Errors
@@ -241,4 +259,42 @@ pub(crate) fn block_at(blocks: &[f32], at: usize) -> DMat3 {
     let b = &blocks[9 * at..9 * at + 9];
     let row = |r: usize| DVec3::new(f64::from(b[3 * r]), f64::from(b[3 * r + 1]), f64::from(b[3 * r + 2]));
     DMat3::from_cols(row(0), row(1), row(2)).transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use alloc::vec;
+
+    #[test]
+    fn displacements_are_the_sums_of_blocks() {
+        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
+        let recording = Recording::from_bytes(bytes).expect("a released recording");
+        let (whole, n) = (recording.residual, recording.surface.positions.len());
+        // A near field of rows of blocks without every third one.
+        let kept = |i: usize, j: usize| (i + j) % 3 != 1;
+        let mut near = NearField { radius: 1.0, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
+        for i in 0..n {
+            for j in (0..n).filter(|&j| kept(i, j)) {
+                near.nodes.push(j as u32);
+                let block = whole.block(i, j);
+                near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
+            }
+            near.offsets.push(near.nodes.len() as u32);
+        }
+        let loads =
+            [(0, DVec3::X), (5, DVec3::new(0.3, -1.0, 2.0)), (n as u32 - 1, DVec3::new(-1.0, 0.5, 0.1))];
+        let scales = (0..3 * n).map(|dof| 1e-3 * (1.0 + dof as f32)).collect();
+        let numbers = (0..9 * n * (n + 1) / 2).map(|at| (at * 7919 % 65_536) as u16 as i16).collect();
+        let quantised = ResidualCompliance::Quantised(QuantisedCompliance { scales, blocks: numbers });
+        for residual in [whole, quantised, ResidualCompliance::NearField(near), ResidualCompliance::None] {
+            let mut out = vec![DVec3::Y; n];
+            residual.add_displacements(&loads, &mut out);
+            for (i, u) in out.into_iter().enumerate() {
+                let sum: DVec3 = loads.iter().map(|&(j, f)| residual.block(i, j as usize) * f).sum();
+                assert!((u - DVec3::Y - sum).length() < 1e-14 * (1.0 + sum.length()), "{i}: {u} {sum}");
+            }
+        }
+    }
 }

@@ -8,7 +8,7 @@
 use super::ContactPoint;
 use super::modal_deformation::ModalDeformation;
 use super::nodal_compliance::NodalCompliance;
-use super::nodal_forces::{NodalForces, add_residual_displacements};
+use super::nodal_forces::NodalForces;
 use super::oscillator::{OscillatorState, SampledOscillator};
 use super::residual_fields::ResidualFields;
 use super::sampled_residual::{Products, SampledResidual};
@@ -465,6 +465,6 @@ impl SampledModes {
                 same
             });
         }
-        add_residual_displacements(&recording.residual, &loads, out);
+        recording.residual.add_displacements(&loads, out);
     }
 }

@@ -2,7 +2,6 @@
 
 use super::sampled_residual::{ResidualMemory, SampledResidual};
 use super::{Body, Footprint, SpringForce};
-use crate::recording::ResidualCompliance;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -128,59 +127,6 @@ impl NodalForces {
     pub(super) fn store(&mut self, node: usize, displacement: DVec3) {
         if self.displacements[node].replace(displacement).is_none() {
             self.cached.push(node as u32);
-        }
-    }
-}
-
-/// Add the residual displacements of all nodes under nodal forces [N] to `out` [m]. Costs nodes × forces, or for a near field
-/// the blocks of the loaded nodes.
-pub(super) fn add_residual_displacements(
-    residual: &ResidualCompliance,
-    loads: &[(u32, DVec3)],
-    out: &mut [DVec3],
-) {
-    for &(node, force) in loads {
-        let node = node as usize;
-        match residual {
-            // S is symmetric: the blocks of a column are those of the row, transposed.
-            ResidualCompliance::NearField(near) => {
-                near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
-            }
-            _ => out.iter_mut().enumerate().for_each(|(i, u)| *u += residual.block(i, node) * force),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::{NearField, Recording};
-
-    #[test]
-    fn residual_displacements_are_the_sums_of_blocks() {
-        let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
-        let recording = Recording::from_bytes(bytes).expect("a released recording");
-        let (whole, n) = (recording.residual, recording.surface.positions.len());
-        // A near field of rows of blocks without every third one.
-        let kept = |i: usize, j: usize| (i + j) % 3 != 1;
-        let mut near = NearField { radius: 1.0, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
-        for i in 0..n {
-            for j in (0..n).filter(|&j| kept(i, j)) {
-                near.nodes.push(j as u32);
-                let block = whole.block(i, j);
-                near.blocks.extend((0..3).flat_map(|row| block.row(row).to_array()).map(|x| x as f32));
-            }
-            near.offsets.push(near.nodes.len() as u32);
-        }
-        let loads =
-            [(0, DVec3::X), (5, DVec3::new(0.3, -1.0, 2.0)), (n as u32 - 1, DVec3::new(-1.0, 0.5, 0.1))];
-        for residual in [whole, ResidualCompliance::NearField(near), ResidualCompliance::None] {
-            let mut out = vec![DVec3::Y; n];
-            add_residual_displacements(&residual, &loads, &mut out);
-            for (i, u) in out.into_iter().enumerate() {
-                let sum: DVec3 = loads.iter().map(|&(j, f)| residual.block(i, j as usize) * f).sum();
-                assert!((u - DVec3::Y - sum).length() < 1e-14 * (1.0 + sum.length()), "{i}: {u} {sum}");
-            }
         }
     }
 }
