@@ -1,6 +1,7 @@
 // palpate from C#, as in Unity: scene, state, steps, forces and surfaces. Put it beside libpalpate_c (palpate_c.dll on Windows).
 
 using System;
+using System.Collections.Generic;
 using System.Runtime.InteropServices;
 
 namespace Palpate
@@ -64,12 +65,14 @@ namespace Palpate
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern void palpate_scene_free(IntPtr scene);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern double palpate_scene_step_s(IntPtr scene);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_scene_find(IntPtr scene, uint part, byte[] name);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_scene_warning(IntPtr scene, UIntPtr number);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern UIntPtr palpate_scene_node_count(IntPtr scene, UIntPtr body);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_scene_triangles(IntPtr scene, UIntPtr body, out UIntPtr count);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_new(IntPtr scene, out IntPtr state, out Error error);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern void palpate_state_free(IntPtr state);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_set_position(IntPtr state, UIntPtr device, Vector position);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern int palpate_state_step(IntPtr state);
+        [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_warning(IntPtr state, UIntPtr number);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_devices(IntPtr state, out UIntPtr count);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_obstacles(IntPtr state, out UIntPtr count);
         [DllImport(Name, CallingConvention = CallingConvention.Cdecl)] public static extern IntPtr palpate_state_contacts(IntPtr state, out UIntPtr count);
@@ -78,6 +81,17 @@ namespace Palpate
         public static byte[] Text(string text)
         {
             return System.Text.Encoding.UTF8.GetBytes(text + "\0");
+        }
+
+        /// <summary>Text of the library; null where there is none.</summary>
+        public static string Text(IntPtr text)
+        {
+            if (text == IntPtr.Zero) return null;
+            int length = 0;
+            while (Marshal.ReadByte(text, length) != 0) length++;
+            byte[] bytes = new byte[length];
+            Marshal.Copy(text, bytes, 0, length);
+            return System.Text.Encoding.UTF8.GetString(bytes);
         }
 
         public static void Check(int status, Error error)
@@ -133,6 +147,19 @@ namespace Palpate
         public void Step()
         {
             lock (turn) Library.Check(Library.palpate_state_step(state));
+        }
+
+        /// <summary>Warnings about the scene and about the steps so far. For looking, not for each step.</summary>
+        public List<string> Warnings()
+        {
+            lock (turn)
+            {
+                List<string> all = new List<string>();
+                string text;
+                for (uint at = 0; (text = Library.Text(Library.palpate_scene_warning(scene, (UIntPtr)at))) != null; at++) all.Add(text);
+                for (uint at = 0; (text = Library.Text(Library.palpate_state_warning(state, (UIntPtr)at))) != null; at++) all.Add(text);
+                return all;
+            }
         }
 
         /// <summary>Device after the last step.</summary>

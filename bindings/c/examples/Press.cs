@@ -29,6 +29,7 @@ static class Press
                 Vector force = simulation.Output(finger).ForceOnHand;
                 Console.WriteLine(string.Format(CultureInfo.InvariantCulture, "{0} {1:R} {2:R} {3:R} {4}", i, force.X, force.Y, force.Z, simulation.Contacts));
             }
+            foreach (string warning in simulation.Warnings()) Console.Error.WriteLine("warning: " + warning);
             // The floor carries the cube and the finger.
             if (!(simulation.Obstacle(0).Force.Z < 0.0)) throw new InvalidOperationException("the floor carries nothing");
         }
