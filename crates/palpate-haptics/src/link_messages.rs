@@ -103,8 +103,8 @@ pub(crate) fn effort(bytes: &[u8], time_s: f64) -> Option<Effort> {
 /// Whether bytes are a message of either end: entry of the fuzzer.
 #[doc(hidden)]
 pub fn decodes_link_message(bytes: &[u8]) -> bool {
-    let greets = serde_json::from_slice::<Hello>(bytes).is_ok()
-        || serde_json::from_slice::<Welcome>(bytes).is_ok();
+    let greets =
+        serde_json::from_slice::<Hello>(bytes).is_ok() || serde_json::from_slice::<Welcome>(bytes).is_ok();
     greets || motion(bytes, 0.0).is_some() || effort(bytes, 0.0).is_some()
 }
 

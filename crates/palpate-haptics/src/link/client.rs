@@ -2,11 +2,11 @@
 
 use super::identity::Secret;
 use super::lock;
-use crate::link_messages::{Hello, Welcome, effort, motion_bytes, taken};
 use super::sequence::SequenceFilter;
 use super::server::runtime;
 use super::transport::transport;
 use crate::error::{Error, LinkError};
+use crate::link_messages::{Hello, Welcome, effort, motion_bytes, taken};
 use crate::port::{DevicePort, Effort, Motion};
 use quinn::crypto::rustls::QuicClientConfig;
 use quinn::{ClientConfig, Connection, ConnectionError, Endpoint};

@@ -17,9 +17,9 @@ impl SequenceFilter {
 
 #[cfg(test)]
 mod tests {
-    use crate::link_messages::{effort, effort_bytes, motion, motion_bytes};
     use super::*;
     use crate::device::{DeviceSpec, Hand, Mount, SimulatedDevice};
+    use crate::link_messages::{effort, effort_bytes, motion, motion_bytes};
     use crate::{
         Columns, DevicePort, Effort, ForcePort, HapticUpdate, Motion, MotionPath, Safety, SafetyLimits, port,
     };

@@ -2,11 +2,11 @@
 
 use super::identity::Secret;
 use super::lock;
-use crate::link_messages::{Hello, Welcome, effort_bytes, motion, taken};
 use super::sequence::SequenceFilter;
 use super::transport::transport;
 use crate::clock::Clock;
 use crate::error::{Error, LinkError};
+use crate::link_messages::{Hello, Welcome, effort_bytes, motion, taken};
 use crate::port::{DevicePort, Effort};
 use crate::scheduling::Scheduling;
 use quinn::crypto::rustls::QuicServerConfig;
