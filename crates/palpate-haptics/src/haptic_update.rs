@@ -126,6 +126,11 @@ impl HapticUpdate {
         counts
     }
 
+    /// Whether the force is armed.
+    pub fn is_armed(&self) -> bool {
+        self.safety.is_armed()
+    }
+
     /// Force that the device holds [N, world].
     pub fn held_force(&self) -> DVec3 {
         self.held

@@ -1,11 +1,12 @@
 //! Haptic device of a page without a server: whoever talks to it hands over readings, and takes forces.
 
 use crate::pointers::lock;
+use crate::protocol::{DeviceStatus, ForceStatus};
 use glam::{DQuat, DVec3};
 use palpate::{DeviceMode, Pose};
 use palpate_haptics::device::{Device, DeviceSpec, Mount, Reading};
 use palpate_haptics::error::DeviceError;
-use palpate_haptics::{AttachedDevice, DevicePort, Error, HapticUpdate, SafetyLimits};
+use palpate_haptics::{AttachedDevice, DevicePort, Error, HapticUpdate, SafetyCounts, SafetyLimits};
 use std::sync::{Arc, Mutex};
 
 /// Rate of the exchange [Hz], for the passivity controller. A browser wakes less often at times: the watchdog bears that.
@@ -32,6 +33,8 @@ pub(crate) struct LocalDevice {
     place: DevicePlace,
     exchanged: Arc<Mutex<Exchanged>>,
     stage: Stage,
+    /// Counters of the safety at the last status.
+    counts: SafetyCounts,
 }
 
 enum Stage {
@@ -49,7 +52,13 @@ struct Exchanged {
 impl LocalDevice {
     /// Device on the port of a slot.
     pub fn new(device: usize, port: DevicePort, place: DevicePlace) -> Self {
-        Self { device, place, exchanged: Arc::default(), stage: Stage::Waiting(Some(port)) }
+        Self {
+            device,
+            place,
+            exchanged: Arc::default(),
+            stage: Stage::Waiting(Some(port)),
+            counts: SafetyCounts::default(),
+        }
     }
 
     /// Update at a time [s] with the newest reading, or none: returns the force to command [N, device frame].
@@ -75,6 +84,27 @@ impl LocalDevice {
         lock(&self.exchanged).reading = reading;
         update.cycle(now_s);
         lock(&self.exchanged).force
+    }
+
+    /// Status, with the faults since the last one.
+    pub fn status(&mut self) -> DeviceStatus {
+        let (is_armed, now) = match &self.stage {
+            Stage::Waiting(_) => (false, SafetyCounts::default()),
+            Stage::Running(update) => (update.is_armed(), update.counts().safety),
+        };
+        let before = std::mem::replace(&mut self.counts, now);
+        let late = |of: SafetyCounts| of.gaps + of.stale + of.old_motions + of.slow_replies;
+        let implausible = |of: SafetyCounts| of.overspeed + of.out_of_range + of.not_finite;
+        let force = if !is_armed {
+            ForceStatus::Off
+        } else if implausible(now) > implausible(before) {
+            ForceStatus::ImplausibleMotion
+        } else if late(now) > late(before) {
+            ForceStatus::LateUpdates
+        } else {
+            ForceStatus::On
+        };
+        DeviceStatus { force, max_force_n: MAX_FORCE_N }
     }
 
     /// Index and port of the slot, for pointers.

@@ -393,7 +393,7 @@ impl LocalScene {
         self.send_status(send);
     }
 
-    fn send_status(&self, send: &mut dyn FnMut(PageMessage)) {
+    fn send_status(&mut self, send: &mut dyn FnMut(PageMessage)) {
         let status = Status {
             generation: self.current.generation,
             paused: self.playback.is_paused(),
@@ -401,6 +401,7 @@ impl LocalScene {
             steps: self.process.steps(),
             viewers: 1,
             force_process: ProcessTiming::new(&self.timing, false),
+            haptic_device: self.device.as_mut().map(LocalDevice::status),
         };
         send(PageMessage::Text(ServerMessage::Status(status).to_json()));
     }

@@ -7,7 +7,7 @@ use palpate_testkit::FREE_BLOCK_FILE;
 use palpate_viewer::{
     DevicePlace, LocalRequest, LocalScene, PageMessage, ViewerDevice, ViewerScene, describe_scene,
 };
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
@@ -239,12 +239,25 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
     let down = |step: u32| (5e-5 * f64::from(step)).min(0.06);
     let forces: Vec<DVec3> = (0..1500).map(|step| at(&mut page, down(step), 0)).collect();
     assert!(forces.iter().all(|force| *force == DVec3::ZERO), "no button was pressed");
+    let status = |page: &mut Page| page.newest("status")["haptic_device"].clone();
+    assert_eq!(status(&mut page), json!({ "force": "off", "max_force_n": 1.5 }));
     let forces: Vec<DVec3> =
         (0..1500).map(|step| at(&mut page, 0.06, u32::from((100..200).contains(&step)))).collect();
     assert!(forces[..100].iter().all(|force| *force == DVec3::ZERO));
     let last = forces[1499];
     // The largest force, to round-off.
     assert!(last.y > 0.1 && last.length() < 1.5 + 1e-12, "{last}");
+    assert_eq!(status(&mut page)["force"], "on");
+    // After a pause between updates the force is gone, and told; then it is back.
+    let statuses: Vec<Value> = (0..1500)
+        .map(|step| {
+            page.now_s.set(page.now_s.get() + if step == 100 { 0.05 } else { 0.0 });
+            let force = at(&mut page, 0.06, 0);
+            assert!(step != 100 || force == DVec3::ZERO, "{force}");
+            status(&mut page)["force"].clone()
+        })
+        .collect();
+    assert!(statuses.contains(&json!("late_updates")) && statuses[1499] == "on", "{statuses:?}");
     // Without readings the force goes.
     let mut force = last;
     for _ in 0..200 {
@@ -253,6 +266,8 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
         force = page.scene.exchange(None, page.now_s.get()).expect("an attached device");
     }
     assert_eq!(force, DVec3::ZERO);
+    page.run(0.5);
+    assert_eq!(status(&mut page)["force"], "off");
     let press = |page: &mut Page, pointer: usize| {
         page.receive(&format!(
             r#"{{"type":"press","pointer":{pointer},"mode":"touch","position":[0,0.3,0]}}"#

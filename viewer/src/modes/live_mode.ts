@@ -227,6 +227,7 @@ export class LiveMode implements PageMode {
   status(status: Status): void {
     this.toolbar.update(status);
     this.panels.status(status, this.shown.requested);
+    if (status.haptic_device !== undefined) this.haply?.status(status.haptic_device);
   }
 
   assigned(message: DeviceAssigned): void {

@@ -126,6 +126,14 @@ export interface Status {
     compute_overruns: number;
     realtime_priority: boolean;
   } | null;
+  /** Of a page without a server. */
+  haptic_device?: HapticDeviceStatus;
+}
+
+/** Status of a haptic device: its force since the last status, off until a button of the grip is pressed. */
+export interface HapticDeviceStatus {
+  force: "off" | "on" | "late_updates" | "implausible_motion";
+  max_force_n: number;
 }
 
 export interface DeviceAssigned {

@@ -1,6 +1,7 @@
 // Haptic device of a page without a server: a Haply Inverse3 on this computer, by its service.
 
 import { Quaternion, Vector3 } from "three";
+import type { HapticDeviceStatus } from "../protocol/messages";
 import type { WorkerConnection } from "../protocol/worker_connection";
 import type { SceneView } from "../rendering/scene_view";
 import type { HaplyPlace } from "../worker/messages";
@@ -20,12 +21,28 @@ export function placeAbove(center: Vector3, radius: number, up: Vector3, toCamer
   return { start: start.toArray(), orientation: [w, x, y, z], scale: radius / REACH };
 }
 
+/** Force of a device in words. */
+export function forceText({ force, max_force_n }: HapticDeviceStatus): string {
+  switch (force) {
+    case "off":
+      return `press a button of its grip to switch the force on (${max_force_n} N at most)`;
+    case "on":
+      return `the force is on (${max_force_n} N at most)`;
+    case "late_updates":
+      return "the force is held back, since this computer answers the device too late; close other programs and tabs";
+    case "implausible_motion":
+      return "the force is held back, since the hand is too fast or too far from its start";
+  }
+}
+
 export class HaplyPanel {
   readonly section: HTMLElement;
   private readonly address = element("input", { type: "url", attributes: { value: ADDRESS, "aria-label": "Address of the Inverse Service" } });
   private readonly button = element("button", { class: "button wide", type: "button", text: "Connect", on: { click: () => this.toggle() } });
   private readonly state = element("p", { class: "secondary", role: "status" });
   private isOn = false;
+  /** Name of the connected device. */
+  private device: string | null = null;
 
   constructor(
     private readonly worker: WorkerConnection,
@@ -33,8 +50,9 @@ export class HaplyPanel {
   ) {
     worker.onHaply = (state, text) => {
       if (!this.isOn) return;
+      this.device = state === "connected" ? text : null;
+      this.state.textContent = state === "connected" ? `${text} is connected.` : `Waiting: ${text}.`;
       if (state === "connected") this.place();
-      this.state.textContent = state === "connected" ? `${text}: press a button of its grip to switch the force on (1.5 N at most).` : `Waiting: ${text}.`;
     };
     this.section = section(
       "Haptic device",
@@ -54,8 +72,14 @@ export class HaplyPanel {
     this.worker.placeHaply(placeAbove(new Vector3(...view.center), view.radius, up, viewDirection.negate()));
   }
 
+  /** Shows what the force of the device does. */
+  status(status: HapticDeviceStatus): void {
+    if (this.device !== null) this.state.textContent = `${this.device}: ${forceText(status)}.`;
+  }
+
   private toggle(): void {
     this.isOn = !this.isOn;
+    this.device = null;
     this.address.disabled = this.isOn;
     this.button.textContent = this.isOn ? "Disconnect" : "Connect";
     this.state.textContent = this.isOn ? "Connecting …" : "";

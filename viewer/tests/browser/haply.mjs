@@ -9,6 +9,8 @@ class InverseService {
   cursor = [0, -0.15, 0.2];
   pressed = false;
   force = [Number.NaN, Number.NaN, Number.NaN];
+  /** Command with the largest force upwards. */
+  upward = [0, 0, 0];
   profiles = [];
   commands = 0;
 
@@ -41,6 +43,7 @@ class InverseService {
     if (session !== undefined) this.profiles.push(session.configure.profile.name);
     const { x, y, z } = inverse3[0].commands.set_cursor_force.vector;
     this.force = [x, y, z];
+    if (z > this.upward[2]) this.upward = this.force;
     this.commands += 1;
   }
 
@@ -80,6 +83,8 @@ const touching = (page) => page.evaluate(() => window.palpate.sceneView.graphs[0
 export const haplyCases = [
   {
     name: "an Inverse3 touches the scene, feels it after the press of its button, and lets go when its service or the page ends",
+    // An update more than 20 ms late takes the force away, as it should: beside another case that is the rule on two cores.
+    alone: true,
     serverlessOnly: true,
     async run(browser) {
       const server = browser.keep(await start());
@@ -102,8 +107,11 @@ export const haplyCases = [
       await wait(300);
       assert(service.force.every((part) => part === 0), `a force of ${service.force} N before a button was pressed`);
       await service.press();
-      await until(() => service.force[2] > 0.1, () => `no force upwards: ${service.force}`);
-      assert(Math.hypot(...service.force) <= 1.5 + 1e-9, `${service.force} N`);
+      await page.waitForSelector("text=Inverse3 049D: the force is on");
+      // How much of it the passivity controller lets pass depends on how late the updates were on the way down.
+      await until(() => service.upward[2] > 0.02, () => `no force upwards: ${service.upward}`);
+      const [right, forward, up] = service.upward;
+      assert(up > 5 * Math.hypot(right, forward) && up <= 1.5 + 1e-9, `${service.upward} N`);
       await screenshot(page, "haply");
       const before = service.commands;
       await until(() => service.commands > before + 50, () => "the updates have ended");

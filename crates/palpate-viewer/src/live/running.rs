@@ -165,6 +165,7 @@ impl RunningScene {
                 timing,
                 granted.is_some_and(|granted| matches!(granted.priority, Ok(Some(_)))),
             ),
+            haptic_device: None,
         }
     }
 }

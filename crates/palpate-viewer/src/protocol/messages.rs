@@ -119,6 +119,29 @@ pub(crate) struct Status {
     pub steps: u64,
     pub viewers: usize,
     pub force_process: ProcessTiming,
+    /// Haptic device of a page without a server.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub haptic_device: Option<DeviceStatus>,
+}
+
+/// Status of a haptic device.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct DeviceStatus {
+    pub force: ForceStatus,
+    pub max_force_n: f64,
+}
+
+/// Force of a haptic device since the last status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ForceStatus {
+    /// Not armed.
+    Off,
+    On,
+    /// Taken away: an update, or the reply to a motion, came too late.
+    LateUpdates,
+    /// Taken away: the hand was too fast or too far from its start.
+    ImplausibleMotion,
 }
 
 /// Message to a page, after [`Hello`].

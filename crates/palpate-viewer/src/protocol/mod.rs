@@ -15,6 +15,9 @@ pub use frame::{FrameEncoder, FrameFormat};
 #[cfg(feature = "logs")]
 pub(crate) use messages::LogEntry;
 pub use messages::{CameraView, PhysicsSettings, RenderRequest, SceneSummary, decodes};
-pub(crate) use messages::{ClientMessage, Hello, PROTOCOL, PressMode, ProcessTiming, ServerMessage, Status};
+pub(crate) use messages::{
+    ClientMessage, DeviceStatus, ForceStatus, Hello, PROTOCOL, PressMode, ProcessTiming, ServerMessage,
+    Status,
+};
 pub(crate) use sound::encode_sound;
 pub(crate) use surface::{mode_shapes_bytes, surface_bytes};
