@@ -5,8 +5,8 @@ use crate::cases::CASES;
 use crate::check::Check;
 use crate::error::{UnknownCase, VerifyError};
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A case that was computed.
@@ -41,7 +41,7 @@ pub fn select<S: AsRef<str>>(names: &[S]) -> Result<Vec<&'static Case>, UnknownC
 }
 
 /// Computes cases on all cores; `progress` hears of each in the given order, once it and those before it are there, or stops the run by its
-/// own error.
+/// own error. One worker takes cases from the front, the others from the end, where the long ones are: these do not begin last.
 ///
 /// # Errors
 /// The first case that can't be computed, or what `progress` returns.
@@ -50,13 +50,15 @@ pub fn run<E: From<VerifyError>>(
     mut progress: impl FnMut(&CaseResult) -> Result<(), E>,
 ) -> Result<Vec<CaseResult>, E> {
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(cases.len());
-    let next = AtomicUsize::new(0);
+    let left = Mutex::new(0..cases.len());
+    let left = || left.lock().unwrap_or_else(PoisonError::into_inner);
     std::thread::scope(|scope| {
         let (sender, computed) = channel();
-        for _ in 0..workers {
-            let (sender, next) = (sender.clone(), &next);
+        for worker in 0..workers {
+            let (sender, left) = (sender.clone(), &left);
             scope.spawn(move || {
-                while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let take = || if worker == 0 { left().next() } else { left().next_back() };
+                while let Some(case) = take().map(|at| cases[at]) {
                     let before = Instant::now();
                     let checks = (case.compute)();
                     let result = checks.map(|checks| CaseResult { case, checks, elapsed: before.elapsed() });
@@ -82,7 +84,7 @@ pub fn run<E: From<VerifyError>>(
             Ok(())
         });
         // After an error no further case begins.
-        next.store(cases.len(), Ordering::Relaxed);
+        *left() = 0..0;
         outcome.map(|()| results)
     })
 }
