@@ -41,7 +41,7 @@ int main(int argc, char **argv) {
     /* From 10 mm above the cube down to 4 mm inside in 0.1 s, back, and again. */
     double t = (double)(i % 200) * step;
     double depth = 0.14 * (t < 0.1 ? t : 0.2 - t);
-    PalpateVector position = {0.0, 0.0, 0.065 - depth};
+    PalpateVector position = {0.0, 0.0, 0.115 - depth};
     palpate_state_set_position(state, (size_t)finger, position);
     palpate_state_step(state);
     if (i % every == 0) {

@@ -90,7 +90,7 @@ fn pressed(workplace: &Workplace, steps: usize, every: usize) -> String {
     for i in 1..=steps {
         let t = (i % 200) as f64 * step_s;
         let depth = 0.14 * if t < 0.1 { t } else { 0.2 - t };
-        input.devices[0] = DeviceInput::touching(DVec3::new(0.0, 0.0, 0.065 - depth));
+        input.devices[0] = DeviceInput::touching(DVec3::new(0.0, 0.0, 0.115 - depth));
         let output = step(&scene.model, &mut state, &input);
         if i % every == 0 {
             let force = output.devices[0].force_on_hand;

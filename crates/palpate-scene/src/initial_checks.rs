@@ -180,14 +180,19 @@ fn tip_inside(name: &str, centre: DVec3, radius: f64, object: &Placed) -> Option
     let solid = Shape::Mesh(object.solid.clone()?);
     let (distance, _) = solid.signed_distance(object.pose.body_from_world(centre), radius)?;
     (radius - distance > object.allowed()).then(|| {
-        let message = format!(
-            "the tip of {name:?} begins {} inside the object {:?}: it starts on the surface, from where it presses its way to the \
-             hand within a tenth of a second; begin its path outside",
-            millimetres(radius - distance),
-            object.name
-        );
-        Warning::new(WarningKind::BeginsInside, name, message)
+        let whose = format!("the object {:?}", object.name);
+        begins_inside(name, radius - distance, &whose, "begin its path outside")
     })
+}
+
+/// Warning about a tip that begins inside an object, by a depth [m].
+pub(crate) fn begins_inside(name: &str, depth: f64, object: &str, instead: &str) -> Warning {
+    let message = format!(
+        "the tip of {name:?} begins {} inside {object}: it starts on the surface, from where it presses its way to the hand \
+         within a tenth of a second; {instead}",
+        millimetres(depth)
+    );
+    Warning::new(WarningKind::BeginsInside, name, message)
 }
 
 fn millimetres(length: f64) -> String {

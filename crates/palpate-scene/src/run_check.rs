@@ -1,5 +1,6 @@
 //! Check of a run: what it has seen that its author hardly means.
 
+use crate::initial_checks::begins_inside;
 use crate::scene::Scene;
 use crate::warning::{Warning, WarningKind};
 use glam::DVec3;
@@ -46,12 +47,15 @@ struct Tip {
     has_touched: bool,
     /// Least sampled distance from the surfaces until it touches [m].
     nearest: f64,
+    /// Largest depth in an object that it was let out of [m].
+    inside: f64,
 }
 
 impl RunCheck {
     /// Check before the first step.
     pub fn new(scene: &Scene) -> Self {
-        let tip = Tip { first: None, has_moved: false, has_touched: false, nearest: f64::INFINITY };
+        let tip =
+            Tip { first: None, has_moved: false, has_touched: false, nearest: f64::INFINITY, inside: 0.0 };
         let objects = scene.object_names.len();
         Self {
             deformation: vec![0.0; objects],
@@ -110,6 +114,9 @@ impl RunCheck {
             if device.mode == DeviceMode::Touch && device.position.is_finite() {
                 tip.has_moved |= *tip.first.get_or_insert(device.position) != device.position;
             }
+        }
+        for (tip, device) in self.tips.iter_mut().zip(&output.devices) {
+            tip.inside = tip.inside.max(device.offset[0].length());
         }
         for contact in &output.contacts {
             if let Collider::Device(number) = contact.against {
@@ -182,6 +189,10 @@ impl RunCheck {
         let depths = objects.zip(&self.penetration);
         all.extend(depths.filter_map(|((recording, name), depth)| penetration(name, recording, *depth)));
         for (device, tip) in scene.devices.iter().zip(&self.tips) {
+            // Of a path the check of the scene's start tells.
+            if device.path.is_none() && tip.inside > PENETRATION_M {
+                all.push(begins_inside(&device.name, tip.inside, "an object", "begin outside"));
+            }
             let could_touch = tip.first.is_some() && (device.path.is_some() || tip.has_moved);
             if could_touch && !tip.has_touched {
                 let nearest = if self.samples < MIN_SAMPLES { f64::INFINITY } else { tip.nearest };

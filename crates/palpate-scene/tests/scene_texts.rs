@@ -120,6 +120,33 @@ fn positions_of_a_program_are_checked_as_those_of_a_path() {
 }
 
 #[test]
+fn a_tip_that_a_program_puts_into_an_object_is_told_of() {
+    let scene = read(TEXT, "0,0,0,3\n1,0,0,3\n").expect("a scene");
+    let inside = |at: DVec3| {
+        let (mut state, mut check) = (State::new(&scene.model), RunCheck::new(&scene));
+        let mut input = scene.input_at(0.0);
+        input.devices[0].position = at;
+        for _ in 0..3 {
+            step(&scene.model, &mut state, &input);
+            check.add(&input, &state);
+        }
+        let warnings = check.warnings(&scene).into_iter();
+        warnings.filter(|warning| warning.kind == WarningKind::BeginsInside).collect::<Vec<_>>()
+    };
+    let surface = &scene.model.recordings().next().expect("a recording").surface;
+    let top = surface.positions.iter().map(|x| x.z).fold(0.0, f64::max);
+    let [warning] = &inside(DVec3::Z * (top - 0.01))[..] else { panic!("one warning") };
+    // A tip without a radius starts a little above the surface.
+    let begin = "the tip of \"finger\" begins 10.1";
+    let end = "mm inside an object: it starts on the surface, from where it presses its way to the hand within a tenth of a second; begin \
+               outside";
+    let message = &warning.message;
+    assert!(message.starts_with(begin) && message.ends_with(end), "{message}");
+    assert_eq!(warning.part, "finger");
+    assert_eq!(inside(DVec3::Z * (top + 0.001)), []);
+}
+
+#[test]
 fn a_tip_that_moves_and_touches_nothing_is_told_of() {
     let scene = read(TEXT, "0,0,0,3\n1,0,0,3\n").expect("a scene");
     let mut state = State::new(&scene.model);
