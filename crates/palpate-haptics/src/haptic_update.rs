@@ -201,8 +201,14 @@ impl HapticUpdate {
         conditions.distance_m = self.distance_from_start(reading.position);
 
         // Command the force, made passive and safe.
+        let is_gap = since_update_s.is_some_and(|gap_s| !self.safety.limits().is_regular(gap_s));
         let wanted = match &mut self.passivity {
-            Some(passivity) => passivity.control(self.sequence, position, &effort, dt),
+            Some(passivity) => {
+                if is_gap {
+                    passivity.skip_gap(self.sequence);
+                }
+                passivity.control(self.sequence, position, &effort, dt)
+            }
             None => effort.force,
         };
         let force = self.safety.limit(wanted, &conditions);

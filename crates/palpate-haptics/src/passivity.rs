@@ -16,7 +16,7 @@
 //! absorbed beyond the work of the wanted force. The coupling's damper does not count as absorbed: it pays for the port's activity, and
 //! a coupling within its stability bound shows no n. The controller damps the hand by n. A device tolerates only a limited damping b of
 //! a velocity that is known late; beyond it the force is scaled by s < 1. Where the tank acts, s falls too, until the tank need not act.
-//! n is kept during contact, which avoids limit cycles.
+//! n is kept during contact, which avoids limit cycles. It is not identified across a gap between updates ([`PassivityController::skip_gap`]).
 //!
 //! ```text
 //! n = (Σ ΔA − Σ −F_wanted·Δx − noise) / Σ ẋ²·Δt        F = s·F_wanted − s·n·ẋ/η        s = min(1, η·b/n)
@@ -142,6 +142,10 @@ pub struct PassivityController {
     contact_s: f64,
     /// Duration of the interruption [s].
     interruption_s: f64,
+    /// Motion of the last update.
+    sequence: u64,
+    /// First motion after a gap between updates.
+    after_gap: u64,
     active_updates: u64,
     max_deficit: f64,
 }
@@ -175,6 +179,8 @@ impl PassivityController {
             absorbed_unloaded: 0.0,
             contact_s: 0.0,
             interruption_s: 0.0,
+            sequence: 0,
+            after_gap: 0,
             active_updates: 0,
             max_deficit: 0.0,
         }
@@ -200,6 +206,15 @@ impl PassivityController {
         self.scale
     }
 
+    /// Learns nothing from the time before a motion, which came after a gap between updates: the force over a gap is not the port's, and is
+    /// taken away by the safety. The tank still counts its energy.
+    ///
+    /// # Real time
+    /// No allocation, lock or system call.
+    pub fn skip_gap(&mut self, sequence: u64) {
+        self.after_gap = sequence;
+    }
+
     /// Passive force [N] for the newest effort, at the hand's position [m] with its motion number `sequence`, `dt_s` [s] after the
     /// last update.
     ///
@@ -217,6 +232,7 @@ impl PassivityController {
         if dt_s > 0.0 {
             self.filter_velocity(moved, dt_s);
         }
+        self.sequence = sequence;
         self.history[index(sequence)] = self.now;
         self.window.force = self.window.force.max(self.wanted.length());
         self.observe(sequence, effort, dt_s);
@@ -281,14 +297,19 @@ impl PassivityController {
         }
         // The first force of a contact replies to a motion without force: the damper has not paid yet.
         if self.contact_s < (sequence.saturating_sub(effort.in_reply_to) + 1) as f64 * dt_s {
-            self.window = Window { force: self.window.force, ..Window::default() };
-            self.balance = 0.0;
+            self.forget();
         }
         let Window { generated, motion, force, .. } = self.window;
         let noise = self.resolution * force.max(effort.force.length());
         if effort.force != DVec3::ZERO && -self.balance > noise && motion > 0.0 {
             self.negative_damping = self.negative_damping.max((generated - noise) / motion);
         }
+    }
+
+    /// Forgets the energies of the window and the balance.
+    fn forget(&mut self) {
+        self.window = Window { force: self.window.force, ..Window::default() };
+        self.balance = 0.0;
     }
 
     /// Damping that dissipates the energy deficit [N·s/m].
@@ -322,6 +343,9 @@ impl PassivityController {
             self.replied = Some((effort.in_reply_to, effort.absorbed_j));
             let span_s = (effort.in_reply_to - before) as f64 * dt_s;
             self.account(self.history[index(before)], effort, span_s, absorbed);
+            if before < self.after_gap {
+                self.forget();
+            }
         }
         // Energy of another hand may pass through.
         let passed = self.replied.map_or(0.0, |(_, absorbed)| (absorbed - self.absorbed_at_start).min(0.0));
@@ -368,6 +392,7 @@ impl PassivityController {
         let square = self.wanted.length_squared();
         let scale = (force - self.added).dot(self.wanted) / square;
         self.now.scale = if square > 0.0 { scale.clamp(0.0, 1.0) } else { self.scale };
+        self.history[index(self.sequence)].scale = self.now.scale;
     }
 }
 

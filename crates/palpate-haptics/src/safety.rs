@@ -181,7 +181,7 @@ impl Safety {
 
 impl SafetyLimits {
     /// Whether a time from one update to the next [s] is one: the clock goes on, and the update is not late.
-    fn is_regular(&self, gap_s: f64) -> bool {
+    pub(crate) fn is_regular(&self, gap_s: f64) -> bool {
         gap_s > 0.0 && gap_s <= self.watchdog_s
     }
 }

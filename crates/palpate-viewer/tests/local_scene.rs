@@ -220,6 +220,18 @@ const ABOVE: DevicePlace = DevicePlace {
     scale: 1.0,
 };
 
+impl Page {
+    /// Update of the haptic device after a time [s]: the steps that are due, then the force [N] on the hand at a depth [m] below its start.
+    fn exchange(&mut self, after_s: f64, depth: f64, buttons: u32) -> DVec3 {
+        // The vendor's origin is somewhere.
+        const FIRST: DVec3 = DVec3::new(0.3, -0.2, 0.1);
+        self.now_s.set(self.now_s.get() + after_s);
+        self.call(|scene, now, send| scene.advance(&|| now.get(), send));
+        let reading = Reading { position: FIRST - depth * DVec3::Y, orientation: None, buttons };
+        self.scene.exchange(Some(reading), self.now_s.get()).expect("an attached device")
+    }
+}
+
 #[test]
 fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_place_back() {
     let mut page = Page::new(&SCENE.replace("[0.0, 0.2, 0.0]", "[0.0, 0.05, 0.0]"));
@@ -228,14 +240,8 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
     let scene = page.newest("scene");
     let slots = scene["devices"].as_array().expect("devices").len();
     assert_eq!(device, slots - 1, "the last one, so that pointers have the first");
-    // The vendor's origin is somewhere; the hand goes down at 5 cm/s and stays.
-    let first = DVec3::new(0.3, -0.2, 0.1);
-    let at = |page: &mut Page, depth: f64, buttons: u32| {
-        page.now_s.set(page.now_s.get() + 0.001);
-        page.call(|scene, now, send| scene.advance(&|| now.get(), send));
-        let reading = Reading { position: first - depth * DVec3::Y, orientation: None, buttons };
-        page.scene.exchange(Some(reading), page.now_s.get()).expect("an attached device")
-    };
+    // The hand goes down at 5 cm/s and stays.
+    let at = |page: &mut Page, depth: f64, buttons: u32| page.exchange(0.001, depth, buttons);
     let down = |step: u32| (5e-5 * f64::from(step)).min(0.06);
     let forces: Vec<DVec3> = (0..1500).map(|step| at(&mut page, down(step), 0)).collect();
     assert!(forces.iter().all(|force| *force == DVec3::ZERO), "no button was pressed");
@@ -251,8 +257,7 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
     // After a pause between updates the force is gone, and told; then it is back.
     let statuses: Vec<Value> = (0..1500)
         .map(|step| {
-            page.now_s.set(page.now_s.get() + if step == 100 { 0.05 } else { 0.0 });
-            let force = at(&mut page, 0.06, 0);
+            let force = page.exchange(if step == 100 { 0.05 } else { 0.001 }, 0.06, 0);
             assert!(step != 100 || force == DVec3::ZERO, "{force}");
             status(&mut page)["force"].clone()
         })
@@ -280,4 +285,41 @@ fn a_haptic_device_feels_the_block_after_the_press_of_a_button_and_gives_its_pla
     assert_eq!(press(&mut page, slots - 1), Some(device as u64));
     assert_eq!(page.scene.exchange(None, 0.0), None);
     assert_eq!(page.scene.attach_device(ABOVE), None, "every slot is taken");
+}
+
+#[test]
+fn an_update_that_comes_late_takes_the_force_away_for_a_while_and_no_more() {
+    /// Depth [m] at which the hand stays, well in the block.
+    const DEPTH: f64 = 0.06;
+    /// Depths of the tip's way in the block at which the late update comes [m].
+    const LATE_AT: [f64; 3] = [0.048, 0.053, 0.058];
+    // Force at the end, with one update that is late by so much, in a hand of so many metres per millisecond.
+    let pressed = |late_s: f64, late_at: f64, speed: f64, is_armed_first: bool| {
+        let mut page = Page::new(&SCENE.replace("[0.0, 0.2, 0.0]", "[0.0, 0.05, 0.0]"));
+        page.run(1.0);
+        page.scene.attach_device(ABOVE).expect("a free slot");
+        let (mut depth, mut is_late) = (0.0, false);
+        for step in 0..4000 {
+            let buttons = u32::from((100..200).contains(&step) && is_armed_first || step >= 2000);
+            let late_s = if !is_late && depth > late_at { late_s } else { 0.0 };
+            is_late |= depth > late_at;
+            let moved = if step < 200 { 0.0 } else { speed * (1.0 + 1e3 * late_s) };
+            depth = (depth + moved).min(DEPTH);
+            page.exchange(0.001 + late_s, depth, buttons);
+        }
+        page.exchange(0.001, depth, 1).y
+    };
+    for is_armed_first in [true, false] {
+        for speed in [5e-5, 2e-4] {
+            let expected = pressed(0.0, LATE_AT[0], speed, is_armed_first);
+            assert!(expected > 1.4, "{expected}");
+            for (late_s, late_at) in LATE_AT.map(|at| [(0.03, at), (0.06, at)]).concat() {
+                let force = pressed(late_s, late_at, speed, is_armed_first);
+                assert!(
+                    (force / expected - 1.0).abs() < 0.01,
+                    "{late_s} s at {late_at} m, {speed} m/ms, armed first: {is_armed_first}: {force} N of {expected}"
+                );
+            }
+        }
+    }
 }
