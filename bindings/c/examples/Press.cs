@@ -23,7 +23,7 @@ static class Press
                 // From 10 mm above the cube down to 4 mm inside in 0.1 s, back, and again.
                 double t = (i % 200) * simulation.StepSeconds;
                 double depth = 0.14 * (t < 0.1 ? t : 0.2 - t);
-                simulation.SetPosition(finger, new Vector(0.0, 0.0, 0.065 - depth));
+                simulation.SetPosition(finger, new Vector(0.0, 0.0, 0.115 - depth));
                 simulation.Step();
                 if (i % every != 0) continue;
                 Vector force = simulation.Output(finger).ForceOnHand;

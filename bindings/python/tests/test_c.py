@@ -34,6 +34,6 @@ def test_the_same_press_in_c_and_python_has_the_same_numbers(tmp_path):
     for i in range(1, STEPS + 1):
         t = i % 200 * scene.step
         depth = 0.14 * (t if t < 0.1 else 0.2 - t)
-        force = simulation.step([[0, 0, 0.065 - depth]])[0]
+        force = simulation.step([[0, 0, 0.115 - depth]])[0]
         in_python.append([i, *force, len(simulation.contacts)])
     assert np.array_equal(in_c, in_python) and in_c[:, 3].max() > 0.05
