@@ -108,8 +108,7 @@ export const haplyCases = [
       assert(service.force.every((part) => part === 0), `a force of ${service.force} N before a button was pressed`);
       await service.press();
       await page.waitForSelector("text=Inverse3 049D: the force is on");
-      // How much of it the passivity controller lets pass depends on how late the updates were on the way down.
-      await until(() => service.upward[2] > 0.02, () => `no force upwards: ${service.upward}`);
+      await until(() => service.upward[2] > 0.1, () => `no force upwards: ${service.upward}`);
       const [right, forward, up] = service.upward;
       assert(up > 5 * Math.hypot(right, forward) && up <= 1.5 + 1e-9, `${service.upward} N`);
       await screenshot(page, "haply");
