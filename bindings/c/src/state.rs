@@ -200,8 +200,8 @@ pub unsafe extern "C" fn palpate_state_step(state: *mut State) -> Status {
 }
 
 /// Warning about the steps so far, as those of `palpate run` but for large deformation: positions that look like millimetres, penetration,
-/// contacts that were not solved or left out, a tip that moved and touched nothing. Ask from 0 on; null after the last. Texts live until 0 is
-/// asked for again.
+/// contacts that were not solved or left out, a tip that begins inside an object, or that moved and touched nothing. Ask from 0 on; null after
+/// the last. Texts live until 0 is asked for again.
 ///
 /// # Safety
 /// `state` is a state or null.

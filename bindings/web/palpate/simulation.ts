@@ -91,7 +91,7 @@ export class Simulation {
 
   /**
    * Warnings about the steps since the start: positions that look like millimetres, penetration, contacts that were not solved or left out, a tip that
-   * moved and touched nothing. For looking, not for each step; those of the scene are in {@link Scene.warnings}.
+   * begins inside an object, or moved and touched nothing. For looking, not for each step; those of the scene are in {@link Scene.warnings}.
    */
   get warnings(): string[] {
     return library().described<string[]>((exports) => exports.simulation_warnings(this.handle));
