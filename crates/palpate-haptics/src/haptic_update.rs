@@ -205,7 +205,7 @@ impl HapticUpdate {
         let wanted = match &mut self.passivity {
             Some(passivity) => {
                 if is_gap {
-                    passivity.skip_gap(self.sequence);
+                    passivity.skip_gap();
                 }
                 passivity.control(self.sequence, position, &effort, dt)
             }

@@ -144,8 +144,8 @@ pub struct PassivityController {
     interruption_s: f64,
     /// Motion of the last update.
     sequence: u64,
-    /// First motion after a gap between updates.
-    after_gap: u64,
+    /// Last motion before a gap between updates.
+    before_gap: u64,
     active_updates: u64,
     max_deficit: f64,
 }
@@ -180,7 +180,7 @@ impl PassivityController {
             contact_s: 0.0,
             interruption_s: 0.0,
             sequence: 0,
-            after_gap: 0,
+            before_gap: 0,
             active_updates: 0,
             max_deficit: 0.0,
         }
@@ -206,13 +206,13 @@ impl PassivityController {
         self.scale
     }
 
-    /// Learns nothing from the time before a motion, which came after a gap between updates: the force over a gap is not the port's, and is
-    /// taken away by the safety. The tank still counts its energy.
+    /// Learns nothing from the time until the next motion, which comes after a gap between updates: the force over a gap is not the port's,
+    /// and is taken away by the safety. The tank still counts its energy.
     ///
     /// # Real time
     /// No allocation, lock or system call.
-    pub fn skip_gap(&mut self, sequence: u64) {
-        self.after_gap = sequence;
+    pub fn skip_gap(&mut self) {
+        self.before_gap = self.sequence;
     }
 
     /// Passive force [N] for the newest effort, at the hand's position [m] with its motion number `sequence`, `dt_s` [s] after the
@@ -235,13 +235,13 @@ impl PassivityController {
         self.sequence = sequence;
         self.history[index(sequence)] = self.now;
         self.window.force = self.window.force.max(self.wanted.length());
-        self.observe(sequence, effort, dt_s);
+        self.observe(effort, dt_s);
         self.wanted = if wanted.is_finite() { wanted } else { DVec3::ZERO };
         self.added = DVec3::ZERO;
         if dt_s <= 0.0 || !wanted.is_finite() {
             return wanted;
         }
-        self.identify(sequence, effort, dt_s);
+        self.identify(effort, dt_s);
 
         // s → min(1, η·b/n): the activity that damping can't remove is avoided by a softer force.
         let removable = EFFECTIVENESS * self.max_damping;
@@ -280,7 +280,7 @@ impl PassivityController {
     }
 
     /// Identifies the negative damping n of the port, from the deficit beyond what the encoder hides.
-    fn identify(&mut self, sequence: u64, effort: &Effort, dt_s: f64) {
+    fn identify(&mut self, effort: &Effort, dt_s: f64) {
         if effort.force == DVec3::ZERO {
             // Out of contact: nothing is stored, and n is forgotten.
             self.absorbed_unloaded = effort.absorbed_j;
@@ -296,7 +296,7 @@ impl PassivityController {
             self.contact_s += dt_s;
         }
         // The first force of a contact replies to a motion without force: the damper has not paid yet.
-        if self.contact_s < (sequence.saturating_sub(effort.in_reply_to) + 1) as f64 * dt_s {
+        if self.contact_s < (self.sequence.saturating_sub(effort.in_reply_to) + 1) as f64 * dt_s {
             self.forget();
         }
         let Window { generated, motion, force, .. } = self.window;
@@ -330,9 +330,10 @@ impl PassivityController {
     }
 
     /// Updates balance, window and tank with the newest effort.
-    fn observe(&mut self, sequence: u64, effort: &Effort, dt_s: f64) {
-        let oldest = (sequence + 1).saturating_sub(HISTORY as u64).max(1);
-        let valid = effort.in_reply_to > 0 && effort.in_reply_to <= sequence && effort.absorbed_j.is_finite();
+    fn observe(&mut self, effort: &Effort, dt_s: f64) {
+        let oldest = (self.sequence + 1).saturating_sub(HISTORY as u64).max(1);
+        let valid =
+            effort.in_reply_to > 0 && effort.in_reply_to <= self.sequence && effort.absorbed_j.is_finite();
         if valid && self.replied.is_none() {
             (self.absorbed_at_start, self.replied) =
                 (effort.absorbed_j, Some((effort.in_reply_to, effort.absorbed_j)));
@@ -343,7 +344,7 @@ impl PassivityController {
             self.replied = Some((effort.in_reply_to, effort.absorbed_j));
             let span_s = (effort.in_reply_to - before) as f64 * dt_s;
             self.account(self.history[index(before)], effort, span_s, absorbed);
-            if before < self.after_gap {
+            if before <= self.before_gap {
                 self.forget();
             }
         }

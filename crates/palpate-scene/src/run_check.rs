@@ -110,13 +110,11 @@ impl RunCheck {
         for (largest, object) in self.penetration.iter_mut().zip(&output.objects) {
             *largest = largest.max(object.penetration_m);
         }
-        for (tip, device) in self.tips.iter_mut().zip(&input.devices) {
+        for (tip, (device, moved)) in self.tips.iter_mut().zip(input.devices.iter().zip(&output.devices)) {
             if device.mode == DeviceMode::Touch && device.position.is_finite() {
                 tip.has_moved |= *tip.first.get_or_insert(device.position) != device.position;
             }
-        }
-        for (tip, device) in self.tips.iter_mut().zip(&output.devices) {
-            tip.inside = tip.inside.max(device.offset[0].length());
+            tip.inside = tip.inside.max(moved.offset[0].length());
         }
         for contact in &output.contacts {
             if let Collider::Device(number) = contact.against {

@@ -74,7 +74,10 @@ export class HaplyPanel {
 
   /** Shows what the force of the device does. */
   status(status: HapticDeviceStatus): void {
-    if (this.device !== null) this.state.textContent = `${this.device}: ${forceText(status)}.`;
+    if (this.device === null) return;
+    const text = `${this.device}: ${forceText(status)}.`;
+    // A screen reader tells a text again that is written again.
+    if (this.state.textContent !== text) this.state.textContent = text;
   }
 
   private toggle(): void {

@@ -84,18 +84,16 @@ impl ResidualCompliance {
     /// Add the displacements of all nodes under nodal forces [N] to `out` [m]. Costs nodes × forces, or for a near field the blocks of the
     /// loaded nodes.
     pub(crate) fn add_displacements(&self, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
-        if let Self::Quantised(quantised) = self {
-            return quantised.add_displacements(loads, out);
-        }
-        for &(node, force) in loads {
-            let node = node as usize;
-            match self {
-                // S is symmetric: the blocks of a column are those of the row, transposed.
-                Self::NearField(near) => {
-                    near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
-                }
-                _ => out.iter_mut().enumerate().for_each(|(i, u)| *u += self.block(i, node) * force),
-            }
+        let loads_of_nodes = loads.iter().map(|&(node, force)| (node as usize, force));
+        match self {
+            Self::Quantised(quantised) => quantised.add_displacements(loads, out),
+            // S is symmetric: the blocks of a column are those of the row, transposed.
+            Self::NearField(near) => loads_of_nodes.for_each(|(node, force)| {
+                near.row(node).for_each(|(other, block)| out[other] += block.transpose() * force);
+            }),
+            _ => loads_of_nodes.for_each(|(node, force)| {
+                out.iter_mut().enumerate().for_each(|(i, u)| *u += self.block(i, node) * force);
+            }),
         }
     }
 
