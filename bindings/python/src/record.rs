@@ -56,6 +56,8 @@ static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
 ///     Metres per unit of the mesh.
 /// cell_size : float, optional
 ///     Side of the cells that a surface is filled with [m].
+/// surface : path, optional
+///     Mesh file of the surface to be seen and touched, in the unit of the mesh: it is embedded in the tetrahedra and may be much finer.
 /// fix, spring : str or list of str, optional
 ///     Nodes that are fixed, and faces on springs, as on the command line: `fix="x<-0.049"`.
 /// merge_nodes : {"auto", "always", "never"}
@@ -81,7 +83,7 @@ static FIRST_PROCESS: OnceLock<u32> = OnceLock::new();
 ///     If Ctrl-C is pressed meanwhile. Other threads run meanwhile, too.
 #[pyfunction]
 #[pyo3(signature = (mesh, *, young=None, poisson=None, density=None, material=None, materials=None, rayleigh=None, damping_ratio=None,
-    modes=200, force_error=None, bandwidth=None, order=2, scale=1.0, cell_size=None, fix=None, spring=None, merge_nodes="auto",
+    modes=200, force_error=None, bandwidth=None, order=2, scale=1.0, cell_size=None, surface=None, fix=None, spring=None, merge_nodes="auto",
     piece=None, residual=None, precision="compact", progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
 pub fn record(
@@ -100,6 +102,7 @@ pub fn record(
     #[pyo3(from_py_with = Whole::number_of)] order: i64,
     scale: f64,
     cell_size: Option<f64>,
+    surface: Option<PathBuf>,
     fix: Option<&Bound<'_, PyAny>>,
     spring: Option<&Bound<'_, PyAny>>,
     merge_nodes: &str,
@@ -128,6 +131,7 @@ pub fn record(
         },
         scale,
         meshing: MeshingParameters { cell_size, nodes: None },
+        surface,
         fix: texts(fix, "fix")?,
         spring: texts(spring, "spring")?,
         residual: residual.map_or(Ok(ResidualChoice::Automatic), read_residual)?,

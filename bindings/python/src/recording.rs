@@ -251,7 +251,7 @@ impl Recording {
             let mut matrix = vec![0.0; size * size];
             for (row, &i) in nodes.iter().enumerate() {
                 for (column, &j) in nodes.iter().enumerate() {
-                    let block = self.inner.residual.block(i, j);
+                    let block = self.inner.residual_between(i, j);
                     for axis in 0..3 {
                         let start = (3 * row + axis) * size + 3 * column;
                         matrix[start..start + 3].copy_from_slice(&block.row(axis).to_array());

@@ -14,6 +14,7 @@
 //! docs/recording.md states how well they predict four other bodies.
 
 use crate::assembly::Assembly;
+use crate::carriers::Carriers;
 use crate::discretisation::Discretisation;
 use crate::factor::Pattern;
 use crate::memory::check_memory;
@@ -21,7 +22,7 @@ use crate::record::{RecordExtent, RecordParameters, check_parameters};
 use crate::record_error::RecordError;
 use crate::residual::{Precision, ResidualChoice, automatic_radius};
 use crate::supports;
-use palpate::{MAX_QUANTISED_NODES, Surface};
+use palpate::MAX_QUANTISED_NODES;
 use palpate_mesh::Mesh;
 
 /// Cost of a recording.
@@ -35,6 +36,8 @@ pub struct Estimate {
     pub dofs: usize,
     /// Nodes of the surface.
     pub surface_nodes: usize,
+    /// Nodes of the model that carry it: as many, but for an embedded surface.
+    pub carriers: usize,
     /// Modes that are kept.
     pub modes: usize,
     /// Size of one factor [bytes].
@@ -64,19 +67,20 @@ pub fn estimate(mesh: Mesh, parameters: &RecordParameters) -> Result<Estimate, R
     let supported =
         supports::apply(&parameters.fixed_nodes, &parameters.supports, &discretisation, &mut assembly)?;
     let pattern = Pattern::new(&assembly)?;
-    let surface_nodes = discretisation.surface_nodes();
+    let carriers = Carriers::new(&discretisation, parameters.surface.as_ref())?;
     let free_dofs = supported.fixed.iter().filter(|fixed| !**fixed).count();
     let is_free = !supported.fixed.contains(&true) && !supported.sprung.contains(&true);
     let elastic = free_dofs - if is_free { 6 } else { 0 };
     let modes = if parameters.extent == RecordExtent::NoModes { 0 } else { parameters.modes.min(elastic) };
-    let (residual, is_whole) = residual_bytes(&discretisation, &surface_nodes, parameters);
+    let (residual, is_whole) = residual_bytes(&discretisation, &carriers, parameters);
     let is_compact = parameters.precision == Precision::Compact;
-    let is_quantised = is_compact && is_whole && surface_nodes.len() <= MAX_QUANTISED_NODES;
+    let is_quantised = is_compact && is_whole && carriers.nodes.len() <= MAX_QUANTISED_NODES;
     let mut estimate = Estimate {
         nodes: discretisation.nodes.len(),
         elements: mesh.tets.len(),
         dofs: free_dofs,
-        surface_nodes: surface_nodes.len(),
+        surface_nodes: carriers.surface.positions.len(),
+        carriers: carriers.nodes.len(),
         modes,
         factor_bytes: pattern.factor_bytes(),
         memory_bytes: 0,
@@ -84,9 +88,8 @@ pub fn estimate(mesh: Mesh, parameters: &RecordParameters) -> Result<Estimate, R
         threads: rayon::current_num_threads(),
         seconds: 0.0,
     };
-    let residual = if is_quantised { quantised_bytes(&surface_nodes) } else { residual };
-    estimate.file_bytes =
-        file_bytes(&estimate, discretisation.triangles.len(), residual, is_free, is_compact);
+    let residual = if is_quantised { quantised_bytes(carriers.nodes.len()) } else { residual };
+    estimate.file_bytes = file_bytes(&estimate, &carriers, residual, is_free, is_compact);
     estimate.memory_bytes = memory_bytes(&estimate, is_quantised);
     estimate.seconds = seconds(&estimate, is_quantised);
     Ok(estimate)
@@ -103,50 +106,50 @@ impl Estimate {
 }
 
 /// Size of a quantised residual compliance [bytes], which is compressed.
-fn quantised_bytes(surface_nodes: &[u32]) -> u64 {
-    let dofs = 3.0 * surface_nodes.len() as f64;
+fn quantised_bytes(carriers: usize) -> u64 {
+    let dofs = 3.0 * carriers as f64;
     (4.0 * dofs + COMPRESSED_BYTES * 0.5 * dofs * (dofs + 1.0)) as u64
 }
 
 /// Size of the residual compliance in full precision [bytes]: its lower triangle, or the blocks of near nodes; and whether it is whole.
 fn residual_bytes(
     discretisation: &Discretisation,
-    surface_nodes: &[u32],
+    carriers: &Carriers,
     parameters: &RecordParameters,
 ) -> (u64, bool) {
-    let n = surface_nodes.len() as u64;
+    let n = carriers.nodes.len() as u64;
     let whole = 2 * 3 * n * (3 * n + 1);
-    let surface = || {
-        let mut number = vec![0_u32; discretisation.nodes.len()];
-        (0..).zip(surface_nodes).for_each(|(at, &node)| number[node as usize] = at);
-        Surface {
-            positions: surface_nodes.iter().map(|&node| discretisation.nodes[node as usize]).collect(),
-            triangles: discretisation.triangles.iter().map(|t| t.map(|node| number[node as usize])).collect(),
-            source_nodes: surface_nodes.to_vec(),
-        }
-    };
     let radius = match parameters.residual {
         _ if parameters.extent == RecordExtent::NoModes => return (0, false),
         ResidualChoice::None => return (0, false),
         ResidualChoice::Whole => return (whole, true),
         ResidualChoice::NearField(radius) => radius,
-        ResidualChoice::Automatic => match automatic_radius(surface_nodes.len(), || surface().mean_edge()) {
+        ResidualChoice::Automatic => match automatic_radius(carriers.nodes.len(), || carriers.mean_edge) {
             Some(radius) => radius,
             None => return (whole, true),
         },
     };
-    let positions = surface().positions;
+    let positions: Vec<glam::DVec3> =
+        carriers.nodes.iter().map(|&node| discretisation.nodes[node as usize]).collect();
     let near = |a: &glam::DVec3| positions.iter().filter(|b| (**b - *a).length() < radius).count() as u64;
     (8 + 4 * (n + 1) + 40 * positions.iter().map(near).sum::<u64>(), false)
 }
 
 /// Size of the file [bytes]: surface, modes, residual compliance, gravity; contact samples and certificate are about two numbers a node.
-fn file_bytes(estimate: &Estimate, triangles: usize, residual: u64, is_free: bool, is_compact: bool) -> u64 {
-    let (n, m, t) = (estimate.surface_nodes as u64, estimate.modes as u64, triangles as u64);
-    let surface = 28 * n + 12 * t;
+fn file_bytes(
+    estimate: &Estimate,
+    carriers: &Carriers,
+    residual: u64,
+    is_free: bool,
+    is_compact: bool,
+) -> u64 {
+    let surface = &carriers.surface;
+    let weights = carriers.embedding.as_ref().map_or(0, |embedding| 4 * surface.positions.len() + 8 * embedding.weights.len());
+    let surface = 28 * surface.positions.len() + 12 * surface.triangles.len() + weights;
+    let (surface, n, m) = (surface as u64, estimate.carriers as u64, estimate.modes as u64);
     let modes = if is_compact { 24 * m + 6 * n * m } else { 16 * m + 24 * n * m };
     let gravity = if is_free { 0 } else { 24 * m + 72 * n };
-    surface + modes + residual + gravity + 16 * n + HEADER_BYTES
+    surface + modes + residual + gravity + 16 * estimate.surface_nodes as u64 + HEADER_BYTES
 }
 
 /// Compressed size of an entry of a quantised residual compliance [bytes]: 0.74 of a ball of 2,600 surface nodes with 200 modes, 1.2 of
@@ -170,7 +173,7 @@ const FILES: f64 = 2.0;
 const QUANTISATION_BYTES: f64 = 8.5;
 
 fn memory_bytes(estimate: &Estimate, is_quantised: bool) -> u64 {
-    let surface_dofs = 3.0 * estimate.surface_nodes as f64;
+    let surface_dofs = 3.0 * estimate.carriers as f64;
     let residual = if is_quantised {
         QUANTISATION_BYTES * surface_dofs * surface_dofs
     } else {
@@ -189,7 +192,7 @@ const QUANTISATION_S: f64 = 8.3e-12;
 fn seconds(estimate: &Estimate, is_quantised: bool) -> f64 {
     let entries = estimate.factor_bytes as f64 / 8.0;
     let (dofs, modes, surface) =
-        (estimate.dofs as f64, estimate.modes as f64, 3.0 * estimate.surface_nodes as f64);
+        (estimate.dofs as f64, estimate.modes as f64, 3.0 * estimate.carriers as f64);
     let cpu = SOLVE_S * entries * (surface + 8.0 * modes)
         + TRUNCATION_S * dofs * modes * surface
         + KRYLOV_S * dofs * modes * modes

@@ -14,6 +14,7 @@
 
 mod assembly;
 mod body;
+mod carriers;
 mod certificate;
 mod discretisation;
 mod element;

@@ -2,6 +2,7 @@
 
 use crate::assembly::Assembly;
 use crate::body::RecordedBody;
+use crate::carriers::Carriers;
 use crate::certificate::{FORCE_ERROR_UNUSABLE, certificate};
 use crate::discretisation::Discretisation;
 use crate::element::ElementOrder;
@@ -17,10 +18,10 @@ use crate::supports::{self, Supports};
 use crate::system::System;
 use glam::DVec3;
 use palpate::{
-    COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, FORMAT_VERSION, MIN_CONTACT_SAMPLES,
-    Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording, Support, Surface,
+    COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, EMBEDDED_FORMAT_VERSIONS, Embedding,
+    FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording, Support,
 };
-use palpate_mesh::Mesh;
+use palpate_mesh::{Mesh, SurfaceMesh};
 
 /// Parameters of a recording.
 #[derive(Debug, Clone)]
@@ -42,6 +43,9 @@ pub struct RecordParameters {
     pub fixed_nodes: Vec<u32>,
     /// Other supports: nodes that are held along some axes, and springs.
     pub supports: Supports,
+    /// Surface to be seen and touched in place of the boundary, in the frame of the mesh: it is embedded in the elements, and may be finer. Closed, with
+    /// its triangles outwards, see [`palpate_mesh::closed_surface`].
+    pub surface: Option<SurfaceMesh>,
     /// Name of the mesh, for the file.
     pub source: String,
     /// Extent of the computation.
@@ -68,6 +72,7 @@ impl RecordParameters {
             precision: Precision::Full,
             fixed_nodes: Vec::new(),
             supports: Supports::default(),
+            surface: None,
             source: "mesh".into(),
             extent: RecordExtent::Full,
         }
@@ -133,6 +138,7 @@ fn record_body(
     }
     progress.advance(1);
     let discretisation = Discretisation::new(&mesh, parameters.order);
+    let carriers = Carriers::new(&discretisation, parameters.surface.as_ref())?;
     check_memory(needed_bytes(discretisation.dofs() as f64, parameters.modes as f64))?;
     let mut assembly = Assembly::new(&discretisation, &parameters.materials);
     let supported =
@@ -159,13 +165,13 @@ fn record_body(
     }
     let mut modes =
         if no_modes { ElasticModes::none(&system) } else { lowest_modes(&system, count, progress)? };
-    let surface_nodes = system.discretisation.surface_nodes();
-    let surface = surface(&system, &surface_nodes);
+    let centre = DVec3::from_array(system.mass.center_of_mass_m);
+    let surface = carriers.surface_about(centre);
     let residual = residual_compliance(
         &system,
         &modes,
-        &surface_nodes,
-        surface.mean_edge(),
+        &carriers.nodes,
+        carriers.mean_edge,
         if no_modes { ResidualChoice::None } else { parameters.residual },
         parameters.precision,
         progress,
@@ -173,7 +179,7 @@ fn record_body(
     warn_about_damping(parameters.damping, &modes, progress);
     if parameters.precision == Precision::Compact {
         // After the residual compliance: as the difference of rounded numbers it would be indefinite where it is small.
-        modes.round_at(&surface_nodes);
+        modes.round_at(&carriers.nodes);
     }
     let (mut sample_levels, mut stated) = (Vec::new(), None);
     if parameters.extent == RecordExtent::Full {
@@ -183,7 +189,7 @@ fn record_body(
         let level_errors = sample_levels.iter().map(|level| CertificateLevel::new(&surface, level)).collect();
         progress.advance(1);
         let certificate =
-            certificate(&system, &modes, &surface, &surface_nodes, &residual, parameters.damping, progress)
+            certificate(&system, &modes, &surface, &carriers, &residual, parameters.damping, progress)
                 .map_err(certificate_error)?;
         warn_about_certificate(&certificate, doubt, progress);
         stated = Some(Certificate { sample_levels: level_errors, ..certificate });
@@ -191,10 +197,7 @@ fn record_body(
 
     let free = system.supported_nodes == 0;
     let metadata = Metadata {
-        format_version: match parameters.precision {
-            Precision::Full => FORMAT_VERSION,
-            Precision::Compact => COMPACT_FORMAT_VERSION,
-        },
+        format_version: format_version(parameters.precision, carriers.embedding.is_some()),
         hold: Metadata::hold(),
         units: Metadata::units(),
         support: if free { Support::Free } else { Support::Fixed },
@@ -214,14 +217,23 @@ fn record_body(
             palpate_version: env!("CARGO_PKG_VERSION").into(),
         },
     };
-    let recording = Recording {
+    let mut recording = Recording {
         metadata,
         surface,
-        modes: modal_basis(&modes, &surface_nodes, parameters.damping),
+        modes: modal_basis(&modes, &carriers.nodes, parameters.damping),
         residual,
-        gravity: (!free).then(|| gravity_response(&system, &modes, &surface_nodes)),
+        gravity: (!free).then(|| gravity_response(&system, &modes, &carriers.nodes)),
         sample_levels,
+        embedding: None,
     };
+    if let Some(embedding) = carriers.embedding {
+        let sag = recording.gravity.as_ref().map(|gravity| gravity.residual_displacements.clone());
+        recording.embed(Embedding {
+            mode_shapes: recording.modes.mode_shapes.clone(),
+            residual_displacements: sag.unwrap_or_default(),
+            ..embedding
+        })?;
+    }
     Ok(RecordedBody { recording, system, modes })
 }
 
@@ -366,23 +378,20 @@ fn warn_about_certificate(certificate: &Certificate, doubt: Option<&str>, progre
     }
 }
 
-/// Surface in the body frame, whose origin is the centre of mass.
-fn surface(system: &System, surface_nodes: &[u32]) -> Surface {
-    let discretisation = &system.discretisation;
-    let centre = DVec3::from_array(system.mass.center_of_mass_m);
-    let mut number = vec![0_u32; discretisation.nodes.len()];
-    surface_nodes.iter().enumerate().for_each(|(at, &node)| number[node as usize] = at as u32);
-    Surface {
-        positions: surface_nodes.iter().map(|&node| discretisation.nodes[node as usize] - centre).collect(),
-        triangles: discretisation.triangles.iter().map(|t| t.map(|node| number[node as usize])).collect(),
-        source_nodes: surface_nodes.iter().map(|&node| discretisation.source_nodes[node as usize]).collect(),
+/// Version of the file's layout.
+fn format_version(precision: Precision, is_embedded: bool) -> u32 {
+    let [full, compact] =
+        if is_embedded { EMBEDDED_FORMAT_VERSIONS } else { [FORMAT_VERSION, COMPACT_FORMAT_VERSION] };
+    match precision {
+        Precision::Full => full,
+        Precision::Compact => compact,
     }
 }
 
-/// Modes at the surface nodes.
-fn modal_basis(modes: &ElasticModes, surface_nodes: &[u32], damping: Damping) -> ModalBasis {
+/// Modes at the nodes that carry the surface.
+fn modal_basis(modes: &ElasticModes, carriers: &[u32], damping: Damping) -> ModalBasis {
     let angular_frequencies: Vec<f64> = modes.squares.iter().map(|square| square.sqrt()).collect();
-    let rows = surface_nodes.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
+    let rows = carriers.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
     let mode_shapes = rows.flat_map(|row| (0..modes.squares.len()).map(move |i| (row, i)));
     ModalBasis {
         damping_ratios: angular_frequencies.iter().map(|&omega| damping.ratio(omega)).collect(),

@@ -4,6 +4,7 @@ use crate::material::MaterialError;
 #[cfg(doc)]
 use crate::progress::Progress;
 use crate::solve_error::SolveError;
+use glam::DVec3;
 use palpate_mesh::MeshError;
 
 /// A recording that cannot be made.
@@ -70,6 +71,22 @@ pub enum RecordError {
         "the nodes on springs hold no whole face of the surface, and springs act on areas: select more nodes"
     )]
     SpringsWithoutFace,
+    /// A node of the embedded surface is too far from the elements to move with them.
+    #[error(
+        "node {node} of the embedded surface, at ({:.4}, {:.4}, {:.4}) m, is {distance:.4} m outside of the tetrahedra, farther than the nearest of \
+         them is large: take smaller cells, or a surface of the same body in the same unit", position.x, position.y, position.z
+    )]
+    SurfaceOutside {
+        /// Node of the surface.
+        node: usize,
+        /// Its position [m].
+        position: DVec3,
+        /// Its distance from the nearest element [m].
+        distance: f64,
+    },
+    /// The recording is too large for its form.
+    #[error(transparent)]
+    Recording(#[from] palpate::RecordingError),
     /// A target is not a positive number.
     #[error("the target of the {what} is {given}, expected a positive number")]
     Target {

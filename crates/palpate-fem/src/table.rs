@@ -344,7 +344,7 @@ impl ClosedForm {
             });
         let residual = |row: usize| match (self.surface_index[row / 3], self.surface_index[load / 3]) {
             (Some(i), Some(j)) => {
-                body.recording.residual.block(i as usize, j as usize).col(load % 3)[row % 3]
+                body.recording.residual_between(i as usize, j as usize).col(load % 3)[row % 3]
             }
             _ => computed.as_ref().map_or(0.0, |computed| computed[(row, 0)]),
         };

@@ -50,7 +50,7 @@ pub use error::{FilePosition, MeshError};
 pub use files::Files;
 pub use format::{Format, Recognised, recognise};
 pub use instruments::{ArchedBar, Bell, TuningFork};
-pub use mesher::{MeshingParameters, MeshingReport, WatchFn, tetrahedralise};
+pub use mesher::{MeshingParameters, MeshingReport, WatchFn, closed_surface, tetrahedralise};
 pub use mid_edge::QuadraticTet;
 pub use pieces::Piece;
 pub use primitives::{CellSplit, ball_mesh, box_mesh, split_box_mesh};

@@ -12,8 +12,9 @@ use palpate::{Damping, Recording};
 use palpate_fem::{
     ElementOrder, ErrorTarget, Precision, Progress, RecordParameters, RecordedBody, ResidualChoice,
 };
-use palpate_mesh::{Mesh, MeshingParameters, Repair};
+use palpate_mesh::{Mesh, MeshError, MeshingParameters, Repair, SurfaceMesh, closed_surface, read_surface};
 use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
 /// Options of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +33,8 @@ pub struct RecordOptions {
     pub scale: f64,
     /// Cells that a surface is filled with.
     pub meshing: MeshingParameters,
+    /// Mesh file of the surface to be seen and touched, which is embedded in the tetrahedra; none for their boundary.
+    pub surface: Option<PathBuf>,
     /// Repairs of the mesh.
     pub repair: Repair,
     /// Fixed nodes, as `--fix`.
@@ -56,6 +59,7 @@ impl Default for RecordOptions {
             order: ElementOrder::Quadratic,
             scale: 1.0,
             meshing: MeshingParameters::default(),
+            surface: None,
             repair: Repair::default(),
             fix: Vec::new(),
             spring: Vec::new(),
@@ -117,10 +121,22 @@ impl RecordOptions {
             precision: self.precision,
             fixed_nodes,
             supports,
+            surface: self.surface.as_deref().map(|path| self.read_surface(path, progress)).transpose()?,
             source: name,
             ..RecordParameters::new(materials, self.order, self.modes, damping)
         };
         Ok(PreparedBody { mesh, parameters, target: self.target })
+    }
+
+    /// Surface to be embedded [m], repaired.
+    fn read_surface(&self, path: &Path, progress: &mut dyn Progress) -> Result<SurfaceMesh, SceneError> {
+        let name = path.display().to_string();
+        let mesh_error = |error: MeshError| refused(SceneErrorKind::Mesh, &name, error);
+        let mut surface = read_surface(path).map_err(mesh_error)?;
+        surface.scale(self.scale).map_err(mesh_error)?;
+        let (closed, repairs) = closed_surface(&surface).map_err(mesh_error)?;
+        repairs.iter().for_each(|repair| progress.warn(&format!("{name}: {repair}")));
+        Ok(closed)
     }
 
     /// Records a body.

@@ -60,5 +60,6 @@ fn body(content: &TableContent) -> Recording {
         gravity: fixed
             .then(|| GravityResponse { modal_forces: vec![], residual_displacements: vec![0.0; 9 * nodes] }),
         sample_levels: vec![],
+        embedding: None,
     }
 }

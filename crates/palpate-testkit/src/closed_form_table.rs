@@ -119,7 +119,7 @@ impl ImpulseColumns for ClosedForm {
 
     fn column(&self, j: usize) -> Column<'_> {
         Column::F64(self.columns[j].get_or_init(|| {
-            let beyond = |i: usize| self.recording.residual.block(i / 3, j / 3).col(j % 3)[i % 3];
+            let beyond = |i: usize| self.recording.residual_between(i / 3, j / 3).col(j % 3)[i % 3];
             let beyond: Vec<f64> = (0..self.columns.len()).map(beyond).collect();
             let sample = |(s, share): (usize, &f64)| -> Vec<f64> {
                 let at = |(i, beyond): (usize, &f64)| self.modal(s, i, self.row(j)) + beyond * share;

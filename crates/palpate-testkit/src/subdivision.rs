@@ -65,7 +65,7 @@ fn interpolated(
     let modes = ModalBasis { mode_shapes, ..coarse.modes.clone() };
     // The certificate states the errors of the coarse body.
     let metadata = Metadata { certificate: None, ..coarse.metadata.clone() };
-    Recording { metadata, surface, modes, residual, gravity: None, sample_levels: Vec::new() }
+    Recording { metadata, surface, modes, residual, gravity: None, sample_levels: Vec::new(), embedding: None }
 }
 
 /// S between all new nodes.

@@ -88,7 +88,7 @@ pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     COMPACT_FORMAT_VERSION, Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory,
-    Damping, FORMAT_VERSION, GravityResponse, ImpulseColumns, ImpulseResponse, MAX_QUANTISED_NODES,
+    Damping, EMBEDDED_FORMAT_VERSIONS, Embedding, FORMAT_VERSION, GravityResponse, ImpulseColumns, ImpulseResponse, MAX_QUANTISED_NODES,
     MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField, PeakForceError, Provenance,
     QuantisedCompliance, Recording, ResidualCompliance, ResponseSeries, Sampling, Support, arrange_column,
     round_mode_shape,

@@ -157,6 +157,7 @@ fn bare(recording: &Recording) -> Arc<Recording> {
         modes: ModalBasis { angular_frequencies: vec![], damping_ratios: vec![], mode_shapes: vec![] },
         residual: ResidualCompliance::None,
         sample_levels: vec![],
+        embedding: None,
         ..recording.clone()
     })
 }

@@ -9,6 +9,7 @@ mod held_places;
 mod places;
 mod response;
 
+use crate::carriers::Carriers;
 use crate::krylov::{KrylovSpaces, ModeAtPlaces};
 use crate::modes::ElasticModes;
 use crate::progress::Progress;
@@ -69,14 +70,14 @@ pub(crate) fn certificate(
     system: &System,
     modes: &ElasticModes,
     surface: &Surface,
-    surface_nodes: &[u32],
+    carriers: &Carriers,
     residual: &ResidualCompliance,
     damping: Damping,
     progress: &mut dyn Progress,
 ) -> Result<Certificate, SolveError> {
-    let places = places(system, surface, surface_nodes);
+    let places = places(system, surface, carriers);
     progress.begin("certificate", (BLOCKS + places.len()) as u64);
-    let loads = loads(system, surface_nodes, &places);
+    let loads = loads(system, &carriers.nodes, &places);
     let rigid = system.rigid_participation(&loads);
     let reference = KrylovSpaces::new(system, modes, loads, EVENT.step_s, BLOCKS, progress)?;
     let mut worst = Certificate {
@@ -103,7 +104,7 @@ pub(crate) fn certificate(
         let coarse = projected.truncated_modes(BLOCKS - CONVERGENCE_BLOCKS)?;
         let truncated = projected.truncated_modes(BLOCKS)?;
         let kept = kept_modes(group, &modes.squares, |node, axis, mode| {
-            modes.shapes[(3 * surface_nodes[node] as usize + axis, mode)]
+            modes.shapes[(3 * carriers.nodes[node] as usize + axis, mode)]
         });
         for (at, place) in group.iter().enumerate() {
             let at_place = |modes: &[ModeAtPlaces]| modes.iter().map(|mode| mode.at(at)).collect();

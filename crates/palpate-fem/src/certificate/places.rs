@@ -1,5 +1,6 @@
 //! Places of the surface at which a certificate is measured: points, and patches as wide as a fingertip.
 
+use crate::carriers::Carriers;
 use crate::system::System;
 use faer::Mat;
 use glam::{DMat3, DVec3};
@@ -23,7 +24,7 @@ const PATCH_DIAGONAL: f64 = 0.03;
 /// Least radius of a patch in mean edges of the surface.
 const PATCH_EDGES: f64 = 2.0;
 
-/// Sampled point or patch: surface nodes with weights that sum to one.
+/// Sampled point or patch: carriers of the surface with weights that sum to one.
 pub(super) struct Place {
     pub nodes: Vec<(usize, f64)>,
     /// Centre [m, body frame].
@@ -36,8 +37,8 @@ pub(super) struct Place {
 
 /// Points spread over the surface by farthest-point sampling, points near the last of them, and patches. A fixed node has no compliance
 /// to compare, so none is sampled.
-pub(super) fn places(system: &System, surface: &Surface, surface_nodes: &[u32]) -> Vec<Place> {
-    let movable = |node: usize| !system.holds_node(surface_nodes[node]);
+pub(super) fn places(system: &System, surface: &Surface, carriers: &Carriers) -> Vec<Place> {
+    let movable = |node: usize| carriers.of(node).iter().all(|(at, _)| !system.holds_node(carriers.nodes[*at]));
     let positions = &surface.positions;
     let candidates: Vec<usize> = (0..positions.len()).filter(|&node| movable(node)).collect();
     let mut nearest: Vec<f64> = positions.iter().map(|p| p.length()).collect();
@@ -79,7 +80,15 @@ pub(super) fn places(system: &System, surface: &Surface, surface_nodes: &[u32]) 
     };
     // The last of the spread points lie on faces rather than at corners.
     let patches = points[..SPREAD.min(points.len())].iter().rev().take(PATCHES).map(patch);
-    points.iter().map(point).chain(patches).collect()
+    let on_surface = points.iter().map(point).chain(patches);
+    let carried = |place: Place| {
+        let nodes = place.nodes.iter();
+        let of_node = |&(node, weight): &(usize, f64)| {
+            carriers.of(node).into_iter().map(move |(at, share)| (at, share * weight))
+        };
+        Place { nodes: nodes.flat_map(of_node).collect(), ..place }
+    };
+    on_surface.map(carried).collect()
 }
 
 /// Area vector and area of each surface node [m²]: a third of its triangles'.
@@ -114,11 +123,11 @@ pub(super) fn residual_between(residual: &ResidualCompliance, of: &Place, on: &P
 }
 
 /// Unit forces on the places [N], three columns each.
-pub(super) fn loads(system: &System, surface_nodes: &[u32], places: &[Place]) -> Mat<f64> {
+pub(super) fn loads(system: &System, carriers: &[u32], places: &[Place]) -> Mat<f64> {
     let mut loads = Mat::zeros(system.discretisation.dofs(), 3 * places.len());
     for (at, place) in places.iter().enumerate() {
         for (&(node, weight), axis) in place.nodes.iter().flat_map(|n| (0..3).map(move |axis| (n, axis))) {
-            let dof = 3 * surface_nodes[node] as usize + axis;
+            let dof = 3 * carriers[node] as usize + axis;
             if !system.is_fixed(dof) {
                 loads[(dof, 3 * at + axis)] += weight;
             }

@@ -23,6 +23,14 @@ impl ElementOrder {
         }
     }
 
+    /// Value of each node's shape function at a point of the element, and its derivatives by the four barycentric coordinates [1].
+    pub(crate) fn shapes(self, at: [f64; 4]) -> Vec<(f64, [f64; 4])> {
+        match self {
+            Self::Linear => (0..4).map(|a| (at[a], std::array::from_fn(|b| f64::from(a == b)))).collect(),
+            Self::Quadratic => curved::shapes(&tet10::shape_functions(), at).to_vec(),
+        }
+    }
+
     /// Element matrices for the given nodes [m]: four corners, and six nodes on the edges for quadratic elements.
     pub(crate) fn matrices(self, nodes: &[DVec3], elasticity: &Elasticity) -> ElementMatrices {
         let corners = [nodes[0], nodes[1], nodes[2], nodes[3]];

@@ -12,6 +12,7 @@
 use super::discrete_oscillator::DiscreteOscillator;
 use glam::DVec3;
 use palpate::{Recording, SampledResidual, Support, Surface, SurfacePoint};
+use std::collections::BTreeMap;
 
 /// Driving-point response at a point of an object's surface, along a direction.
 #[derive(Debug, Clone)]
@@ -43,7 +44,12 @@ impl PointResponse {
                 shapes.iter_mut().zip(row).for_each(|(sum, phi)| *sum += weight * component * phi);
             }
         }
-        let pairs = weights.iter().flat_map(|a| weights.iter().map(move |b| (a, b)));
+        let mut of_model = BTreeMap::new();
+        for &(surface_node, weight) in &weights {
+            let nodes = recording.model_nodes_of(surface_node);
+            nodes.for_each(|(node, share)| *of_model.entry(node).or_insert(0.0) += weight * share);
+        }
+        let pairs = of_model.iter().flat_map(|a| of_model.iter().map(move |b| (a, b)));
         let residual =
             pairs.map(|((i, wi), (j, wj))| wi * wj * n.dot(recording.residual.block(*i, *j) * n)).sum();
         let mobility = match recording.metadata.support {
@@ -112,7 +118,7 @@ fn patch(surface: &Surface, centre: usize, radius: f64) -> Vec<(usize, f64)> {
         let s = (surface.positions[node] - middle).length() / radius;
         if s < 1.0 { (1.0 - s * s).powi(2) } else { 0.0 }
     };
-    let mut weights = std::collections::BTreeMap::from([(centre, f64::MIN_POSITIVE)]);
+    let mut weights = BTreeMap::from([(centre, f64::MIN_POSITIVE)]);
     if radius > 0.0 {
         for corners in &surface.triangles {
             let nodes = corners.map(|node| node as usize);

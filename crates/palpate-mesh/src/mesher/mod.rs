@@ -135,6 +135,19 @@ pub fn tetrahedralise(
     Ok((mesh, report))
 }
 
+/// Repairs a surface that is to be embedded in a body: vertices on one point are merged, triangles that stand twice left out, and those that
+/// face inwards turned. Gives the repairs, a sentence each.
+///
+/// # Errors
+/// [`MeshError`] for a surface that is not closed, or has no area.
+pub fn closed_surface(surface: &SurfaceMesh) -> Result<(SurfaceMesh, Vec<String>), MeshError> {
+    let Prepared { surface, warnings, open: (edges, share), .. } = prepare(surface)?;
+    if edges > 0 {
+        return Err(MeshError::OpenSurface { edges, share, limit: 0.0 });
+    }
+    Ok((surface, warnings))
+}
+
 impl MeshingReport {
     /// Sentence that tells of the mesh.
     fn summary(&self) -> String {

@@ -22,6 +22,8 @@ pub(super) struct Prepared {
     pub area: f64,
     /// Whether parts of the surface lie inside others.
     pub overlaps: bool,
+    /// Number of open edges, and the area of the holes about them as a share.
+    pub open: (usize, f64),
     /// Repairs, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -76,7 +78,7 @@ pub(super) fn prepare(surface: &SurfaceMesh) -> Result<Prepared, MeshError> {
     let tree = SurfaceTree::new(surface.corners());
     let volume = surface.volume().abs();
     let overlaps = overlaps(&surface, &tree, volume / area);
-    Ok(Prepared { tree, surface, volume, area, overlaps, warnings })
+    Ok(Prepared { tree, surface, volume, area, overlaps, open: (edges, share), warnings })
 }
 
 /// Triangles of which it is asked at most whether they lie inside other parts.

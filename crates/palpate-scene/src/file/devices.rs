@@ -326,7 +326,10 @@ fn small_patches(device: &SceneDevice, objects: &[ModelObject], names: &[String]
         .filter_map(|(object, name)| {
             let edges =
                 if object.recording.metadata.mesh.order == 2 { SMOOTH_PATCH } else { SMOOTH_PATCH_LINEAR };
-            let local = local_edges(&object.recording.surface);
+            let local = match &object.recording.embedding {
+                Some(embedding) => vec![(embedding.mean_edge, 1.0)],
+                None => local_edges(&object.recording.surface),
+            };
             let area_above = |edge: f64| local.iter().filter(|(own, _)| *own > edge).map(|(_, area)| area).sum::<f64>();
             let share = area_above(radius / edges) / area_above(0.0);
             (radius > 0.0 && share > COARSE_SHARE).then(|| {

@@ -200,7 +200,7 @@ mod tests {
         let radius = 2.0 * recording.surface.mean_edge();
         let body = Body::new(recording.clone(), &[radius], usize::MAX, &[]);
         let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
-        let (state, points) = (response.at_rest(recording.surface.positions.len(), 1), ContactPoints::new(1));
+        let (state, points) = (response.at_rest(&recording, 1), ContactPoints::new(1));
         let mut cache = NodePositionCache::new(&body);
         let mut query = ProximityQuery::new();
         let omegas = &recording.modes.angular_frequencies;

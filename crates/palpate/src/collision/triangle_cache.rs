@@ -268,7 +268,7 @@ mod tests {
         let body = Body::new(recording.clone(), &[2.0 * recording.surface.mean_edge()], usize::MAX, &[]);
         let footprint = footprint_of(&body);
         let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
-        let (state, points) = (response.at_rest(recording.surface.positions.len(), 1), ContactPoints::new(1));
+        let (state, points) = (response.at_rest(&recording, 1), ContactPoints::new(1));
         let (mut cache, mut query) = (NodePositionCache::new(&body), ProximityQuery::new());
         let omegas = &recording.modes.angular_frequencies;
         let mut counts = [0; 5];

@@ -33,7 +33,6 @@ pub(crate) struct ObjectState {
 impl ObjectState {
     /// Object at its start, with room for contact points.
     pub(crate) fn new(object: &Object, gravity: DVec3, capacity: usize) -> Self {
-        let nodes = object.body.recording.surface.positions.len();
         let twist = object.start.twist;
         let pose = object.start.pose;
         let angular_momentum = object
@@ -43,7 +42,7 @@ impl ObjectState {
         let still = RigidStep { end: rigid, turn: DVec3::ZERO, residual: 0.0 };
         let mut state = Self {
             rigid,
-            response: object.response.at_rest(nodes, capacity),
+            response: object.response.at_rest(&object.body.recording, capacity),
             points: ContactPoints::new(capacity),
             free: still,
             end: still,

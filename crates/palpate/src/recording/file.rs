@@ -7,7 +7,7 @@
 use super::quantised::{QuantisedCompliance, shape_steps};
 use super::residual::lower_triangle;
 use super::sample_levels::LevelLists;
-use super::{GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
+use super::{Embedding, GravityResponse, Metadata, ModalBasis, NearField, Recording, ResidualCompliance};
 use crate::error::{Error, RecordingError};
 use crate::surface::Surface;
 use alloc::borrow::Cow;
@@ -16,6 +16,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::mem::take;
 use glam::DVec3;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors, View};
@@ -27,6 +28,16 @@ pub const FORMAT_VERSION: u32 = 1;
 
 /// Version of the compact layout, with mode shapes of 16 bits in whole steps.
 pub const COMPACT_FORMAT_VERSION: u32 = 2;
+
+/// Versions of both layouts with an embedded surface.
+pub const EMBEDDED_FORMAT_VERSIONS: [u32; 2] = [3, 4];
+
+impl Metadata {
+    /// Whether mode shapes are whole steps of 16 bits.
+    pub fn is_compact(&self) -> bool {
+        [COMPACT_FORMAT_VERSION, EMBEDDED_FORMAT_VERSIONS[1]].contains(&self.format_version)
+    }
+}
 
 /// Metadata entry `palpate`. The metadata's text is kept verbatim, because the hash covers it.
 #[derive(Serialize, Deserialize)]
@@ -103,6 +114,8 @@ impl Recording {
     pub fn to_bytes(&self) -> Result<Vec<u8>, Error> {
         self.validate()?;
         let (n, m) = (self.surface.positions.len(), self.modes.len());
+        // Mode shapes, residual compliance and sag are those of the model's nodes.
+        let model_nodes = self.model_nodes();
         let mut tensors = vec![
             (
                 "surface.positions",
@@ -119,14 +132,14 @@ impl Recording {
             ("modes.angular_frequencies", tensor_f64(&[m], self.modes.angular_frequencies.iter().copied())),
             ("modes.damping_ratios", tensor_f64(&[m], self.modes.damping_ratios.iter().copied())),
         ];
-        let shapes = &self.modes.mode_shapes;
-        if self.metadata.format_version == COMPACT_FORMAT_VERSION {
+        let shapes = self.model_mode_shapes();
+        if self.metadata.is_compact() {
             let steps = shape_steps(shapes, m);
             let whole = shapes.iter().zip(steps.iter().cycle()).map(|(shape, step)| shape / step);
-            tensors.push(("modes.mode_shapes", tensor_i16(&[3 * n, m], whole)));
+            tensors.push(("modes.mode_shapes", tensor_i16(&[3 * model_nodes, m], whole)));
             tensors.push(("modes.steps", tensor_f64(&[m], steps.iter().copied())));
         } else {
-            tensors.push(("modes.mode_shapes", tensor_f64(&[3 * n, m], shapes.iter().copied())));
+            tensors.push(("modes.mode_shapes", tensor_f64(&[3 * model_nodes, m], shapes.iter().copied())));
         }
         match &self.residual {
             ResidualCompliance::None => {}
@@ -136,23 +149,35 @@ impl Recording {
             }
             ResidualCompliance::Quantised(quantised) => {
                 let bytes = quantised.compressed();
-                tensors.push(("residual.scales", tensor_f32(&[3 * n], &quantised.scales)));
+                tensors.push(("residual.scales", tensor_f32(&[3 * model_nodes], &quantised.scales)));
                 let shape = [bytes.len()].to_vec();
                 tensors.push(("residual.quantised", Tensor { dtype: Dtype::U8, shape, bytes }));
             }
             ResidualCompliance::NearField(near) => {
                 tensors.push(("residual.radius", tensor_f64(&[1], [near.radius].into_iter())));
-                tensors.push(("residual.offsets", tensor_u32(&[n + 1], near.offsets.iter().copied())));
+                tensors.push((
+                    "residual.offsets",
+                    tensor_u32(&[model_nodes + 1], near.offsets.iter().copied()),
+                ));
                 tensors.push(("residual.nodes", tensor_u32(&[near.nodes.len()], near.nodes.iter().copied())));
                 tensors.push(("residual.blocks", tensor_f32(&[near.nodes.len(), 3, 3], &near.blocks)));
             }
         }
         if let Some(gravity) = &self.gravity {
             tensors.push(("gravity.modal_forces", tensor_f64(&[3, m], gravity.modal_forces.iter().copied())));
+            let embedding = self.embedding.as_ref();
+            let displacements = embedding
+                .map_or(&gravity.residual_displacements, |embedding| &embedding.residual_displacements);
             tensors.push((
                 "gravity.residual_displacements",
-                tensor_f64(&[3 * n, 3], gravity.residual_displacements.iter().copied()),
+                tensor_f64(&[3 * model_nodes, 3], displacements.iter().copied()),
             ));
+        }
+        if let Some(Embedding { mean_edge, offsets, nodes, weights, .. }) = &self.embedding {
+            tensors.push(("embedding.mean_edge", tensor_f64(&[1], [*mean_edge].into_iter())));
+            tensors.push(("embedding.offsets", tensor_u32(&[n + 1], offsets.iter().copied())));
+            tensors.push(("embedding.nodes", tensor_u32(&[nodes.len()], nodes.iter().copied())));
+            tensors.push(("embedding.weights", tensor_f32(&[nodes.len()], weights)));
         }
         if !self.sample_levels.is_empty() {
             let lists = LevelLists::new(&self.sample_levels);
@@ -197,8 +222,9 @@ impl Recording {
         };
         let header: Header = parse(json)?;
         let VersionOnly { format_version } = parse(header.metadata.get())?;
-        if !(FORMAT_VERSION..=COMPACT_FORMAT_VERSION).contains(&format_version) {
-            let (found, supported) = (format_version, COMPACT_FORMAT_VERSION);
+        let supported = EMBEDDED_FORMAT_VERSIONS[1];
+        if !(FORMAT_VERSION..=supported).contains(&format_version) {
+            let found = format_version;
             return Err(RecordingError::UnsupportedVersion { found, supported }.into());
         }
         let file = SafeTensors::deserialize(bytes).map_err(container)?;
@@ -227,7 +253,7 @@ impl Recording {
         let modes = ModalBasis {
             angular_frequencies: tensors.f64("modes.angular_frequencies")?,
             damping_ratios: tensors.f64("modes.damping_ratios")?,
-            mode_shapes: if metadata.format_version == COMPACT_FORMAT_VERSION {
+            mode_shapes: if metadata.is_compact() {
                 let steps = tensors.f64("modes.steps")?;
                 let shapes = tensors.i16("modes.mode_shapes")?.zip(steps.iter().cycle());
                 shapes.map(|(whole, step)| f64::from(whole) * step).collect()
@@ -235,11 +261,11 @@ impl Recording {
                 tensors.f64("modes.mode_shapes")?
             },
         };
+        let is_embedded = EMBEDDED_FORMAT_VERSIONS.contains(&metadata.format_version);
+        let model_nodes =
+            if is_embedded { tensors.rows("modes.mode_shapes")? / 3 } else { surface.positions.len() };
         let residual = if tensors.has("residual.packed") {
-            ResidualCompliance::from_lower_triangle(
-                surface.positions.len(),
-                &tensors.f32("residual.packed")?,
-            )?
+            ResidualCompliance::from_lower_triangle(model_nodes, &tensors.f32("residual.packed")?)?
         } else if tensors.has("residual.quantised") {
             let scales = tensors.f32("residual.scales")?;
             let compressed = tensors.bytes("residual.quantised", Dtype::U8)?;
@@ -275,7 +301,22 @@ impl Recording {
         } else {
             Vec::new()
         };
-        Ok(Self { metadata, surface, modes, residual, gravity, sample_levels })
+        let mut recording =
+            Self { metadata, surface, modes, residual, gravity, sample_levels, embedding: None };
+        if is_embedded {
+            let sag = recording.gravity.as_mut().map(|gravity| take(&mut gravity.residual_displacements));
+            let embedding = Embedding {
+                model_nodes,
+                mean_edge: tensors.f64("embedding.mean_edge")?.first().copied().unwrap_or(f64::NAN),
+                offsets: tensors.u32("embedding.offsets")?,
+                nodes: tensors.u32("embedding.nodes")?,
+                weights: tensors.f32("embedding.weights")?,
+                mode_shapes: take(&mut recording.modes.mode_shapes),
+                residual_displacements: sag.unwrap_or_default(),
+            };
+            recording.embed(embedding)?;
+        }
+        Ok(recording)
     }
 }
 
@@ -284,6 +325,8 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> 
     let extents = |name: &str| views.iter().find(|(other, _)| *other == name).map(|(_, view)| view.shape());
     let count = |name: &str| extents(name).and_then(|shape| shape.first()).copied().unwrap_or(0);
     let (nodes, modes) = (count("surface.positions"), count("modes.angular_frequencies"));
+    let is_embedded = extents("embedding.offsets").is_some();
+    let model_nodes = if is_embedded { count("modes.mode_shapes") / 3 } else { nodes };
     for (name, view) in views {
         let (blocks, levels) = (count("residual.nodes"), count("samples.spacings"));
         let expected: &[usize] = match *name {
@@ -291,14 +334,16 @@ fn check_shapes(views: &[(&str, TensorView<'_>)]) -> Result<(), RecordingError> 
             "surface.triangles" => &[count("surface.triangles"), 3],
             "surface.source_nodes" => &[nodes],
             "modes.angular_frequencies" | "modes.damping_ratios" | "modes.steps" => &[modes],
-            "modes.mode_shapes" => &[nodes.saturating_mul(3), modes],
-            "residual.scales" => &[nodes.saturating_mul(3)],
-            "residual.radius" => &[1],
-            "residual.offsets" => &[nodes.saturating_add(1)],
+            "modes.mode_shapes" => &[model_nodes.saturating_mul(3), modes],
+            "residual.scales" => &[model_nodes.saturating_mul(3)],
+            "residual.radius" | "embedding.mean_edge" => &[1],
+            "residual.offsets" => &[model_nodes.saturating_add(1)],
             "residual.nodes" => &[blocks],
             "residual.blocks" => &[blocks, 3, 3],
             "gravity.modal_forces" => &[3, modes],
-            "gravity.residual_displacements" => &[nodes.saturating_mul(3), 3],
+            "gravity.residual_displacements" => &[model_nodes.saturating_mul(3), 3],
+            "embedding.offsets" => &[nodes.saturating_add(1)],
+            "embedding.nodes" | "embedding.weights" => &[count("embedding.nodes")],
             "samples.spacings" => &[levels],
             "samples.offsets" | "samples.triangle_offsets" => &[levels.saturating_add(1)],
             "samples.nodes" => &[count("samples.nodes")],
@@ -328,6 +373,13 @@ struct Tensors<'a>(&'a SafeTensors<'a>);
 impl Tensors<'_> {
     fn has(&self, name: &str) -> bool {
         self.0.tensor(name).is_ok()
+    }
+
+    /// First extent of a tensor.
+    fn rows(&self, name: &str) -> Result<usize, RecordingError> {
+        let tensor = self.0.tensor(name);
+        let tensor = tensor.map_err(|_| RecordingError::MissingTensor { name: name.to_string() })?;
+        Ok(tensor.shape().first().copied().unwrap_or(0))
     }
 
     fn bytes(&self, name: &str, dtype: Dtype) -> Result<&[u8], RecordingError> {

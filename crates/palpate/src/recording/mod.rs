@@ -1,6 +1,7 @@
 //! Recording: responses, surface, mass and certificate of one body, computed offline for the runtime.
 
 mod column;
+mod embedding;
 mod file;
 mod impulse_response;
 mod metadata;
@@ -11,7 +12,8 @@ mod sample_levels;
 mod validation;
 
 pub use column::{Column, ResponseSeries, arrange_column};
-pub use file::{COMPACT_FORMAT_VERSION, FORMAT_VERSION};
+pub use embedding::Embedding;
+pub use file::{COMPACT_FORMAT_VERSION, EMBEDDED_FORMAT_VERSIONS, FORMAT_VERSION};
 pub use impulse_response::{ColumnsInMemory, ImpulseColumns, ImpulseResponse, Sampling};
 pub use metadata::{
     Certificate, CertificateEvent, CertificateLevel, Damping, MassProperties, Material, MeshCounts, Metadata,
@@ -41,6 +43,9 @@ pub struct Recording {
     pub gravity: Option<GravityResponse>,
     /// Levels of contact samples, finest first; empty: a model makes them.
     pub sample_levels: Vec<SampleLevel>,
+    /// Embedding of the surface in the finite elements; none where the surface is their boundary. The residual compliance is then that between
+    /// the nodes of the model.
+    pub embedding: Option<Embedding>,
 }
 
 /// Elastic modes, orthonormal in the mass matrix: ΦᵀMΦ = I.
@@ -85,9 +90,14 @@ impl ModalBasis {
 impl GravityResponse {
     /// Displacement of a node beyond the modes [m], under an acceleration [m/s²].
     pub fn residual_displacement(&self, node: usize, acceleration: DVec3) -> DVec3 {
-        let row = |axis: usize| DVec3::from_slice(&self.residual_displacements[(3 * node + axis) * 3..]);
-        DVec3::new(row(0).dot(acceleration), row(1).dot(acceleration), row(2).dot(acceleration))
+        sag_at(&self.residual_displacements, node, acceleration)
     }
+}
+
+/// Displacement of a node under an acceleration, by its three rows.
+fn sag_at(displacements: &[f64], node: usize, acceleration: DVec3) -> DVec3 {
+    let row = |axis: usize| DVec3::from_slice(&displacements[(3 * node + axis) * 3..]);
+    DVec3::new(row(0).dot(acceleration), row(1).dot(acceleration), row(2).dot(acceleration))
 }
 
 /// Upper limit of sizes [SI units], and inverse of the lower limit, so that a step cannot overflow.
@@ -130,7 +140,7 @@ impl Recording {
         let moves = |node: usize| {
             (0..3).all(|axis| {
                 self.modes.row(node, axis).iter().any(|phi| *phi != 0.0)
-                    || self.residual.block(node, node).col(axis)[axis] != 0.0
+                    || self.residual_between(node, node).col(axis)[axis] != 0.0
             })
         };
         carry_movable_weight(self.surface.corners(point), moves)
@@ -140,6 +150,11 @@ impl Recording {
     pub fn residual_relaxation_s(&self) -> f64 {
         let highest = self.modes.angular_frequencies.last();
         highest.map_or(0.0, |highest| self.metadata.damping.residual_relaxation_s(*highest))
+    }
+
+    /// Order of the faces that the triangles of the surface are of: 1 where they are plane.
+    pub(crate) fn surface_order(&self) -> u32 {
+        if self.embedding.is_some() { 1 } else { self.metadata.mesh.order }
     }
 
     /// Mass [kg] of the body.

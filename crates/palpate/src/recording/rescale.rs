@@ -10,7 +10,7 @@
 //! exactly, and the damping law gives ζ′ = ζ(ω′).
 
 use super::residual::ResidualCompliance;
-use super::{Certificate, Damping, FORMAT_VERSION, MassProperties, Material, Recording, Support};
+use super::{Certificate, Damping, EMBEDDED_FORMAT_VERSIONS, FORMAT_VERSION, MassProperties, Material, Recording, Support};
 use crate::error::{Error, RecordingError};
 use alloc::string::String;
 use libm::sqrt;
@@ -64,11 +64,14 @@ impl Recording {
             *zeta = damping.ratio(*omega);
         }
         if b != 1.0 {
-            rescaled.metadata.format_version = FORMAT_VERSION;
+            let [embedded, _] = EMBEDDED_FORMAT_VERSIONS;
+            rescaled.metadata.format_version =
+                if rescaled.embedding.is_some() { embedded } else { FORMAT_VERSION };
         }
         let modes = &mut rescaled.modes;
         let shape = 1.0 / sqrt(b);
-        modes.mode_shapes.iter_mut().for_each(|phi| *phi *= shape);
+        let of_model = rescaled.embedding.as_mut().map(|embedding| &mut embedding.mode_shapes);
+        [Some(&mut modes.mode_shapes), of_model].into_iter().flatten().flatten().for_each(|phi| *phi *= shape);
         rescaled.residual.scale(1.0 / a);
         rescaled.validate()?;
         Ok(rescaled)

@@ -3,7 +3,7 @@
 //! A hash tells that a file is the one that was written, not that what was written is a body. The checks need no more memory than
 //! the recording, and their time grows with its size.
 
-use super::file::COMPACT_FORMAT_VERSION;
+use super::file::EMBEDDED_FORMAT_VERSIONS;
 use super::quantised::shape_steps;
 use super::{LARGEST, Recording, ResidualCompliance, Support};
 use crate::error::{Error, RecordingError, RecordingPart};
@@ -70,9 +70,10 @@ impl Recording {
     pub fn validate(&self) -> Result<(), Error> {
         self.metadata.validate()?;
         self.validate_surface()?;
+        self.validate_embedding()?;
         self.validate_modes()?;
         self.validate_mass()?;
-        self.residual.validate(self.surface.positions.len())?;
+        self.residual.validate(self.model_nodes())?;
         self.validate_residual_size()?;
         self.validate_sample_levels()?;
         Ok(self.validate_gravity()?)
@@ -110,6 +111,21 @@ impl Recording {
         Ok(())
     }
 
+    /// Check that an embedding fits the surface, and that the format's version tells of it.
+    fn validate_embedding(&self) -> Result<(), RecordingError> {
+        let version = self.metadata.format_version;
+        if self.embedding.is_some() != EMBEDDED_FORMAT_VERSIONS.contains(&version) {
+            let given = if self.embedding.is_some() { "an" } else { "no" };
+            return Err(RecordingError::Inconsistent {
+                part: RecordingPart::Surface,
+                what: format!(
+                    "{given} embedding is given with format version {version}, expected one with the versions {EMBEDDED_FORMAT_VERSIONS:?} alone"
+                ),
+            });
+        }
+        self.embedding.as_ref().map_or(Ok(()), |embedding| embedding.validate(self.surface.positions.len()))
+    }
+
     fn validate_modes(&self) -> Result<(), RecordingError> {
         let field = |name, unit, range| Field { part: RecordingPart::Modes, name, unit, range };
         let (nodes, modes) = (self.surface.positions.len(), self.modes.len());
@@ -121,10 +137,12 @@ impl Recording {
         frequencies.check(self.modes.angular_frequencies.iter().copied())?;
         ratios.check(self.modes.damping_ratios.iter().copied())?;
         shapes.check(self.modes.mode_shapes.iter().copied())?;
-        if self.metadata.format_version == COMPACT_FORMAT_VERSION {
-            let steps = shape_steps(&self.modes.mode_shapes, modes);
-            let mut in_steps =
-                self.modes.mode_shapes.iter().zip(steps.iter().cycle()).map(|(shape, step)| shape / step);
+        let of_model = self.model_mode_shapes();
+        shapes.check_length(of_model.len(), 3 * self.model_nodes() * modes)?;
+        shapes.check(of_model.iter().copied())?;
+        if self.metadata.is_compact() {
+            let steps = shape_steps(of_model, modes);
+            let mut in_steps = of_model.iter().zip(steps.iter().cycle()).map(|(shape, step)| shape / step);
             if let Some(at) = in_steps.position(|steps| steps != libm::rint(steps)) {
                 return shapes.fail(format!(
                     "hold a number at {at} that is no whole step of its mode, as compact recordings need"
@@ -170,9 +188,9 @@ impl Recording {
     /// Check that the residual compliance can be positive semi-definite: |Sᵢⱼ| ≤ √(Sᵢᵢ·Sⱼⱼ) for every pair of directions, but for the
     /// round-off of the compliance G = S + Φ·Λ⁻¹·Φᵀ that it was computed from. Eigenvalues would take the cube of the size.
     fn validate_residual_size(&self) -> Result<(), RecordingError> {
-        let modes = &self.modes;
+        let (shapes, omegas) = (self.model_mode_shapes(), &self.modes.angular_frequencies);
         let modal = |node: usize, axis: usize| -> f64 {
-            let row = modes.row(node, axis).iter().zip(&modes.angular_frequencies);
+            let row = shapes[(3 * node + axis) * omegas.len()..].iter().zip(omegas);
             row.map(|(phi, omega)| (phi / omega) * (phi / omega)).sum()
         };
         // √S and √G of every degree of freedom.
@@ -181,7 +199,7 @@ impl Recording {
             let whole = own + DVec3::new(modal(node, 0), modal(node, 1), modal(node, 2));
             (own.map(libm::sqrt), whole.map(libm::sqrt))
         };
-        let roots: Vec<(DVec3, DVec3)> = (0..self.surface.positions.len()).map(roots).collect();
+        let roots: Vec<(DVec3, DVec3)> = (0..self.model_nodes()).map(roots).collect();
         let check = |i: usize, j: usize, block: DMat3| {
             for (row, column) in (0..9).map(|at| (at / 3, at % 3)) {
                 let (own, whole) =
@@ -226,6 +244,10 @@ impl Recording {
         displacements.check_length(gravity.residual_displacements.len(), 9 * self.surface.positions.len())?;
         forces.check(gravity.modal_forces.iter().copied())?;
         displacements.check(gravity.residual_displacements.iter().copied())?;
+        if let Some(embedding) = &self.embedding {
+            displacements.check_length(embedding.residual_displacements.len(), 9 * embedding.model_nodes)?;
+            displacements.check(embedding.residual_displacements.iter().copied())?;
+        }
         for axis in 0..3 {
             let found: f64 =
                 gravity.modal_forces[axis * modes..][..modes].iter().map(|force| force * force).sum();

@@ -64,7 +64,7 @@ impl Body {
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
         let normals = node_normals(&recording.surface);
-        let heights = smooth_heights(&recording.surface, recording.metadata.mesh.order);
+        let heights = smooth_heights(&recording.surface, recording.surface_order());
         let max_height = heights.iter().copied().fold(0.0, f64::max);
         for level in &*recording.levels_down_to(max_contact_samples) {
             patches.push(PatchField::at_samples(&recording, level, &normals, &heights));
@@ -329,7 +329,9 @@ impl Body {
             return self.corners(location).into_iter().map(of).sum();
         }
         let mut sum = DVec3::ZERO;
-        self.distribute(location, |node, weight| sum += of((node, weight)));
+        self.distribute(location, |node, weight| {
+            sum += self.recording.model_sag(response, node, gravity) * weight;
+        });
         sum
     }
 
@@ -363,16 +365,14 @@ impl Body {
                     return used(self.corners(location)).map(of).sum();
                 }
                 let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
-                    None => own.to_nodes.between(node, corner) * weight,
-                    Some(patch) => {
-                        let nodes = patch.weights.of(corner);
-                        own.to_nodes.averaged(node, nodes) * weight
-                    }
+                    None => own.to_nodes.averaged(node, self.recording.model_nodes_of(corner)) * weight,
+                    Some(patch) => own.to_nodes.averaged(node, patch.weights.of(corner)) * weight,
                 };
                 used(self.corners(location)).map(sum).sum()
             }
             (None, Some(other)) => {
-                let of = |sample: usize| other.to_nodes.between(sample, node).transpose();
+                let of_model = self.recording.model_nodes_of(node);
+                let of = |sample: usize| other.to_nodes.averaged(sample, of_model.clone()).transpose();
                 used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
             }
         }
@@ -440,13 +440,13 @@ impl Body {
         kernel.displacement(&self.recording, node, forces)
     }
 
-    /// Distribution of a force at a location to nodes, with weights; a node may come more than once. Corners that have no weight but for
+    /// Distribution of a force at a location to the model's nodes, with weights; a node may come more than once. Corners that have no weight but for
     /// round-off get none.
     pub(super) fn distribute(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
         for (corner, weight) in self.corners(location) {
             match self.patch(location.footprint) {
                 _ if weight.abs() <= f64::EPSILON => {}
-                None => give(corner, weight),
+                None => self.recording.model_nodes_of(corner).for_each(|(node, w)| give(node, w * weight)),
                 Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
             }
         }
@@ -454,9 +454,13 @@ impl Body {
 
     /// Residual compliance of a surface node [m/N]: its displacement per force at a location.
     pub(super) fn residual_of_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
-        let mut sum = DMat3::ZERO;
-        self.distribute(location, |other, weight| sum += self.recording.residual.block(node, other) * weight);
-        sum
+        let recording = &self.recording;
+        let of = |own: usize| {
+            let mut sum = DMat3::ZERO;
+            self.distribute(location, |other, weight| sum += recording.residual.block(own, other) * weight);
+            sum
+        };
+        recording.model_nodes_of(node).map(|(own, weight)| of(own) * weight).sum()
     }
 }
 

@@ -11,6 +11,7 @@ use super::fir::Fir;
 use super::force_history::ForceHistory;
 use super::modal::ModalState;
 use super::{Body, ContactLocation, ContactPoint, LocationState, ResponseEnergy};
+use crate::recording::Recording;
 use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
@@ -44,10 +45,11 @@ enum StepEnd {
 }
 
 impl FirState {
-    pub(crate) fn new(fir: &Fir, nodes: usize, slots: usize) -> Self {
+    pub(crate) fn new(fir: &Fir, recording: &Recording, slots: usize) -> Self {
+        let nodes = recording.surface.positions.len();
         let history = ForceHistory::new(fir.samples(), fir.touchable_nodes());
         Self {
-            surface: ModalState::new(fir.modes.len(), nodes, slots),
+            surface: ModalState::new(recording, slots),
             surface_error: 0.0,
             blocks: BlockedConvolution::new(nodes),
             displacements: [(); 2].map(|()| vec![None; nodes]),

@@ -47,6 +47,10 @@ impl Fir {
         step_s: f64,
     ) -> Result<Self, ModelError> {
         table.validate(&recording.surface)?;
+        if recording.embedding.is_some() {
+            let what = "an impulse response is between the nodes of the finite elements: record the body without an embedded surface";
+            return Err(ModelError::ImpulseResponse { what: what.into() });
+        }
         if libm::fabs(table.step_s - step_s) > 1e-9 * step_s {
             let recorded_s = table.step_s;
             return Err(ModelError::ImpulseResponse {

@@ -159,13 +159,11 @@ impl Response {
         modes.nodal_compliance = Some(known.unwrap_or_else(|| Arc::new(NodalCompliance::new(body, modes))));
     }
 
-    /// State at rest, for the body's number of surface nodes and a capacity of contact points.
-    pub(crate) fn at_rest(&self, nodes: usize, capacity: usize) -> ResponseState {
+    /// State at rest, with a capacity of contact points.
+    pub(crate) fn at_rest(&self, recording: &Recording, capacity: usize) -> ResponseState {
         match self {
-            Self::Modal(modes) => {
-                ResponseState::Modal(Box::new(ModalState::new(modes.len(), nodes, capacity)))
-            }
-            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, nodes, capacity))),
+            Self::Modal(_) => ResponseState::Modal(Box::new(ModalState::new(recording, capacity))),
+            Self::Fir(fir) => ResponseState::Fir(Box::new(FirState::new(fir, recording, capacity))),
         }
     }
 }

@@ -87,8 +87,9 @@ impl ResidualBound {
 }
 
 impl ModalState {
-    /// State at rest for numbers of modes and surface nodes, and a capacity of contact points.
-    pub(crate) fn new(modes: usize, nodes: usize, capacity: usize) -> Self {
+    /// State at rest, with a capacity of contact points.
+    pub(crate) fn new(recording: &Recording, capacity: usize) -> Self {
+        let modes = recording.modes.len();
         Self {
             modes: vec![OscillatorState::default(); modes],
             q: vec![0.0; modes],
@@ -100,7 +101,7 @@ impl ModalState {
             weighted: vec![0.0; 3 * modes],
             spring_forces: BoundedVec::new(capacity + RELAXING),
             tip_springs: BoundedVec::new(capacity + RELAXING),
-            nodal: NodalForces::new(nodes),
+            nodal: NodalForces::new(recording.model_nodes(), recording.surface.positions.len()),
             products: Products::default(),
             residual_energy: 0.0,
             residual_norm: 0.0,
@@ -449,22 +450,39 @@ impl SampledModes {
             }
             None => out.fill(DVec3::ZERO),
         }
-        let mut loads = deformed.loaded.clone();
-        if !residual_fields.add(body, &deformed.patches, out) {
-            // All forces as nodal forces, since patches overlap.
-            for SpringForce { location, force, .. } in &deformed.patches {
-                body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
-            }
-            // Stable: the order of a node's forces is that of their sum.
-            loads.sort_by_key(|(node, _)| *node);
-            loads.dedup_by(|next, kept| {
-                let same = next.0 == kept.0;
-                if same {
-                    kept.1 += next.1;
-                }
-                same
-            });
+        let Some(embedding) = &recording.embedding else {
+            return add_spring_displacements(body, deformed, residual_fields, out);
+        };
+        let mut of_model = vec![DVec3::ZERO; embedding.model_nodes];
+        add_spring_displacements(body, deformed, residual_fields, &mut of_model);
+        for (node, u) in out.iter_mut().enumerate() {
+            *u += embedding.of(node).map(|(node, weight)| of_model[node] * weight).sum::<DVec3>();
         }
-        recording.residual.add_displacements(&loads, out);
     }
+}
+
+/// Add S·d at the nodes of the model [m, body].
+fn add_spring_displacements(
+    body: &Body,
+    deformed: &ModalDeformation,
+    residual_fields: &mut ResidualFields,
+    out: &mut [DVec3],
+) {
+    let mut loads = deformed.loaded.clone();
+    if !residual_fields.add(body, &deformed.patches, out) {
+        // All forces as nodal forces, since patches overlap.
+        for SpringForce { location, force, .. } in &deformed.patches {
+            body.distribute(location, |node, weight| loads.push((node as u32, *force * weight)));
+        }
+        // Stable: the order of a node's forces is that of their sum.
+        loads.sort_by_key(|(node, _)| *node);
+        loads.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            if same {
+                kept.1 += next.1;
+            }
+            same
+        });
+    }
+    body.recording.residual.add_displacements(&loads, out);
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 #[derive(Debug)]
 pub(crate) struct ModalDeformation {
     pub(super) q: Vec<f64>,
-    /// Forces on nodes [N, body].
+    /// Forces on model nodes [N, body].
     pub(super) loaded: Vec<(u32, DVec3)>,
     /// Forces on patches.
     pub(super) patches: Vec<SpringForce>,

@@ -41,5 +41,8 @@ impl<'a, X: Copy + Into<f64>> ModalDistances<'a, X> {
 
 /// √tr(Sᵢᵢ) of a node [√(m/N)].
 pub(crate) fn residual_size(recording: &Recording, node: usize) -> f64 {
-    libm::sqrt(recording.residual.trace(node, node))
+    if recording.embedding.is_none() {
+        return libm::sqrt(recording.residual.trace(node, node));
+    }
+    libm::sqrt(recording.residual_between(node, node).diagonal().element_sum().max(0.0))
 }

@@ -177,7 +177,7 @@ mod tests {
         let mut precomputed = computed.clone();
         precomputed.precompute_nodal_compliance(&body, core::iter::empty());
         let blocks = |response: &Response| {
-            let mut state = response.at_rest(recording.surface.positions.len(), 4);
+            let mut state = response.at_rest(&recording, 4);
             let mut points = ContactPoints::new(4);
             let mut view = ResponseView { response, body: &body, state: &mut state, gravity: DVec3::ZERO };
             let node = |node| body.node_point(Footprint::Point, node);

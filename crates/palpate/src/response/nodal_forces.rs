@@ -1,4 +1,4 @@
-//! Spring forces of the residual compliance on nodes, and their displacements.
+//! Spring forces of the residual compliance on the nodes of the finite element model, and displacements of the surface nodes by them.
 
 use super::sampled_residual::{ResidualMemory, SampledResidual};
 use super::{Body, Footprint, SpringForce};
@@ -6,14 +6,14 @@ use alloc::vec;
 use alloc::vec::Vec;
 use glam::DVec3;
 
-/// Forces at points [N, body], distributed to the nodes of their triangles and summed.
+/// Forces at points [N, body], distributed to the model's nodes and summed.
 #[derive(Debug, Clone)]
 pub(crate) struct NodalForces {
-    /// Loaded nodes and the forces whose static displacement they have.
+    /// Loaded model nodes and the forces whose static displacement they have.
     loaded: Vec<(u32, DVec3)>,
     /// Memory of the forces on each.
     memories: Vec<ResidualMemory>,
-    /// Index of each surface node in `loaded`, from 1; 0 for unloaded nodes.
+    /// Index of each model node in `loaded`, from 1; 0 for unloaded nodes.
     at: Vec<u32>,
     /// Cached residual displacements of surface nodes [m, body], and the nodes that have one.
     displacements: Vec<Option<DVec3>>,
@@ -21,17 +21,18 @@ pub(crate) struct NodalForces {
 }
 
 impl NodalForces {
-    pub(super) fn new(nodes: usize) -> Self {
+    /// For numbers of model nodes and of surface nodes.
+    pub(super) fn new(model_nodes: usize, surface_nodes: usize) -> Self {
         Self {
-            loaded: Vec::with_capacity(nodes),
-            memories: Vec::with_capacity(nodes),
-            at: vec![0; nodes],
-            displacements: vec![None; nodes],
-            cached: Vec::with_capacity(nodes),
+            loaded: Vec::with_capacity(model_nodes),
+            memories: Vec::with_capacity(model_nodes),
+            at: vec![0; model_nodes],
+            displacements: vec![None; surface_nodes],
+            cached: Vec::with_capacity(surface_nodes),
         }
     }
 
-    /// Loaded nodes with their forces [N, body].
+    /// Loaded model nodes with their forces [N, body].
     pub(super) fn loaded(&self) -> &[(u32, DVec3)] {
         &self.loaded
     }
@@ -67,13 +68,14 @@ impl NodalForces {
         memories.truncate(kept);
     }
 
+    /// Add the memory of a force on model nodes with these weights.
     pub(super) fn add(
         &mut self,
-        corners: [(usize, f64); 3],
+        nodes: impl Iterator<Item = (usize, f64)>,
         memory: &ResidualMemory,
         residual: &SampledResidual,
     ) {
-        for (node, weight) in corners.into_iter().filter(|(_, weight)| *weight != 0.0) {
+        for (node, weight) in nodes.filter(|(_, weight)| *weight != 0.0) {
             if self.at[node] == 0 {
                 self.loaded.push((node as u32, DVec3::ZERO));
                 self.memories.push(ResidualMemory::default());
@@ -97,7 +99,7 @@ impl NodalForces {
     ) -> ResidualMemory {
         let mut sum = ResidualMemory::default();
         for ((other, _), memory) in self.loaded.iter().zip(&self.memories) {
-            let block = body.recording.residual.block(node, *other as usize);
+            let block = body.recording.residual_by_model_node(node, *other as usize);
             sum.add_displacements(&block, memory);
         }
         for spring in springs.iter().filter(|spring| spring.location.footprint != Footprint::Point) {
@@ -113,9 +115,9 @@ impl NodalForces {
     /// Costs the loaded nodes and the springs, unless it is cached.
     pub(crate) fn residual_displacement(&self, body: &Body, springs: &[SpringForce], node: usize) -> DVec3 {
         let sum = || {
-            let residual = &body.recording.residual;
+            let recording = &body.recording;
             let at_nodes = self.loaded.iter();
-            let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
+            let at_nodes = at_nodes.map(|&(other, force)| recording.residual_by_model_node(node, other as usize) * force);
             let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
             let by_sample = |spring| body.residual_displacement(Footprint::Point, node, spring);
             at_nodes.chain(of_samples.map(by_sample)).sum()

@@ -11,7 +11,7 @@
 
 use super::modal_distances::ModalDistances;
 use super::residual_kernel::ResidualKernel;
-use super::sample_surface::SampleSurface;
+use super::sample_surface::{SampleSurface, SampleVertices};
 use crate::recording::Recording;
 use crate::surface::{Bounds, Cell, PatchWeights, SampleLevel, SphereTree, Surface};
 use alloc::boxed::Box;
@@ -24,6 +24,7 @@ use glam::DVec3;
 pub(crate) struct PatchField {
     /// Patch radius a [m].
     pub(crate) radius: f64,
+    /// Weights of the model's nodes in each patch.
     pub(crate) weights: PatchWeights,
     /// Averaged mode shapes G [1/√kg]: (3·patch + axis)·m + mode. Single precision halves the time of queries on a fine
     /// mesh.
@@ -45,7 +46,8 @@ impl PatchField {
     /// Patches about all surface nodes, with the sphere tree over the surface.
     pub(crate) fn new(recording: &Recording, tree: &SphereTree, radius: f64) -> Self {
         let all: Vec<u32> = (0..recording.surface.positions.len() as u32).collect();
-        let weights = PatchWeights::new(&recording.surface, recording.metadata.mesh.order, radius, &all);
+        let weights = PatchWeights::new(&recording.surface, recording.surface_order(), radius, &all);
+        let weights = at_model_nodes(recording, weights);
         let kernel = ResidualKernel::new(recording, &weights, radius);
         let rows = averaged_rows(recording, &weights);
         let distances = ModalDistances::new(recording, &rows);
@@ -64,18 +66,20 @@ impl PatchField {
         heights: &[f64],
     ) -> Self {
         let radius = level.spacing;
-        let order = recording.metadata.mesh.order;
+        let order = recording.surface_order();
         let (weights, one_sided) = PatchWeights::of_samples(&recording.surface, order, radius, &level.nodes);
-        let samples = SampleSurface::new(recording, level, (&weights, &one_sided), (normals, heights));
-        Self::averaged_at(recording, samples, weights, radius)
+        let vertices = SampleVertices::new(&recording.surface, level, (&weights, &one_sided), (normals, heights));
+        let weights = at_model_nodes(recording, weights);
+        Self::averaged_at(recording, SampleSurface::new(recording, vertices, &weights), weights, radius)
     }
 
     /// Cells of the body's clamps.
     pub(crate) fn at_cells(recording: &Recording, cells: &[Cell]) -> Self {
         let weights = PatchWeights::of_cells(cells);
-        let samples = SampleSurface::of_cells(recording, &weights);
+        let vertices = SampleVertices::of_cells(&recording.surface, &weights);
+        let weights = at_model_nodes(recording, weights);
         // No patch radius asks for them.
-        Self::averaged_at(recording, samples, weights, f64::NAN)
+        Self::averaged_at(recording, SampleSurface::new(recording, vertices, &weights), weights, f64::NAN)
     }
 
     /// Patches with given weights about the nodes of a sample surface.
@@ -109,16 +113,23 @@ impl PatchField {
     }
 }
 
+/// Weights of the model's nodes in patches whose surface nodes have these weights.
+fn at_model_nodes(recording: &Recording, weights: PatchWeights) -> PatchWeights {
+    if recording.embedding.is_none() {
+        return weights;
+    }
+    weights.distributed(recording.model_nodes(), |node| recording.model_nodes_of(node))
+}
+
 /// Mode shapes averaged over patches.
 fn averaged_rows(recording: &Recording, weights: &PatchWeights) -> Vec<f32> {
-    let modes = &recording.modes;
-    let m = modes.len();
+    let (m, shapes) = (recording.modes.len(), recording.model_mode_shapes());
     let mut rows = Vec::with_capacity(3 * weights.len() * m);
     let mut sums = vec![0.0; 3 * m];
     for c in 0..weights.len() {
         sums.fill(0.0);
         for (node, w) in weights.of(c) {
-            let from = &modes.mode_shapes[3 * node * m..3 * (node + 1) * m];
+            let from = &shapes[3 * node * m..3 * (node + 1) * m];
             sums.iter_mut().zip(from).for_each(|(sum, phi)| *sum += w * phi);
         }
         rows.extend(sums.iter().map(|&sum| sum as f32));

@@ -44,7 +44,7 @@ fn modal_displacement(body: &Body, state: &ModalState, point: &SurfacePoint, gra
         let m = recording.modes.len();
         let mut own = dot3(&recording.modes.mode_shapes[3 * m * node..3 * m * (node + 1)], &state.q);
         for &(other, force) in state.nodal.loaded() {
-            own += recording.residual.block(node, other as usize) * force;
+            own += recording.residual_by_model_node(node, other as usize) * force;
         }
         let patches =
             state.spring_forces.iter().filter(|spring| spring.location.footprint != Footprint::Point);

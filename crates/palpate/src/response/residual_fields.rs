@@ -1,4 +1,4 @@
-//! Cache of residual displacement fields: displacement of every surface node per unit force on a contact patch.
+//! Cache of residual displacement fields: displacement of every model node per unit force on a contact patch.
 //!
 //! ```text
 //! A_c = Σᵢ wᵢ·S_·ᵢ        S·f = Σ_c A_c·f_c
@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 /// Number of cached patches above which unused ones are dropped: some faces in contact, and a moving finger.
 const MAX_CACHED: usize = 256;
 
-/// Cached fields by patch index and node: a 3×3 matrix [m/N] for every surface node, column by column, and the frame of the
+/// Cached fields by patch index and node: a 3×3 matrix [m/N] for every model node, column by column, and the frame of the
 /// last use.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ResidualFields {
@@ -25,7 +25,7 @@ pub(crate) struct ResidualFields {
 }
 
 impl ResidualFields {
-    /// Add the residual displacements under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
+    /// Add the residual displacements of the model's nodes under forces on patches to `out` [m, body]. Gives whether it does: only for a whole S.
     pub(super) fn add(&mut self, body: &Body, patches: &[SpringForce], out: &mut [DVec3]) -> bool {
         if !body.recording.residual.is_whole() {
             return false;
@@ -57,7 +57,7 @@ impl ResidualFields {
 
 /// Field A_c of the patch about a node [m/N].
 fn compliance_field(body: &Body, footprint: Footprint, corner: usize) -> Vec<f32> {
-    let nodes = body.recording.surface.positions.len();
+    let nodes = body.recording.model_nodes();
     let mut field = Vec::with_capacity(9 * nodes);
     let Some(patch) = body.patch(footprint) else { return field };
     let weights: Vec<(usize, f64)> = patch.weights.of(corner).collect();

@@ -32,9 +32,9 @@ impl ResidualKernel {
     /// Kernel of patches of a radius [m] about all surface nodes.
     pub(super) fn new(recording: &Recording, weights: &PatchWeights, radius: f64) -> Self {
         let surface = &recording.surface;
-        let n = surface.positions.len();
+        let n = recording.model_nodes();
         let mut dense = vec![0.0; n];
-        let own: Vec<DMat3> = (0..n)
+        let own: Vec<DMat3> = (0..weights.len())
             .map(|c| match &recording.residual {
                 // Row by row: most node pairs of a large patch lie beyond the near field.
                 ResidualCompliance::NearField(near) => {
@@ -67,7 +67,7 @@ impl ResidualKernel {
             let between = |d: usize| weights.of(d).map(|(j, w)| field[j] * w).sum::<f64>();
             others.iter().map(|&d| between(d) / scale(d)).collect()
         };
-        let range = fit_kernel_range(&surface.positions, surface.mean_edge(), radius, correlations);
+        let range = fit_kernel_range(&surface.positions, recording.mean_element_edge(), radius, correlations);
         Self { factors, range }
     }
 

@@ -47,59 +47,61 @@ pub(crate) struct SampleSurface {
     pub(crate) tree: SphereTree,
     /// Residual compliance D between vertices [m/N].
     pub(super) residual: ResidualCompliance,
-    /// Residual compliance between vertices and surface nodes [m/N].
+    /// Residual compliance between vertices and the model's nodes [m/N].
     pub(super) to_nodes: PatchNodeCompliance,
 }
 
-impl SampleSurface {
+/// Vertices of a sample surface before the response of the body is known: where they are, and the decimated surface between them.
+pub(super) struct SampleVertices {
+    samples: usize,
+    one_sided: Vec<u32>,
+    normals: Vec<DVec3>,
+    surface: Surface,
+}
+
+impl SampleVertices {
     /// Contact samples of a level, whose patches have these weights; with the outward normals of all surface nodes and the heights of
     /// the smooth surface over them [m].
     pub(super) fn new(
-        recording: &Recording,
+        rest: &Surface,
         level: &SampleLevel,
         (weights, one_sided): (&PatchWeights, &[OneSidedPatch]),
         (normals, heights): (&[DVec3], &[f64]),
     ) -> Self {
-        let rest = &recording.surface;
         let samples = level.nodes.len();
         let of_sample: Vec<u32> = one_sided.iter().map(|side| side.sample as u32).collect();
         let nodes: Vec<u32> =
             level.nodes.iter().copied().chain(of_sample.iter().map(|&of| level.nodes[of as usize])).collect();
         let at_nodes = level.nodes.iter().map(|&node| normals[node as usize]);
         let vertex_normals: Vec<DVec3> = at_nodes.chain(one_sided.iter().map(|side| side.normal)).collect();
-        let is_surface = !level.triangles.is_empty();
-        let triangles = if is_surface {
+        let triangles = if level.triangles.is_empty() {
+            Vec::new()
+        } else {
             let mut index = vec![u32::MAX; rest.positions.len()];
             level.nodes.iter().enumerate().for_each(|(sample, &node)| index[node as usize] = sample as u32);
             let sample = |node: u32| index[node as usize];
             level.triangles.iter().map(|corners| corners.map(sample)).collect()
-        } else {
-            Vec::new()
         };
         let positions = averaged_positions(rest, (&nodes, &vertex_normals), weights, (normals, heights));
         let source_nodes = nodes.iter().map(|&node| rest.source_nodes[node as usize]).collect();
         let surface = Surface { positions, triangles, source_nodes };
-        Self { one_sided: of_sample, ..Self::of(recording, surface, samples, vertex_normals, weights) }
+        Self { samples, one_sided: of_sample, normals: vertex_normals, surface }
     }
 
-    /// Cells of clamps, whose positions at rest are their centroids.
-    pub(super) fn of_cells(recording: &Recording, weights: &PatchWeights) -> Self {
-        let rest = &recording.surface.positions;
+    /// Cells of clamps with these weights, whose positions at rest are their centroids.
+    pub(super) fn of_cells(rest: &Surface, weights: &PatchWeights) -> Self {
         let count = weights.len();
-        let centroid = |c: usize| weights.of(c).map(|(node, w)| rest[node] * w).sum();
+        let centroid = |c: usize| weights.of(c).map(|(node, w)| rest.positions[node] * w).sum();
         let positions: Vec<DVec3> = (0..count).map(centroid).collect();
         let surface = Surface { positions, triangles: Vec::new(), source_nodes: vec![0; count] };
-        Self::of(recording, surface, count, vec![DVec3::ZERO; count], weights)
+        Self { samples: count, one_sided: Vec::new(), normals: vec![DVec3::ZERO; count], surface }
     }
+}
 
-    /// Samples, and further vertices, of a surface that may have no triangles.
-    fn of(
-        recording: &Recording,
-        mut surface: Surface,
-        samples: usize,
-        normals: Vec<DVec3>,
-        weights: &PatchWeights,
-    ) -> Self {
+impl SampleSurface {
+    /// Samples, and further vertices, whose patches have these weights of the model's nodes.
+    pub(super) fn new(recording: &Recording, vertices: SampleVertices, weights: &PatchWeights) -> Self {
+        let SampleVertices { samples, one_sided, normals, mut surface } = vertices;
         let is_surface = !surface.triangles.is_empty();
         let mut triangle = vec![NONE; weights.len()];
         for (t, corners) in surface.triangles.iter().enumerate() {
@@ -111,10 +113,8 @@ impl SampleSurface {
             surface.triangles.push([vertex as u32; 3]);
         }
         let tree = SphereTree::new(&surface.positions, &surface.triangles[..in_tree]);
-        let to_nodes =
-            PatchNodeCompliance::new(&recording.residual, weights, recording.surface.positions.len());
+        let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, recording.model_nodes());
         let residual = averaged(&recording.residual, &to_nodes, weights);
-        let one_sided = Vec::new();
         Self { samples, one_sided, normals, surface, is_surface, triangle, tree, residual, to_nodes }
     }
 
@@ -253,7 +253,7 @@ fn averaged_near_field(radius: f64, to_nodes: &PatchNodeCompliance, weights: &Pa
     out
 }
 
-/// Residual compliance W·S between patches and surface nodes [m/N]: displacement of a patch per force at a node. Sparse by rows;
+/// Residual compliance W·S between patches and the model's nodes [m/N]: displacement of a patch per force at a node. Sparse by rows;
 /// a row with all nodes is indexed directly.
 #[derive(Debug, Clone)]
 pub(super) struct PatchNodeCompliance {

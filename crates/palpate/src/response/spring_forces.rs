@@ -156,7 +156,12 @@ impl ModalState {
         residual: &SampledResidual,
     ) {
         if location.footprint == Footprint::Point {
-            self.nodal.add(body.recording.surface.corners(&location.point), memory, residual);
+            let recording = &body.recording;
+            let corners = recording.surface.corners(&location.point).into_iter();
+            let nodes = corners.flat_map(|(corner, weight)| {
+                recording.model_nodes_of(corner).map(move |(node, share)| (node, share * weight))
+            });
+            self.nodal.add(nodes, memory, residual);
         }
     }
 }

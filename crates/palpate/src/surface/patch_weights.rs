@@ -110,6 +110,30 @@ impl PatchWeights {
         patches
     }
 
+    /// Patches of the nodes that every surface node's weight is distributed to, of which there are `count`.
+    pub(crate) fn distributed<I: Iterator<Item = (usize, f64)>>(
+        &self,
+        count: usize,
+        of_node: impl Fn(usize) -> I,
+    ) -> Self {
+        let mut sums = vec![0.0; count];
+        let mut patches = Self::empty();
+        for patch in 0..self.len() {
+            let mut touched: Vec<u32> = Vec::new();
+            for (node, weight) in self.of(patch) {
+                of_node(node).for_each(|(other, share)| {
+                    touched.push(other as u32);
+                    sums[other] += weight * share;
+                });
+            }
+            touched.sort_unstable();
+            touched.dedup();
+            let weight = |&node: &u32| (node, core::mem::take(&mut sums[node as usize]));
+            patches.push(&touched.iter().map(weight).collect());
+        }
+        patches
+    }
+
     /// Number of patches.
     pub(crate) fn len(&self) -> usize {
         self.offsets.len() - 1

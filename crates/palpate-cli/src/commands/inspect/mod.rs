@@ -240,6 +240,7 @@ pub fn print_as_json(recording: &Recording) -> Result<(), Failure> {
         "fixed_nodes": metadata.mesh.fixed_nodes,
         "surface_nodes": recording.surface.positions.len(),
         "surface_triangles": recording.surface.triangles.len(),
+        "embedded_in_nodes": recording.embedding.as_ref().map(|embedding| embedding.model_nodes),
         "bounding_box_m": bounding_box_m(recording),
         "support": metadata.support,
         "mass_kg": metadata.mass.mass_kg,
@@ -276,7 +277,16 @@ fn describe(recording: &Recording, path: &Path, bytes: usize) -> Result<String, 
     let kind = if mesh.order == 1 { "linear" } else { "quadratic" };
     writeln!(out, "  mesh         {} nodes, {} {kind} tetrahedra", mesh.nodes, mesh.elements)?;
     let surface = &recording.surface;
-    writeln!(out, "  surface      {} nodes, {} triangles", surface.positions.len(), surface.triangles.len())?;
+    let embedded = match &recording.embedding {
+        Some(embedding) => format!(", embedded: moved by {} nodes of the mesh", embedding.model_nodes),
+        None => String::new(),
+    };
+    writeln!(
+        out,
+        "  surface      {} nodes, {} triangles{embedded}",
+        surface.positions.len(),
+        surface.triangles.len()
+    )?;
     let [low, high] = bounding_box_m(recording);
     let range = |axis: usize| format!("{:.4} … {:.4}", low[axis] + 0.0, high[axis] + 0.0);
     writeln!(out, "  extent       x {}, y {}, z {} m in the mesh file", range(0), range(1), range(2))?;

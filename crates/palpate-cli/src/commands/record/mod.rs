@@ -107,6 +107,9 @@ pub struct Arguments {
     /// Side of the cells that a surface is filled with [m]: tetrahedra have edges of 0.87 to 1 of it. Without it about 2,000 nodes come out
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub cell_size: Option<f64>,
+    /// Surface to be seen and touched: a mesh file, in the unit of SOURCE, that is embedded in the tetrahedra and may be much finer, often that which SOURCE names. Without it the boundary of the tetrahedra
+    #[arg(long, value_name = "FILE", conflicts_with = "dense")]
+    pub surface: Option<PathBuf>,
     /// Fix nodes: a named group of the mesh, a condition such as 'x<0.001' or 'y>0.1 & z<=0' on its coordinates in metres, after --scale, or the words of --touchable; may be repeated. Axes before a colon hold these alone, as rollers do: 'z: z<0.001'. A box: or sphere: is about the origin. Mid-edge nodes of --order 2 count as nodes, each by its own place; in a group they are where the file has them, or else where both ends of their edge are
     #[arg(long, value_name = "[AXES:] GROUP|CONDITION")]
     pub fix: Vec<String>,
@@ -191,7 +194,10 @@ pub fn record(arguments: &Arguments) -> Result<(), Failure> {
     // A dry run writes no recording: standard output has its estimate.
     let output_is_taken = takes_output(&[("-o", output)], arguments.json && !arguments.dry_run)?;
     let inputs: Vec<&Path> =
-        [Some(Path::new(&arguments.source)), arguments.materials.as_deref()].into_iter().flatten().collect();
+        [Some(Path::new(&arguments.source)), arguments.materials.as_deref(), arguments.surface.as_deref()]
+            .into_iter()
+            .flatten()
+            .collect();
     if let Some(output) = output.filter(|_| !output_is_taken) {
         check_writable(output, &inputs)?;
     }
@@ -243,6 +249,7 @@ fn options(arguments: &Arguments) -> Result<RecordOptions, Failure> {
         order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
         scale: arguments.scale,
         meshing: MeshingParameters { cell_size: arguments.cell_size, nodes: None },
+        surface: arguments.surface.clone(),
         repair: Repair {
             merge_nodes: arguments.merge_nodes.into(),
             piece: arguments.piece.unwrap_or_default(),

@@ -1,0 +1,306 @@
+//! The recorded surface and the nodes of the finite element model that carry it: the boundary with its own nodes, or a finer surface that is
+//! embedded in the elements.
+//!
+//! A node v of an embedded surface moves with the nodes a of the element that it lies in, or of one that it is near to:
+//!
+//! ```text
+//! w_va = N_a(λ') + (λ − λ')_a
+//! ```
+//!
+//! λ are the barycentric coordinates of v, and λ' the same, or those of a point on the boundary where v is near to it or outside: from there the
+//! displacements are continued linearly, by the corners of the element. The weights sum to 1, and translations, rotations and uniform strains of the
+//! model are those of the surface. So a surface that follows the boundary is carried by the nodes of the boundary and the corners next to them, and
+//! not by the other nodes of quadratic elements, which would make the residual compliance several times larger.
+//!
+//! Equations: docs/theory.md (C85).
+
+use crate::discretisation::Discretisation;
+use crate::record_error::RecordError;
+use glam::{DMat3, DVec3};
+use palpate::{Embedding, Surface};
+use palpate_mesh::SurfaceMesh;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Surface of a recording, with the nodes of the model that carry it.
+pub(crate) struct Carriers {
+    /// Surface in the frame of the mesh.
+    pub(crate) surface: Surface,
+    /// Nodes of the model that carry the surface, ascending: its own, or those that it is embedded in.
+    pub(crate) nodes: Vec<u32>,
+    /// Weights of these nodes for an embedded surface; mode shapes and sag are empty.
+    pub(crate) embedding: Option<Embedding>,
+    /// Mean edge of the model's boundary [m].
+    pub(crate) mean_edge: f64,
+}
+
+/// Weight below which a node does not carry a surface node [1]: round-off of barycentric coordinates.
+const ROUND_OFF: f64 = 1e-9;
+
+/// Distance from an element, in barycentric coordinates, up to which its displacements are continued: its own size.
+const REACH: f64 = 1.0;
+
+/// Barycentric distance from a face of the boundary up to which a node is carried by it: on it there is no difference, and at a half of the element
+/// the displacements differ by those of mid-edge nodes from the mean of their corners.
+const NEAR: f64 = 0.1;
+
+/// Iterations of Newton's method for the coordinates in a curved element; an affine one takes one.
+const ITERATIONS: usize = 8;
+
+impl Carriers {
+    /// Carriers of an embedded surface, or of the boundary.
+    ///
+    /// # Errors
+    /// [`RecordError::SurfaceOutside`] for a node that is farther from all elements than they are large.
+    pub(crate) fn new(
+        discretisation: &Discretisation,
+        embedded: Option<&SurfaceMesh>,
+    ) -> Result<Self, RecordError> {
+        embedded.map_or_else(
+            || Ok(Self::boundary(discretisation)),
+            |surface| Self::embedded(discretisation, surface),
+        )
+    }
+
+    fn boundary(discretisation: &Discretisation) -> Self {
+        let nodes = discretisation.surface_nodes();
+        let mut number = vec![0_u32; discretisation.nodes.len()];
+        (0..).zip(&nodes).for_each(|(at, &node)| number[node as usize] = at);
+        let surface = Surface {
+            positions: nodes.iter().map(|&node| discretisation.nodes[node as usize]).collect(),
+            triangles: discretisation.triangles.iter().map(|t| t.map(|node| number[node as usize])).collect(),
+            source_nodes: nodes.iter().map(|&node| discretisation.source_nodes[node as usize]).collect(),
+        };
+        let mean_edge = surface.mean_edge();
+        Self { surface, nodes, embedding: None, mean_edge }
+    }
+
+    fn embedded(discretisation: &Discretisation, surface: &SurfaceMesh) -> Result<Self, RecordError> {
+        let tree = ElementTree::new(discretisation);
+        let of_node = |(node, &position): (usize, &DVec3)| tree.weights(node, position);
+        let weights: Vec<_> = surface.positions.par_iter().enumerate().map(of_node).collect::<Result<_, _>>()?;
+        let mut nodes: Vec<u32> = weights.iter().flatten().map(|(node, _)| *node).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut number = vec![0_u32; discretisation.nodes.len()];
+        (0..).zip(&nodes).for_each(|(at, &node)| number[node as usize] = at);
+        let mean_edge = Self::boundary(discretisation).mean_edge;
+        let mut embedding =
+            Embedding { model_nodes: nodes.len(), mean_edge, offsets: vec![0], ..Embedding::default() };
+        for of_node in weights {
+            embedding.nodes.extend(of_node.iter().map(|(node, _)| number[*node as usize]));
+            embedding.weights.extend(of_node.iter().map(|(_, weight)| *weight as f32));
+            embedding.offsets.push(embedding.nodes.len() as u32);
+        }
+        let positions = surface.positions.clone();
+        let source_nodes = (0..positions.len() as u32).collect();
+        let surface = Surface { positions, triangles: surface.triangles.clone(), source_nodes };
+        Ok(Self { surface, nodes, embedding: Some(embedding), mean_edge })
+    }
+
+    /// Surface in the body frame, whose origin is the centre of mass [m, mesh].
+    pub(crate) fn surface_about(&self, centre: DVec3) -> Surface {
+        let mut surface = self.surface.clone();
+        surface.positions.iter_mut().for_each(|position| *position -= centre);
+        surface
+    }
+
+    /// Indices of the carriers of a surface node, with their weights.
+    pub(crate) fn of(&self, surface_node: usize) -> Vec<(usize, f64)> {
+        match &self.embedding {
+            None => vec![(surface_node, 1.0)],
+            Some(embedding) => embedding.of(surface_node).collect(),
+        }
+    }
+}
+
+/// Tree of bounding boxes over the elements of a model.
+struct ElementTree<'a> {
+    discretisation: &'a Discretisation,
+    /// Whether the face opposite to each corner of an element is on the boundary.
+    on_boundary: Vec<[bool; 4]>,
+    /// Elements, leaf after leaf.
+    order: Vec<u32>,
+    boxes: Vec<Part>,
+}
+
+/// Part of the tree: a leaf, or one whose first half follows it.
+struct Part {
+    low: DVec3,
+    high: DVec3,
+    /// Elements in the order of the tree.
+    range: std::ops::Range<usize>,
+    /// Index of the second half; none of a leaf.
+    second: Option<usize>,
+}
+
+/// Elements in a leaf.
+const LEAF: usize = 4;
+
+/// Coordinates of a point in an element.
+#[derive(Clone, Copy)]
+struct Coordinates {
+    element: u32,
+    /// λ' and λ.
+    within: [f64; 4],
+    point: [f64; 4],
+    /// Distance of the point from the element [m].
+    distance: f64,
+}
+
+impl Coordinates {
+    /// Distance in barycentric coordinates: how far displacements are continued.
+    fn reach(&self) -> f64 {
+        self.within.iter().zip(self.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// Measure of how well an element suits a point [m]: its distance, longer for an element that is flat in this direction.
+    fn measure(&self) -> f64 {
+        self.distance * (1.0 + self.reach())
+    }
+}
+
+impl<'a> ElementTree<'a> {
+    fn new(discretisation: &'a Discretisation) -> Self {
+        let mut order: Vec<u32> = (0..discretisation.regions.len() as u32).collect();
+        let extents: Vec<[DVec3; 2]> = discretisation
+            .element_nodes()
+            .map(|nodes| {
+                let at = |node: &u32| discretisation.nodes[*node as usize];
+                let all = || nodes.iter().map(at);
+                [all().fold(DVec3::INFINITY, DVec3::min), all().fold(DVec3::NEG_INFINITY, DVec3::max)]
+            })
+            .collect();
+        let mut boxes = Vec::new();
+        divide(&mut order, 0, &extents, &mut boxes);
+        Self { discretisation, on_boundary: boundary_faces(discretisation), order, boxes }
+    }
+
+    /// Nodes of the model that a surface node moves with, and their weights.
+    fn weights(&self, surface_node: usize, position: DVec3) -> Result<Vec<(u32, f64)>, RecordError> {
+        let mut best: Option<Coordinates> = None;
+        self.search(0, position, &mut best);
+        let outside = |distance: f64| RecordError::SurfaceOutside { node: surface_node, position, distance };
+        let found = best.ok_or_else(|| outside(f64::INFINITY))?;
+        if !(found.reach() <= REACH) {
+            return Err(outside(found.distance));
+        }
+        let faces = self.on_boundary[found.element as usize];
+        let nearest = (0..4).filter(|&k| faces[k] && found.within[k] <= NEAR);
+        let face = nearest.min_by(|&a, &b| found.within[a].total_cmp(&found.within[b]));
+        let mut from = found.within;
+        if let Some(face) = face {
+            from[face] = 0.0;
+            let sum: f64 = from.iter().sum();
+            from = from.map(|x| x / sum);
+        }
+        let shapes = self.discretisation.order.shapes(from).into_iter();
+        let weights = shapes.enumerate().map(|(at, (value, _))| {
+            value + if at < 4 { found.point[at] - from[at] } else { 0.0 }
+        });
+        let nodes = self.nodes_of(found.element).iter().copied();
+        Ok(nodes.zip(weights).filter(|(_, weight)| weight.abs() > ROUND_OFF).collect())
+    }
+
+    fn nodes_of(&self, element: u32) -> &'a [u32] {
+        let count = self.discretisation.order.nodes();
+        &self.discretisation.elements[element as usize * count..(element as usize + 1) * count]
+    }
+
+    fn search(&self, part: usize, point: DVec3, best: &mut Option<Coordinates>) {
+        let Some(Part { low, high, range, second }) = self.boxes.get(part) else { return };
+        let least = (point - point.clamp(*low, *high)).length();
+        if best.is_some_and(|best| best.measure() <= least) {
+            return;
+        }
+        match second {
+            None => {
+                for &element in &self.order[range.clone()] {
+                    let found = self.coordinates(element, point);
+                    if best.is_none_or(|best| found.measure() < best.measure()) {
+                        *best = Some(found);
+                    }
+                }
+            }
+            Some(second) => {
+                let to = |part: usize| {
+                    let Part { low, high, .. } = &self.boxes[part];
+                    (point - point.clamp(*low, *high)).length()
+                };
+                let halves = if to(part + 1) <= to(*second) { [part + 1, *second] } else { [*second, part + 1] };
+                halves.into_iter().for_each(|half| self.search(half, point, best));
+            }
+        }
+    }
+
+    /// Coordinates of a point in an element, by Newton's method from its centroid.
+    fn coordinates(&self, element: u32, point: DVec3) -> Coordinates {
+        let order = self.discretisation.order;
+        let nodes = self.nodes_of(element);
+        let at = |of: &dyn Fn(&(f64, [f64; 4])) -> f64, within: [f64; 4]| -> DVec3 {
+            let shapes = order.shapes(within);
+            shapes.iter().zip(nodes).map(|(shape, node)| self.discretisation.nodes[*node as usize] * of(shape)).sum()
+        };
+        let (mut within, mut coordinates) = ([0.25; 4], [0.25; 4]);
+        for _ in 0..ITERATIONS {
+            let from = at(&|(value, _)| *value, within);
+            let slope = |k: usize| at(&|(_, slopes)| slopes[k], within);
+            let last = slope(3);
+            let jacobian = DMat3::from_cols(slope(0) - last, slope(1) - last, slope(2) - last);
+            let step = jacobian.inverse() * (point - from);
+            let by = [step.x, step.y, step.z, -(step.x + step.y + step.z)];
+            coordinates = std::array::from_fn(|k| within[k] + by[k]);
+            let positive = coordinates.map(|x| x.max(0.0));
+            let sum: f64 = positive.iter().sum();
+            let next = positive.map(|x| x / sum);
+            let change = next.iter().zip(within).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            within = next;
+            if change < ROUND_OFF {
+                break;
+            }
+        }
+        let distance = (point - at(&|(value, _)| *value, within)).length();
+        // NaN of a degenerate element is farther than any other.
+        let distance = if distance.is_nan() { f64::INFINITY } else { distance };
+        let is_within = coordinates.iter().all(|x| *x >= 0.0);
+        Coordinates { element, within, point: coordinates, distance: if is_within { 0.0 } else { distance } }
+    }
+}
+
+/// Whether the face opposite to each corner of an element is on the boundary: no other element has it.
+fn boundary_faces(discretisation: &Discretisation) -> Vec<[bool; 4]> {
+    let face = |nodes: &[u32], opposite: usize| {
+        let mut corners = [nodes[(opposite + 1) % 4], nodes[(opposite + 2) % 4], nodes[(opposite + 3) % 4]];
+        corners.sort_unstable();
+        corners
+    };
+    let mut uses: HashMap<[u32; 3], u32> = HashMap::new();
+    for nodes in discretisation.element_nodes() {
+        (0..4).for_each(|k| *uses.entry(face(nodes, k)).or_default() += 1);
+    }
+    let of_element = |nodes: &[u32]| std::array::from_fn(|k| uses[&face(nodes, k)] == 1);
+    discretisation.element_nodes().map(of_element).collect()
+}
+
+/// Divide elements at the median of the longest side of their box; gives the index of the part.
+fn divide(order: &mut [u32], first: usize, extents: &[[DVec3; 2]], boxes: &mut Vec<Part>) -> usize {
+    let own = boxes.len();
+    let of = || order.iter().map(|&element| extents[element as usize]);
+    let low = of().fold(DVec3::INFINITY, |low, [other, _]| low.min(other));
+    let high = of().fold(DVec3::NEG_INFINITY, |high, [_, other]| high.max(other));
+    boxes.push(Part { low, high, range: first..first + order.len(), second: None });
+    if order.len() > LEAF {
+        let size = (high - low).to_array();
+        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+        let middle = |element: &u32| {
+            let [low, high] = extents[*element as usize];
+            low[axis] + high[axis]
+        };
+        let half = order.len() / 2;
+        order.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
+        let (a, b) = order.split_at_mut(half);
+        divide(a, first, extents, boxes);
+        boxes[own].second = Some(divide(b, first + half, extents, boxes));
+    }
+    own
+}
