@@ -144,7 +144,10 @@ fn file_bytes(
     is_compact: bool,
 ) -> u64 {
     let surface = &carriers.surface;
-    let weights = carriers.embedding.as_ref().map_or(0, |embedding| 4 * surface.positions.len() + 8 * embedding.weights.len());
+    let weights = carriers
+        .embedding
+        .as_ref()
+        .map_or(0, |embedding| 4 * surface.positions.len() + 8 * embedding.weights.len());
     let surface = 28 * surface.positions.len() + 12 * surface.triangles.len() + weights;
     let (surface, n, m) = (surface as u64, estimate.carriers as u64, estimate.modes as u64);
     let modes = if is_compact { 24 * m + 6 * n * m } else { 16 * m + 24 * n * m };

@@ -19,7 +19,8 @@ use crate::system::System;
 use glam::DVec3;
 use palpate::{
     COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, EMBEDDED_FORMAT_VERSIONS, Embedding,
-    FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording, Support,
+    FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording,
+    Support,
 };
 use palpate_mesh::{Mesh, SurfaceMesh};
 

@@ -36,7 +36,7 @@ pub use scenes::{
     GRAVITY_M_S2, energy_imbalance, finger, floor, grasp, half_extent, holding, model_and_state, object_at,
     scene, smoothstep, start_at, touching,
 };
-pub use subdivision::{subdivided, subdivided_near_field};
+pub use subdivision::{embedded, subdivided, subdivided_near_field};
 pub use waiting::wait_until;
 
 #[cfg(feature = "record")]

@@ -5,7 +5,10 @@
 //! and of S: `S(m, n) = ¼·Σ S(parents of m, parents of n)`.
 
 use glam::{DMat3, DVec3};
-use palpate::{Metadata, ModalBasis, NearField, Recording, ResidualCompliance, Surface};
+use palpate::{
+    EMBEDDED_FORMAT_VERSIONS, Embedding, GravityResponse, Metadata, ModalBasis, NearField, Recording,
+    ResidualCompliance, Surface,
+};
 use std::collections::HashMap;
 
 /// Radius of the near field of [`subdivided_near_field`], in mean edges of the new surface.
@@ -25,6 +28,30 @@ pub fn subdivided_near_field(coarse: &Recording) -> Recording {
     let (surface, parents) = split(&coarse.surface);
     let residual = ResidualCompliance::NearField(near_field(&surface, &parents, &coarse.residual));
     interpolated(coarse, surface, &parents, residual)
+}
+
+/// A body whose surface triangles are split in four once, and embedded in its nodes: each new one moves with its two parents.
+pub fn embedded(coarse: &Recording) -> Recording {
+    let (surface, parents) = split(&coarse.surface);
+    let embedding = Embedding {
+        model_nodes: coarse.surface.positions.len(),
+        // That of the new surface: kernels between patches are then those of the subdivided body.
+        mean_edge: surface.mean_edge(),
+        offsets: (0..=parents.len() as u32).map(|node| 2 * node).collect(),
+        nodes: parents.iter().flatten().map(|&node| node as u32).collect(),
+        weights: vec![0.5; 2 * parents.len()],
+        mode_shapes: coarse.modes.mode_shapes.clone(),
+        residual_displacements: coarse
+            .gravity
+            .as_ref()
+            .map(|gravity| gravity.residual_displacements.clone())
+            .unwrap_or_default(),
+    };
+    let format_version = EMBEDDED_FORMAT_VERSIONS[0];
+    let metadata = Metadata { certificate: None, format_version, ..coarse.metadata.clone() };
+    let mut fine = Recording { metadata, surface, sample_levels: Vec::new(), ..coarse.clone() };
+    fine.embed(embedding).expect("an embedding that fits");
+    fine
 }
 
 /// The split surface, and for every node the two nodes that it is the mean of (twice the same for one that was there).
@@ -63,9 +90,19 @@ fn interpolated(
         }
     }
     let modes = ModalBasis { mode_shapes, ..coarse.modes.clone() };
+    let mean = |values: &[f64], [a, b]: [usize; 2]| -> Vec<f64> {
+        (0..9).map(|at| 0.5 * (values[9 * a + at] + values[9 * b + at])).collect()
+    };
+    let gravity = coarse.gravity.as_ref().map(|gravity| GravityResponse {
+        residual_displacements: parents
+            .iter()
+            .flat_map(|&of| mean(&gravity.residual_displacements, of))
+            .collect(),
+        ..gravity.clone()
+    });
     // The certificate states the errors of the coarse body.
     let metadata = Metadata { certificate: None, ..coarse.metadata.clone() };
-    Recording { metadata, surface, modes, residual, gravity: None, sample_levels: Vec::new(), embedding: None }
+    Recording { metadata, surface, modes, residual, gravity, sample_levels: Vec::new(), embedding: None }
 }
 
 /// S between all new nodes.

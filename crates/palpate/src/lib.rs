@@ -88,10 +88,10 @@ pub use object::{InitialDeformation, ObjectStart};
 pub use obstacle::{Obstacle, ObstacleMesh, Shape};
 pub use recording::{
     COMPACT_FORMAT_VERSION, Certificate, CertificateEvent, CertificateLevel, Column, ColumnsInMemory,
-    Damping, EMBEDDED_FORMAT_VERSIONS, Embedding, FORMAT_VERSION, GravityResponse, ImpulseColumns, ImpulseResponse, MAX_QUANTISED_NODES,
-    MassProperties, Material, MeshCounts, Metadata, ModalBasis, NearField, PeakForceError, Provenance,
-    QuantisedCompliance, Recording, ResidualCompliance, ResponseSeries, Sampling, Support, arrange_column,
-    round_mode_shape,
+    Damping, EMBEDDED_FORMAT_VERSIONS, Embedding, FORMAT_VERSION, GravityResponse, ImpulseColumns,
+    ImpulseResponse, MAX_QUANTISED_NODES, MassProperties, Material, MeshCounts, Metadata, ModalBasis,
+    NearField, PeakForceError, Provenance, QuantisedCompliance, Recording, ResidualCompliance,
+    ResponseSeries, Sampling, Support, arrange_column, round_mode_shape,
 };
 pub use response::{OscillatorState, ResponseForm, SampledOscillator, SampledResidual};
 pub use scene::{Model, ModelObject, ModelParameters, RigidCompliance};

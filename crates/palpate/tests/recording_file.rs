@@ -70,7 +70,7 @@ fn errors_have_a_kind_and_a_text() {
     };
     assert!(matches!(kind(b""), Some(RecordingError::Container { .. })));
     assert_eq!(kind(other), Some(RecordingError::NotARecording));
-    assert_eq!(kind(&newer), Some(RecordingError::UnsupportedVersion { found: 9, supported: 2 }));
+    assert_eq!(kind(&newer), Some(RecordingError::UnsupportedVersion { found: 9, supported: 4 }));
     let mut damaged = FREE.to_vec();
     damaged[FREE.len() - 1] ^= 1;
     assert_eq!(kind(&damaged), Some(RecordingError::HashMismatch));
@@ -79,7 +79,7 @@ fn errors_have_a_kind_and_a_text() {
         "not a usable recording: its content does not fit its hash: the file was damaged or changed after it was written"
     );
     assert!(
-        text(&newer).contains("format version 9, this palpate reads versions up to 2"),
+        text(&newer).contains("format version 9, this palpate reads versions up to 4"),
         "{}",
         text(&newer)
     );

@@ -38,7 +38,8 @@ pub(super) struct Place {
 /// Points spread over the surface by farthest-point sampling, points near the last of them, and patches. A fixed node has no compliance
 /// to compare, so none is sampled.
 pub(super) fn places(system: &System, surface: &Surface, carriers: &Carriers) -> Vec<Place> {
-    let movable = |node: usize| carriers.of(node).iter().all(|(at, _)| !system.holds_node(carriers.nodes[*at]));
+    let movable =
+        |node: usize| carriers.of(node).iter().all(|(at, _)| !system.holds_node(carriers.nodes[*at]));
     let positions = &surface.positions;
     let candidates: Vec<usize> = (0..positions.len()).filter(|&node| movable(node)).collect();
     let mut nearest: Vec<f64> = positions.iter().map(|p| p.length()).collect();

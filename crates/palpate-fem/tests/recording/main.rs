@@ -1,6 +1,7 @@
 //! From a mesh to a recording: identities, closed forms and second routes for the results of `record`.
 
 mod bodies;
+mod embedded;
 mod plates;
 mod records;
 mod rescaled;

@@ -47,9 +47,10 @@ impl Default for LevelOfDetail {
 }
 
 impl LevelOfDetail {
-    /// Begin a step with so many contacts, with the next finer level if it is time to try it.
-    pub(super) fn begin(&mut self, step: u64, contacts: usize) {
-        self.is_trial = self.level > 0 && step - self.since >= self.trial_interval;
+    /// Begin a step with so many contacts, with the next finer level if it is time to try it; `finest` is the finest of the body.
+    pub(super) fn begin(&mut self, step: u64, contacts: usize, finest: usize) {
+        self.level = self.level.max(finest);
+        self.is_trial = self.level > finest && step - self.since >= self.trial_interval;
         if self.is_trial {
             (self.level, self.since) = (self.level - 1, step);
             self.replaced = if self.level == 0 { contacts } else { 0 };
@@ -162,7 +163,7 @@ mod tests {
     fn trials(steps: u64) -> Vec<u64> {
         let (mut detail, mut tried) = (LevelOfDetail { level: 2, ..LevelOfDetail::default() }, Vec::new());
         for step in 1..=steps {
-            detail.begin(step, 0);
+            detail.begin(step, 0, 0);
             if detail.is_trial {
                 assert!(detail.allowed(100) < 100);
                 tried.push(step);
@@ -175,9 +176,9 @@ mod tests {
     #[test]
     fn all_nodes_take_the_place_of_as_many_contacts() {
         let mut detail = LevelOfDetail { level: 1, ..LevelOfDetail::default() };
-        detail.begin(COLLISION.refine_after_steps, 121);
+        detail.begin(COLLISION.refine_after_steps, 121, 0);
         assert_eq!((detail.level, detail.allowed(48)), (0, 121));
-        detail.begin(COLLISION.refine_after_steps + 1, 121);
+        detail.begin(COLLISION.refine_after_steps + 1, 121, 0);
         assert_eq!(detail.allowed(48), 121, "they stay");
         detail.coarsen(COLLISION.refine_after_steps + 2);
         assert_eq!(detail.allowed(48), 48);
@@ -186,7 +187,7 @@ mod tests {
     #[test]
     fn a_coarser_level_is_tried_with_few_samples_only() {
         let mut detail = LevelOfDetail { level: 2, ..LevelOfDetail::default() };
-        detail.begin(COLLISION.refine_after_steps, 121);
+        detail.begin(COLLISION.refine_after_steps, 121, 0);
         assert_eq!(detail.level, 1);
         assert!(detail.allowed(48) < 48);
     }

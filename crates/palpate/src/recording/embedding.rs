@@ -71,9 +71,8 @@ impl Embedding {
 
     /// Check lengths, indices and weights.
     pub(super) fn validate(&self, surface_nodes: usize) -> Result<(), RecordingError> {
-        self.problem(surface_nodes).map_or(Ok(()), |what| {
-            Err(RecordingError::Inconsistent { part: RecordingPart::Surface, what })
-        })
+        self.problem(surface_nodes)
+            .map_or(Ok(()), |what| Err(RecordingError::Inconsistent { part: RecordingPart::Surface, what }))
     }
 
     fn problem(&self, surface_nodes: usize) -> Option<String> {
@@ -87,7 +86,9 @@ impl Embedding {
             || !offsets.is_sorted()
         {
             let count = nodes.len();
-            return Some(format!("embedding.offsets do not divide {count} weights between {surface_nodes} nodes"));
+            return Some(format!(
+                "embedding.offsets do not divide {count} weights between {surface_nodes} nodes"
+            ));
         }
         if weights.len() != nodes.len() {
             let (found, expected) = (weights.len(), nodes.len());
@@ -98,12 +99,14 @@ impl Embedding {
         }
         if let Some(at) = weights.iter().position(|weight| !(weight.abs() <= LARGEST_WEIGHT)) {
             let weight = weights[at];
-            return Some(format!("embedding.weights[{at}] is {weight:e}, expected -{LARGEST_WEIGHT} to {LARGEST_WEIGHT}"));
+            return Some(format!(
+                "embedding.weights[{at}] is {weight:e}, expected -{LARGEST_WEIGHT} to {LARGEST_WEIGHT}"
+            ));
         }
         let sum = |node: &usize| self.of(*node).map(|(_, weight)| weight).sum::<f64>();
-        (0..surface_nodes).find(|node| libm::fabs(sum(node) - 1.0) > SUM_TOLERANCE).map(|node| {
-            format!("embedding.weights of surface node {node} sum to {}, expected 1", sum(&node))
-        })
+        (0..surface_nodes)
+            .find(|node| libm::fabs(sum(node) - 1.0) > SUM_TOLERANCE)
+            .map(|node| format!("embedding.weights of surface node {node} sum to {}, expected 1", sum(&node)))
     }
 }
 

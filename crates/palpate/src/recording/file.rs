@@ -155,10 +155,8 @@ impl Recording {
             }
             ResidualCompliance::NearField(near) => {
                 tensors.push(("residual.radius", tensor_f64(&[1], [near.radius].into_iter())));
-                tensors.push((
-                    "residual.offsets",
-                    tensor_u32(&[model_nodes + 1], near.offsets.iter().copied()),
-                ));
+                tensors
+                    .push(("residual.offsets", tensor_u32(&[model_nodes + 1], near.offsets.iter().copied())));
                 tensors.push(("residual.nodes", tensor_u32(&[near.nodes.len()], near.nodes.iter().copied())));
                 tensors.push(("residual.blocks", tensor_f32(&[near.nodes.len(), 3, 3], &near.blocks)));
             }

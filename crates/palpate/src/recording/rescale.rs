@@ -10,7 +10,10 @@
 //! exactly, and the damping law gives ζ′ = ζ(ω′).
 
 use super::residual::ResidualCompliance;
-use super::{Certificate, Damping, EMBEDDED_FORMAT_VERSIONS, FORMAT_VERSION, MassProperties, Material, Recording, Support};
+use super::{
+    Certificate, Damping, EMBEDDED_FORMAT_VERSIONS, FORMAT_VERSION, MassProperties, Material, Recording,
+    Support,
+};
 use crate::error::{Error, RecordingError};
 use alloc::string::String;
 use libm::sqrt;
@@ -71,7 +74,11 @@ impl Recording {
         let modes = &mut rescaled.modes;
         let shape = 1.0 / sqrt(b);
         let of_model = rescaled.embedding.as_mut().map(|embedding| &mut embedding.mode_shapes);
-        [Some(&mut modes.mode_shapes), of_model].into_iter().flatten().flatten().for_each(|phi| *phi *= shape);
+        [Some(&mut modes.mode_shapes), of_model]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .for_each(|phi| *phi *= shape);
         rescaled.residual.scale(1.0 / a);
         rescaled.validate()?;
         Ok(rescaled)

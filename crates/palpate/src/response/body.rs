@@ -34,6 +34,8 @@ pub(crate) struct Body {
     bounds: Bounds,
     /// Mean edge length of the triangles at rest [m].
     pub(crate) edge: f64,
+    /// Distance below which contacts depend on one another [m]: between the model's nodes, of an embedded surface; 0 of others.
+    pub(crate) node_spacing: f64,
     /// Triangles around every surface node, node after node, and the index of each node's first.
     around: Vec<u32>,
     first_around: Vec<u32>,
@@ -63,6 +65,7 @@ impl Body {
         let mut patches: Vec<PatchField> =
             radii.iter().map(|&radius| PatchField::new(&recording, &tree, radius)).collect();
         let edge = recording.surface.mean_edge();
+        let node_spacing = recording.embedding.as_ref().map_or(0.0, |embedding| embedding.mean_edge);
         let normals = node_normals(&recording.surface);
         let heights = smooth_heights(&recording.surface, recording.surface_order());
         let max_height = heights.iter().copied().fold(0.0, f64::max);
@@ -90,6 +93,7 @@ impl Body {
             tree,
             bounds,
             edge,
+            node_spacing,
             around,
             first_around,
             normals,
@@ -169,6 +173,13 @@ impl Body {
                 (1..=self.levels).contains(&level).then_some(level)
             }
         }
+    }
+
+    /// Finest level of detail that its finite elements resolve: all nodes, or of an embedded surface the samples that are as far apart as the model's nodes.
+    /// Contacts that are closer to each other depend on one another.
+    pub(crate) fn finest_level(&self) -> usize {
+        let spacing = |level: usize| self.patch_radius(self.footprint_at_level(level));
+        (0..self.levels).find(|&level| spacing(level) >= self.node_spacing).unwrap_or(self.levels)
     }
 
     /// Coarsest level of detail.

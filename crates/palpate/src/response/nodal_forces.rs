@@ -117,7 +117,8 @@ impl NodalForces {
         let sum = || {
             let recording = &body.recording;
             let at_nodes = self.loaded.iter();
-            let at_nodes = at_nodes.map(|&(other, force)| recording.residual_by_model_node(node, other as usize) * force);
+            let at_nodes = at_nodes
+                .map(|&(other, force)| recording.residual_by_model_node(node, other as usize) * force);
             let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
             let by_sample = |spring| body.residual_displacement(Footprint::Point, node, spring);
             at_nodes.chain(of_samples.map(by_sample)).sum()

@@ -68,7 +68,8 @@ impl PatchField {
         let radius = level.spacing;
         let order = recording.surface_order();
         let (weights, one_sided) = PatchWeights::of_samples(&recording.surface, order, radius, &level.nodes);
-        let vertices = SampleVertices::new(&recording.surface, level, (&weights, &one_sided), (normals, heights));
+        let vertices =
+            SampleVertices::new(&recording.surface, level, (&weights, &one_sided), (normals, heights));
         let weights = at_model_nodes(recording, weights);
         Self::averaged_at(recording, SampleSurface::new(recording, vertices, &weights), weights, radius)
     }

@@ -76,7 +76,7 @@ impl CollisionContext<'_> {
         let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
         let detail = &mut self.levels.against_obstacle(at, number).detail;
         let before_level = detail.level;
-        detail.begin(self.step, known.len());
+        detail.begin(self.step, known.len(), body.finest_level());
         let is_near = loop {
             query.level = detail.level;
             let footprint = body.footprint_at_level(query.level);

@@ -21,7 +21,10 @@ impl CollisionContext<'_> {
         let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
         let mut pair = self.levels.of_pair(objects, self.step);
-        pair.details.iter_mut().for_each(|detail| detail.begin(self.step, 0));
+        for (detail, &object) in pair.details.iter_mut().zip(&pair.objects) {
+            let body = &self.scene.objects[object].body;
+            detail.begin(self.step, 0, body.finest_level().min(body.coarsest_surface_level()));
+        }
         loop {
             let overlap = self.overlap(&pair);
             pair.is_near |= overlap.is_some();

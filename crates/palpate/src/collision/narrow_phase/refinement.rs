@@ -70,7 +70,14 @@ impl ObstacleQuery<'_> {
         let max_new = room.min(max_samples.saturating_mul(2).saturating_sub(added));
         for node in near_nodes.iter().map(|&node| node as usize).take(max_new) {
             let feature = FeatureId::of_node(0, node);
-            if candidates.list[first..].iter().any(|candidate| candidate.id.feature == feature) {
+            let is_beside = |location: &ContactLocation| {
+                location.footprint == Footprint::Point
+                    && (self.body.rest_position(location) - self.body.recording.surface.positions[node])
+                        .length()
+                        < self.body.node_spacing
+            };
+            let mut known = candidates.list[first..].iter();
+            if known.any(|other| other.id.feature == feature || is_beside(&other.location)) {
                 continue;
             }
             let over_step = [surface.position(node), surface.predicted_position(node)];
