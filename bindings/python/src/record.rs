@@ -130,7 +130,7 @@ pub fn record(
             other => return Err(refused(format!("order is {other}, expected 1 or 2"))),
         },
         scale,
-        meshing: MeshingParameters { cell_size, nodes: None },
+        meshing: MeshingParameters { cell_size, nodes: None, curved: false },
         surface,
         fix: texts(fix, "fix")?,
         spring: texts(spring, "spring")?,

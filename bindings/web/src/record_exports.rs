@@ -31,7 +31,11 @@ fn record(about: &str, content: &[u8]) -> Result<(), String> {
         name: about.get("name").and_then(Value::as_str).unwrap_or("the mesh").to_string(),
         bytes: content.to_vec(),
         scale: number("scale")?,
-        meshing: MeshingParameters { nodes: number("nodes").ok().map(|n| n as u32), cell_size: None },
+        meshing: MeshingParameters {
+            nodes: number("nodes").ok().map(|n| n as u32),
+            cell_size: None,
+            curved: false,
+        },
         material: Material::isotropic(number("young")?, number("poisson")?, number("density")?),
         modes: number("modes")? as usize,
     };

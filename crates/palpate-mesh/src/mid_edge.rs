@@ -93,6 +93,11 @@ impl QuadraticTet {
         coefficients
     }
 
+    /// Lower bound of the determinant of the Jacobian [m³].
+    pub(crate) fn least_determinant(&self) -> f64 {
+        self.bernstein_coefficients().into_iter().fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether the determinant of the Jacobian is positive: by its bound, or else at the points of a lattice.
     fn is_positive(&self) -> bool {
         let longest = EDGES.iter().map(|&[a, b]| (self.0[a] - self.0[b]).length()).fold(0.0, f64::max);

@@ -142,7 +142,8 @@ impl RecordingRecipe {
     /// # Errors
     /// When it cannot be read.
     pub fn mesh(&self, progress: &mut dyn Progress) -> Result<Mesh, SceneError> {
-        let mut mesh = read_body(&self.source, self.scale, &self.meshing, progress)?;
+        let meshing = MeshingParameters { curved: self.order == ElementOrder::Quadratic, ..self.meshing };
+        let mut mesh = read_body(&self.source, self.scale, &meshing, progress)?;
         mesh.repair(&Repair::default()).map_err(|error| self.refused(error))?;
         if self.order == ElementOrder::Quadratic && !self.fix.is_empty() {
             mesh.add_mid_edge_nodes();

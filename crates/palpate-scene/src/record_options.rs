@@ -107,7 +107,9 @@ impl RecordOptions {
             BodySource::Mesh(mesh, name) => (UnscaledBody::of_mesh(mesh, name), name.to_string()),
         };
         body.ask_unit(self.scale, progress);
-        let mut mesh = body.into_mesh(self.scale, &self.meshing, progress)?;
+        let curved = self.order == ElementOrder::Quadratic;
+        let meshing = MeshingParameters { curved, ..self.meshing };
+        let mut mesh = body.into_mesh(self.scale, &meshing, progress)?;
         mesh.is_unit_asked = true;
         mesh.repair(&self.repair).map_err(|error| refused(SceneErrorKind::Mesh, &name, error))?;
         if self.order == ElementOrder::Quadratic {
@@ -229,8 +231,10 @@ mod tests {
         surface.positions.iter().for_each(|p| off += &format!("{} {} {}\n", p.x, p.y, p.z));
         surface.triangles.iter().for_each(|[a, b, c]| off += &format!("3 {a} {b} {c}\n"));
         let modes_by_error = ErrorTarget { force_error: Some(0.5), ..ErrorTarget::default() };
-        let coarse =
-            RecordOptions { meshing: MeshingParameters { cell_size: Some(50.0), nodes: None }, ..options() };
+        let coarse = RecordOptions {
+            meshing: MeshingParameters { cell_size: Some(50.0), nodes: None, curved: false },
+            ..options()
+        };
         for (source, options) in [
             (BodySource::Mesh(mesh.clone(), "mine"), options()),
             (BodySource::Mesh(mesh, "mine"), RecordOptions { target: modes_by_error, ..options() }),

@@ -130,7 +130,7 @@ fn an_uploaded_mesh_is_read_by_its_content_and_its_repairs_are_told() {
     let surface = "OFF\n8 7 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n\
                    4 1 2 6 5\n4 2 3 7 6\n3 3 0 4\n3 3 7 4\n";
     let upload = MeshUpload {
-        meshing: MeshingParameters { cell_size: Some(0.03), nodes: None },
+        meshing: MeshingParameters { cell_size: Some(0.03), nodes: None, curved: false },
         ..upload("cube.stl", surface)
     };
     let (in_memory, repairs) = upload.record(&mut SilentProgress).expect("a recording");

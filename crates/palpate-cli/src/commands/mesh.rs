@@ -77,7 +77,7 @@ pub fn mesh(arguments: &Arguments) -> Result<(), Failure> {
     };
     let repair =
         Repair { merge_nodes: arguments.merge_nodes.into(), piece: arguments.piece.unwrap_or_default() };
-    let meshing = MeshingParameters { cell_size: arguments.cell_size, nodes: None };
+    let meshing = MeshingParameters { cell_size: arguments.cell_size, nodes: None, curved: true };
     let mut never = |_share| ControlFlow::Continue(());
     let (report, mesh) = MeshReport::new(file, arguments.scale, &repair, &meshing, &mut never);
     if arguments.json {

@@ -1,10 +1,11 @@
 //! From a closed surface to tetrahedra.
 //!
 //! The surface is repaired ([`prepare`]), a lattice is stuffed into it ([`stuffing`]), corners and edges of the boundary are moved onto
-//! sharp ones of the surface ([`creases`]), and the tetrahedra are smoothed ([`smoothing`]). Nothing is random: the same surface gives the
+//! sharp ones of the surface ([`creases`]), and the tetrahedra are smoothed ([`smoothing`]); elements of order 2 get curved edges ([`curving`]). Nothing is random: the same surface gives the
 //! same mesh, to the bit.
 
 mod creases;
+mod curving;
 mod fidelity;
 mod lattice;
 mod manifold;
@@ -58,6 +59,8 @@ pub struct MeshingParameters {
     pub cell_size: Option<f64>,
     /// About how many nodes the body gets without a cell size, more if it is thin. None for 2,000.
     pub nodes: Option<u32>,
+    /// Whether edges of the boundary follow the surface by mid-edge nodes on it, for elements of order 2.
+    pub curved: bool,
 }
 
 /// Report on a mesh that was made of a surface.
@@ -65,7 +68,7 @@ pub struct MeshingParameters {
 pub struct MeshingReport {
     /// Side of a cell [m].
     pub cell_size_m: f64,
-    /// Number of nodes.
+    /// Number of nodes, without those on curved edges.
     pub nodes: usize,
     /// Number of tetrahedra.
     pub tetrahedra: usize,
@@ -127,6 +130,9 @@ pub fn tetrahedralise(
         regions: vec![Region::default()],
         ..Mesh::default()
     };
+    if parameters.curved {
+        curving::curve(&mut mesh, &prepared.tree);
+    }
     watch.stage(1.0).at(0.0)?;
     let report = report(&mesh, &prepared, cell);
     mesh.warnings = prepared.warnings;
@@ -259,10 +265,10 @@ fn report(mesh: &Mesh, prepared: &Prepared, cell: f64) -> MeshingReport {
     for angle in mesh.tets.iter().flat_map(|tet| dihedral_angles(&mesh.nodes, tet)).map(f64::to_degrees) {
         (least, most) = (least.min(angle), most.max(angle));
     }
-    let volume: f64 = mesh.tets.iter().map(|tet| tet_volume(&mesh.nodes, tet)).sum();
+    let volume: f64 = mesh.tets.iter().map(|tet| mesh.quadratic_volume(tet)).sum();
     MeshingReport {
         cell_size_m: cell,
-        nodes: mesh.nodes.len(),
+        nodes: mesh.nodes.len() - mesh.mid_edge_nodes.len(),
         tetrahedra: mesh.tets.len(),
         dihedral_range_deg: [least, most],
         volume_error: (!prepared.overlaps).then(|| volume / prepared.volume - 1.0),

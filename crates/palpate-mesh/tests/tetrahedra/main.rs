@@ -16,7 +16,7 @@ const ANGLES_DEG: [f64; 2] = [25.0, 155.0];
 
 fn filled(surface: &SurfaceMesh, cell_size: Option<f64>) -> (Mesh, MeshingReport) {
     let watch = &mut |_| ControlFlow::Continue(());
-    tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None }, watch)
+    tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None, curved: false }, watch)
         .expect("a surface with an inside")
 }
 
@@ -89,7 +89,7 @@ fn a_body_has_about_as_many_nodes_as_are_asked_for() {
     for nodes in [150, 600, 5000] {
         for (name, surface) in [("ball", shapes::ball()), ("box", shapes::slab([0.1, 0.06, 0.04]))] {
             let watch = &mut |_| ControlFlow::Continue(());
-            let parameters = MeshingParameters { cell_size: None, nodes: Some(nodes) };
+            let parameters = MeshingParameters { cell_size: None, nodes: Some(nodes), curved: false };
             let (mesh, _) = tetrahedralise(&surface, &parameters, watch).expect("a surface with an inside");
             let share = mesh.nodes.len() as f64 / f64::from(nodes);
             assert!((0.7..1.4).contains(&share), "{name}: {} of {nodes}", mesh.nodes.len());

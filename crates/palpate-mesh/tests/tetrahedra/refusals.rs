@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 fn refusal(surface: &SurfaceMesh, cell_size: Option<f64>) -> String {
     let watch = &mut |_| ControlFlow::Continue(());
-    let result = tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None }, watch);
+    let result = tetrahedralise(surface, &MeshingParameters { cell_size, nodes: None, curved: false }, watch);
     result.expect_err("no inside").to_string()
 }
 
@@ -97,7 +97,7 @@ fn a_body_is_read_from_a_file_of_either_kind() {
     let read = |name: &str, text: String, cell_size: Option<f64>| {
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("a file");
-        read_body(&path, 0.001, &MeshingParameters { cell_size, nodes: None }, &mut |_| {
+        read_body(&path, 0.001, &MeshingParameters { cell_size, nodes: None, curved: false }, &mut |_| {
             ControlFlow::Continue(())
         })
     };

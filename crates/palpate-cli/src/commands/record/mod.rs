@@ -248,7 +248,7 @@ fn options(arguments: &Arguments) -> Result<RecordOptions, Failure> {
         target: ErrorTarget { force_error: arguments.force_error, bandwidth_hz: arguments.bandwidth },
         order: if arguments.order == 1 { ElementOrder::Linear } else { ElementOrder::Quadratic },
         scale: arguments.scale,
-        meshing: MeshingParameters { cell_size: arguments.cell_size, nodes: None },
+        meshing: MeshingParameters { cell_size: arguments.cell_size, nodes: None, curved: false },
         surface: arguments.surface.clone(),
         repair: Repair {
             merge_nodes: arguments.merge_nodes.into(),
