@@ -12,7 +12,7 @@
 //! model are those of the surface. So a surface that follows the boundary is carried by the nodes of the boundary and the corners next to them, and
 //! not by the other nodes of quadratic elements, which would make the residual compliance several times larger.
 //!
-//! Equations: docs/theory.md (C85).
+//! Equations: docs/theory.md (C89).
 
 use crate::discretisation::Discretisation;
 use crate::record_error::RecordError;

@@ -14,6 +14,7 @@ mod closed_loop;
 mod compliance;
 mod contact_samples;
 mod drop_block;
+mod embedded;
 mod fingers_hold;
 mod frequencies;
 mod friction;
@@ -204,6 +205,11 @@ pub const CASES: &[Case] = &[
         name: "tables",
         about: "six bodies thrown, on one another and pressed, by convolution with tables against the modal form",
         compute: tables::tables,
+    },
+    Case {
+        name: "embedded",
+        about: "fine surfaces embedded in coarse tetrahedra, and curved boundaries, against tetrahedra of half the size",
+        compute: embedded::embedded,
     },
     Case {
         name: "let-out",

@@ -114,7 +114,7 @@ const FILLED: f64 = 0.01;
 /// Modes of tetrahedra that a surface is filled with.
 fn filled_surface(exact: &[(&str, usize, f64)], shear_speed: f64) -> Result<Vec<Check>, VerifyError> {
     let surface = SurfaceMesh::from_boundary(ball_mesh(RADIUS, SURFACE_LAYERS)?)?;
-    let parameters = MeshingParameters { cell_size: Some(CELL * RADIUS), nodes: None, curved: false };
+    let parameters = MeshingParameters { cell_size: Some(CELL * RADIUS), nodes: None, curved: true };
     let (mesh, _) = tetrahedralise(&surface, &parameters, &mut |_| ControlFlow::Continue(()))?;
     let body = lowest(mesh, &undamped(YOUNG, POISSON, DENSITY, ElementOrder::Quadratic, 27))?;
     let modes: Vec<f64> = frequencies_hz(&body).into_iter().map(|f| f * TAU * RADIUS / shear_speed).collect();

@@ -8,7 +8,7 @@
 //! distributed to them by the same weights, so that the work is the same on both sides. Mode shapes, residual compliance and sag are recorded at
 //! the model's nodes: their size does not depend on the surface.
 //!
-//! Equations: docs/theory.md (C85).
+//! Equations: docs/theory.md (C89).
 
 use super::{GravityResponse, LARGEST, Recording};
 use crate::error::{RecordingError, RecordingPart};
