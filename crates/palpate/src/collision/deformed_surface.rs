@@ -225,7 +225,10 @@ impl<'a> DeformedSurface<'a> {
     }
 
     /// Position with the residual displacement of a node added [m], that of excluded contacts left out.
-    fn add_residual(&self, node: usize, modal: DVec3) -> DVec3 {
+    fn add_residual(&mut self, node: usize, modal: DVec3) -> DVec3 {
+        if self.footprint == Footprint::Point {
+            return self.add_residual_at_node(node, modal);
+        }
         let own = || self.own.iter().flatten();
         if self.body.is_tip(self.footprint) {
             let of_tips = self.tip_springs.iter().map(|&at| &self.spring_forces[at as usize]);
@@ -237,17 +240,31 @@ impl<'a> DeformedSurface<'a> {
             return modal + self.body.tip_displacement(self.footprint, node, forces);
         }
         let displacement = |force: &SpringForce| self.body.residual_displacement(self.footprint, node, force);
-        if self.footprint != Footprint::Point {
-            return modal + self.spring_forces.iter().map(displacement).sum::<DVec3>();
-        }
-        let mut position = modal + self.nodal.residual_displacement(self.body, self.spring_forces, node);
+        modal + self.spring_forces.iter().map(displacement).sum::<DVec3>()
+    }
+
+    /// The same for a node of the surface.
+    fn add_residual_at_node(&mut self, node: usize, modal: DVec3) -> DVec3 {
+        let (body, nodal, springs) = (self.body, self.nodal, self.spring_forces);
+        let residual = match (nodal.known(node), &body.recording.embedding) {
+            (Some(known), _) => known,
+            (None, None) => nodal.displacement_of_model_node(body, springs, node),
+            (None, Some(embedding)) => {
+                let carried = |(carrier, weight): (usize, f64)| {
+                    let compute = || nodal.displacement_of_model_node(body, springs, carrier);
+                    self.cache.carrier(carrier, compute) * weight
+                };
+                embedding.of(node).map(carried).sum()
+            }
+        };
+        let mut position = modal + residual;
         // Between nodes a point force's displacement has no shape: nodes beside an excluded contact move as it does.
-        for (own, own_displacement) in own() {
+        for (own, own_displacement) in self.own.iter().flatten() {
             let is_beside = |force: &&SpringForce| {
                 force.location == *own && (self.rest(node) - force.rest).length() < self.flat_radius
             };
-            if let Some(force) = self.spring_forces.iter().find(is_beside) {
-                position += *own_displacement - displacement(force);
+            if let Some(force) = springs.iter().find(is_beside) {
+                position += *own_displacement - body.residual_displacement(Footprint::Point, node, force);
             }
         }
         position

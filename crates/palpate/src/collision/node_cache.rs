@@ -41,6 +41,8 @@ pub(crate) struct NodePositionCache {
     predicted: Stamped<DVec3>,
     /// With residual displacement, now.
     total: Stamped<DVec3>,
+    /// Residual displacement of the model's nodes, of an embedded surface.
+    carriers: Stamped<DVec3>,
     /// Whether `total` leaves out the residual displacement of some contacts.
     excludes_own: bool,
     /// Step and footprint for which positions are kept; none within a step.
@@ -60,6 +62,10 @@ impl NodePositionCache {
             modal: positions(),
             predicted: positions(),
             total: positions(),
+            carriers: Stamped::new(
+                DVec3::ZERO,
+                body.recording.embedding.as_ref().map_or(0, |e| e.model_nodes),
+            ),
             excludes_own: false,
             key: None,
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
@@ -73,7 +79,7 @@ impl NodePositionCache {
     pub(super) fn select(&mut self, key: Option<(u64, Footprint)>) -> bool {
         let same = key.is_some() && self.key == key;
         if !same {
-            [&mut self.modal, &mut self.predicted].into_iter().for_each(Stamped::clear);
+            [&mut self.modal, &mut self.predicted, &mut self.carriers].into_iter().for_each(Stamped::clear);
             self.key = key;
         }
         if !same || self.excludes_own {
@@ -138,6 +144,16 @@ impl NodePositionCache {
 
     pub(super) fn set_total(&mut self, node: usize, position: DVec3) {
         self.total.set(node, position);
+    }
+
+    /// Residual displacement [m] of a model node of an embedded surface, computed once.
+    pub(super) fn carrier(&mut self, node: usize, compute: impl FnOnce() -> DVec3) -> DVec3 {
+        let known = self.carriers.get(node);
+        known.unwrap_or_else(|| {
+            let displacement = compute();
+            self.carriers.set(node, displacement);
+            displacement
+        })
     }
 
     /// Begin a traversal: no node is marked.

@@ -381,12 +381,20 @@ impl Body {
                 };
                 used(self.corners(location)).map(sum).sum()
             }
-            (None, Some(other)) => {
+            (None, Some(_)) => {
                 let of_model = self.recording.model_nodes_of(node);
-                let of = |sample: usize| other.to_nodes.averaged(sample, of_model.clone()).transpose();
-                used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
+                of_model.map(|(node, weight)| self.residual_of_model_node(node, location) * weight).sum()
             }
         }
+    }
+
+    /// Residual compliance [m/N] of a model node: its displacement per force at a contact sample; zero for patches of tips.
+    ///
+    /// # Real time
+    pub(super) fn residual_of_model_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
+        let Some(samples) = self.samples(location.footprint) else { return DMat3::ZERO };
+        let of = |sample: usize| samples.to_nodes.between(sample, node).transpose();
+        used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
     }
 
     /// Residual compliance between the contact samples of two levels, if it is precomputed.

@@ -109,21 +109,28 @@ impl NodalForces {
         sum
     }
 
-    /// Residual displacement of a node under these forces and the springs of contact samples [m, body].
+    /// Cached residual displacement of a surface node [m, body].
+    pub(crate) fn known(&self, node: usize) -> Option<DVec3> {
+        self.displacements[node]
+    }
+
+    /// Residual displacement of a model node under these forces and the springs of contact samples [m, body].
     ///
     /// # Real time
-    /// Costs the loaded nodes and the springs, unless it is cached.
-    pub(crate) fn residual_displacement(&self, body: &Body, springs: &[SpringForce], node: usize) -> DVec3 {
-        let sum = || {
-            let recording = &body.recording;
-            let at_nodes = self.loaded.iter();
-            let at_nodes = at_nodes
-                .map(|&(other, force)| recording.residual_by_model_node(node, other as usize) * force);
-            let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
-            let by_sample = |spring| body.residual_displacement(Footprint::Point, node, spring);
-            at_nodes.chain(of_samples.map(by_sample)).sum()
-        };
-        self.displacements[node].unwrap_or_else(sum)
+    /// Costs the loaded nodes and the springs.
+    pub(crate) fn displacement_of_model_node(
+        &self,
+        body: &Body,
+        springs: &[SpringForce],
+        node: usize,
+    ) -> DVec3 {
+        let residual = &body.recording.residual;
+        let at_nodes = self.loaded.iter();
+        let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
+        let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
+        let by_sample =
+            |spring: &SpringForce| body.residual_of_model_node(node, &spring.location) * spring.force;
+        at_nodes.chain(of_samples.map(by_sample)).sum()
     }
 
     /// Cache the residual displacement of a node [m, body].
