@@ -78,8 +78,9 @@ impl Carriers {
     fn embedded(discretisation: &Discretisation, surface: &SurfaceMesh) -> Result<Self, RecordError> {
         let tree = ElementTree::new(discretisation);
         let of_node = |(node, &position): (usize, &DVec3)| tree.weights(node, position);
-        let weights: Vec<_> =
-            surface.positions.par_iter().enumerate().map(of_node).collect::<Result<_, _>>()?;
+        // The first error, on any number of threads.
+        let weights: Vec<_> = surface.positions.par_iter().enumerate().map(of_node).collect();
+        let weights: Vec<_> = weights.into_iter().collect::<Result<_, _>>()?;
         let mut nodes: Vec<u32> = weights.iter().flatten().map(|(node, _)| *node).collect();
         nodes.sort_unstable();
         nodes.dedup();

@@ -56,6 +56,9 @@ pub enum TableError {
     /// The table has no sample.
     #[error("the table has 0 samples: the duration is shorter than a step")]
     NoSamples,
+    /// The surface is embedded: a table is between nodes of the finite elements.
+    #[error("a table has no embedded surface: record the boundary of the tetrahedra")]
+    EmbeddedSurface,
     /// The integrator has no step per sample.
     #[error("the integrator needs at least 1 step per sample")]
     NoSubsteps,
@@ -110,6 +113,9 @@ impl<'a> TableRecorder<'a> {
         }
         if parameters.samples == 0 {
             return Err(TableError::NoSamples);
+        }
+        if body.recording.embedding.is_some() {
+            return Err(TableError::EmbeddedSurface);
         }
         let damping = body.recording.metadata.damping;
         let method = match (parameters.method, damping) {

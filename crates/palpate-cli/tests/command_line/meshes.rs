@@ -216,3 +216,38 @@ fn a_surface_is_recorded_in_one_command() {
         "box.obj: cell size is -1 m, expected a positive number"
     );
 }
+
+#[test]
+fn a_surface_is_embedded_in_coarse_tetrahedra() {
+    let workplace = Workplace::new();
+    workplace.write("box.obj", obj_box([100.0, 50.0, 50.0], true));
+    let all = |options: &[&str]| -> Vec<String> {
+        let common = ["record", "box.obj", "--scale", "0.001", "--cell-size", "0.03", "--modes", "5"];
+        [&common[..], &MATERIAL, options].concat().into_iter().map(str::to_string).collect()
+    };
+    let run = |options: &[&str]| {
+        let all = all(options);
+        workplace.json(&all.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let json = run(&["--surface", "box.obj", "-o", "a.palp", "--json"]);
+    assert_eq!((&json["surface_nodes"], &json["format_version"]), (&8.into(), &4.into()));
+    let nodes = json["embedded_in_nodes"].as_u64().expect("a number");
+    assert!((8..=80).contains(&nodes), "{nodes}");
+    let line = format!("8 nodes, 12 triangles, embedded: moved by {nodes} nodes of the mesh");
+    assert!(workplace.succeed(&["inspect", "a.palp"]).contains(&line));
+    let estimate = run(&["--surface", "box.obj", "--dry-run", "--json"]);
+    assert_eq!(estimate["surface_nodes"], 8);
+    let fail = |options: &[&str]| {
+        let all = all(options);
+        workplace.fail(&all.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    workplace.write("far.obj", obj_box([100.0, 50.0, 500.0], true));
+    let error = fail(&["--surface", "far.obj", "-o", "b.palp"]);
+    let place = "of the embedded surface, at (0.1000, 0.0000, 0.5000) m, is 0.4";
+    assert!(error.contains(place) && error.contains("m outside of the tetrahedra"), "{error}");
+    workplace.write("tray.obj", obj_box([100.0, 50.0, 50.0], false));
+    let error = fail(&["--surface", "tray.obj", "-o", "b.palp"]);
+    assert!(error.contains("tray.obj: the surface is open: 4 edges"), "{error}");
+    let error = fail(&["--surface", "none.obj", "-o", "b.palp"]);
+    assert!(error.contains("none.obj"), "{error}");
+}

@@ -243,7 +243,7 @@ impl<'a> DeformedSurface<'a> {
         modal + self.spring_forces.iter().map(displacement).sum::<DVec3>()
     }
 
-    /// The same for a node of the surface.
+    /// Position of a node of the surface with its residual displacement added [m], that of excluded contacts left out.
     fn add_residual_at_node(&mut self, node: usize, modal: DVec3) -> DVec3 {
         let (body, nodal, springs) = (self.body, self.nodal, self.spring_forces);
         let residual = match (nodal.known(node), &body.recording.embedding) {
