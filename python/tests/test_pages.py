@@ -169,3 +169,31 @@ def test_logs_of_all_forms_are_read_as_the_package_reads_them(log):
         ours = [[step["devices"][name]["force"][axis] for axis in "xyz"] for _, _, step in messages["/step"]]
         assert np.array_equal(ours, known.forces[name])
     assert metadata["palpate"]["scene"] in files and len(messages["/tf"]) > 1
+
+
+def test_an_embedded_surface_is_read_as_the_page_says(tmp_path):
+    names = {}
+    exec(blocks("docs/formats.md")[0], names)
+    # The corners of a cube of eight cells, and triangles between them.
+    corners = [[x, y, z] for z in (-0.05, 0.05) for y in (-0.05, 0.05) for x in (-0.05, 0.05)]
+    faces = [(1, 3, 4, 2), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6), (5, 6, 8, 7)]
+    text = "".join("v {} {} {}\n".format(*corner) for corner in corners)
+    (tmp_path / "box.obj").write_text(text + "".join("f {} {} {} {}\n".format(*face) for face in faces))
+    cube = dict(young=2e4, poisson=0.3, density=1000, modes=6)
+    plain = palpate.record("box:0.1x0.1x0.1/2x2x2", **cube)
+    recording = palpate.record("box:0.1x0.1x0.1/2x2x2", surface=tmp_path / "box.obj", **cube)
+    assert recording.positions.shape == (8, 3)
+    recording.save(tmp_path / "cube.palp")
+    metadata, tensors = names["read_recording"](tmp_path / "cube.palp")
+    assert metadata["format_version"] == 4
+    shapes = names["mode_shapes"](tensors).reshape(8, 3, 6)
+    assert np.allclose(shapes, recording.mode_shapes, atol=1e-6 * abs(shapes).max())
+    carried = names["weights"](tensors)
+    assert np.allclose(carried.sum(axis=1), 1)
+    S = names["residual_compliance"](tensors).reshape(carried.shape[1], 3, carried.shape[1], 3)
+    S = np.einsum("na,axby,mb->nxmy", carried, S, carried).reshape(24, 24)
+    assert np.allclose(S, recording.residual_compliance(), atol=1e-6 * abs(S).max())
+    # A corner of the surface is one of the mesh. Modes of one frequency may be turned: what counts is the compliance.
+    nearest = [int(np.argmin(np.linalg.norm(plain.positions - p, axis=1))) for p in recording.positions]
+    own = abs(np.trace(S.reshape(8, 3, 8, 3)[0, :, 0, :]) / np.trace(plain.residual_compliance([nearest[0]])) - 1)
+    assert own < 1e-2

@@ -352,6 +352,7 @@ def record(
     order: Literal[1, 2] = 2,
     scale: float = 1.0,
     cell_size: float | None = None,
+    surface: str | PathLike[str] | None = None,
     fix: str | Sequence[str] | None = None,
     spring: str | Sequence[str] | None = None,
     merge_nodes: Literal["auto", "always", "never"] = "auto",

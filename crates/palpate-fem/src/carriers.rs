@@ -15,6 +15,7 @@
 //! Equations: docs/theory.md (C89).
 
 use crate::discretisation::Discretisation;
+use crate::element::ShapeFunction;
 use crate::record_error::RecordError;
 use glam::{DMat3, DVec3};
 use palpate::{Embedding, Surface};
@@ -184,7 +185,7 @@ impl<'a> ElementTree<'a> {
         self.search(0, position, &mut best);
         let outside = |distance: f64| RecordError::SurfaceOutside { node: surface_node, position, distance };
         let found = best.ok_or_else(|| outside(f64::INFINITY))?;
-        if !(found.reach() <= REACH) {
+        if found.distance.is_infinite() || found.reach() > REACH {
             return Err(outside(found.distance));
         }
         let faces = self.on_boundary[found.element as usize];
@@ -240,7 +241,7 @@ impl<'a> ElementTree<'a> {
     fn coordinates(&self, element: u32, point: DVec3) -> Coordinates {
         let order = self.discretisation.order;
         let nodes = self.nodes_of(element);
-        let at = |of: &dyn Fn(&(f64, [f64; 4])) -> f64, within: [f64; 4]| -> DVec3 {
+        let at = |of: &dyn Fn(&ShapeFunction) -> f64, within: [f64; 4]| -> DVec3 {
             let shapes = order.shapes(within);
             shapes
                 .iter()

@@ -18,9 +18,8 @@ use crate::supports::{self, Supports};
 use crate::system::System;
 use glam::DVec3;
 use palpate::{
-    COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, EMBEDDED_FORMAT_VERSIONS, Embedding,
-    FORMAT_VERSION, MIN_CONTACT_SAMPLES, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording,
-    Support,
+    COMPACT_FORMAT_VERSION, Certificate, CertificateLevel, Damping, EMBEDDED_FORMAT_VERSIONS, FORMAT_VERSION,
+    MIN_CONTACT_SAMPLES, Material, MeshCounts, Metadata, ModalBasis, Provenance, Recording, Support,
 };
 use palpate_mesh::{Mesh, SurfaceMesh};
 
@@ -228,12 +227,7 @@ fn record_body(
         embedding: None,
     };
     if let Some(embedding) = carriers.embedding {
-        let sag = recording.gravity.as_ref().map(|gravity| gravity.residual_displacements.clone());
-        recording.embed(Embedding {
-            mode_shapes: recording.modes.mode_shapes.clone(),
-            residual_displacements: sag.unwrap_or_default(),
-            ..embedding
-        })?;
+        recording.embed(embedding)?;
     }
     Ok(RecordedBody { recording, system, modes })
 }

@@ -40,12 +40,7 @@ pub fn embedded(coarse: &Recording) -> Recording {
         offsets: (0..=parents.len() as u32).map(|node| 2 * node).collect(),
         nodes: parents.iter().flatten().map(|&node| node as u32).collect(),
         weights: vec![0.5; 2 * parents.len()],
-        mode_shapes: coarse.modes.mode_shapes.clone(),
-        residual_displacements: coarse
-            .gravity
-            .as_ref()
-            .map(|gravity| gravity.residual_displacements.clone())
-            .unwrap_or_default(),
+        ..Embedding::default()
     };
     let format_version = EMBEDDED_FORMAT_VERSIONS[0];
     let metadata = Metadata { certificate: None, format_version, ..coarse.metadata.clone() };

@@ -46,7 +46,7 @@ fn check_equal([own, other]: &[Vec<Output>; 2]) -> f64 {
         let of_devices = output.devices.iter().map(|device| device.force_on_hand);
         of_devices.chain(output.objects.iter().map(|object| object.force)).collect()
     };
-    let largest = other.iter().flat_map(|output| forces(output)).map(DVec3::length).fold(0.0, f64::max);
+    let largest = other.iter().flat_map(&forces).map(DVec3::length).fold(0.0, f64::max);
     for (number, (a, b)) in own.iter().zip(other).enumerate() {
         for (at, (force, expected)) in forces(a).into_iter().zip(forces(b)).enumerate() {
             let apart = (force - expected).length();

@@ -5,6 +5,7 @@ use crate::system::System;
 use faer::Mat;
 use glam::{DMat3, DVec3};
 use palpate::{ResidualCompliance, Surface};
+use std::collections::BTreeMap;
 
 /// Number of sampled points that are spread over the surface: on a cube the corners, then a face.
 const SPREAD: usize = 9;
@@ -83,11 +84,13 @@ pub(super) fn places(system: &System, surface: &Surface, carriers: &Carriers) ->
     let patches = points[..SPREAD.min(points.len())].iter().rev().take(PATCHES).map(patch);
     let on_surface = points.iter().map(point).chain(patches);
     let carried = |place: Place| {
-        let nodes = place.nodes.iter();
-        let of_node = |&(node, weight): &(usize, f64)| {
-            carriers.of(node).into_iter().map(move |(at, share)| (at, share * weight))
-        };
-        Place { nodes: nodes.flat_map(of_node).collect(), ..place }
+        let mut sums = BTreeMap::new();
+        for &(node, weight) in &place.nodes {
+            for (at, share) in carriers.of(node) {
+                *sums.entry(at).or_insert(0.0) += share * weight;
+            }
+        }
+        Place { nodes: sums.into_iter().collect(), ..place }
     };
     on_surface.map(carried).collect()
 }

@@ -19,5 +19,6 @@ mod tet4;
 
 pub(crate) use elasticity::{Elasticity, ElementMatrices};
 pub use order::ElementOrder;
+pub(crate) use order::ShapeFunction;
 pub(crate) use quadrature::triangle as triangle_rule;
 pub(crate) use tet10::EDGES;

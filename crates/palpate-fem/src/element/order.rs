@@ -5,6 +5,9 @@ use super::{curved, tet4, tet10};
 use glam::DVec3;
 use palpate_mesh::QuadraticTet;
 
+/// Value of a shape function at a point, and its derivatives by the four barycentric coordinates [1].
+pub(crate) type ShapeFunction = (f64, [f64; 4]);
+
 /// Polynomial order of the tetrahedral elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ElementOrder {
@@ -23,8 +26,8 @@ impl ElementOrder {
         }
     }
 
-    /// Value of each node's shape function at a point of the element, and its derivatives by the four barycentric coordinates [1].
-    pub(crate) fn shapes(self, at: [f64; 4]) -> Vec<(f64, [f64; 4])> {
+    /// Shape functions of the nodes at a point of the element.
+    pub(crate) fn shapes(self, at: [f64; 4]) -> Vec<ShapeFunction> {
         match self {
             Self::Linear => (0..4).map(|a| (at[a], std::array::from_fn(|b| f64::from(a == b)))).collect(),
             Self::Quadratic => curved::shapes(&tet10::shape_functions(), at).to_vec(),

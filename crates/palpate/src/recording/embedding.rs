@@ -15,7 +15,7 @@ use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::iter::once;
+use core::{iter::once, mem::take};
 use glam::{DMat3, DVec3};
 
 /// Embedding of the surface nodes in the nodes of a finite element model. It holds what is recorded at these nodes; mode shapes and
@@ -97,7 +97,7 @@ impl Embedding {
         if let Some(node) = nodes.iter().find(|node| **node as usize >= *model_nodes) {
             return Some(format!("embedding.nodes name node {node}, beyond the model's {model_nodes} nodes"));
         }
-        if let Some(at) = weights.iter().position(|weight| !(weight.abs() <= LARGEST_WEIGHT)) {
+        if let Some(at) = weights.iter().position(|weight| weight.is_nan() || weight.abs() > LARGEST_WEIGHT) {
             let weight = weights[at];
             return Some(format!(
                 "embedding.weights[{at}] is {weight:e}, expected -{LARGEST_WEIGHT} to {LARGEST_WEIGHT}"
@@ -111,11 +111,12 @@ impl Embedding {
 }
 
 impl Recording {
-    /// Sets mode shapes and sag at the surface nodes from those of the embedding, which becomes the recording's.
+    /// Embeds the surface: the recording's mode shapes and sag, so far those of the model's nodes, become the embedding's, and those at the surface nodes
+    /// are made of them.
     ///
     /// # Errors
-    /// [`RecordingError::Inconsistent`] for an embedding whose lengths, indices or weights do not fit.
-    pub fn embed(&mut self, embedding: Embedding) -> Result<(), RecordingError> {
+    /// [`RecordingError::Inconsistent`] where lengths, indices or weights do not fit.
+    pub fn embed(&mut self, mut embedding: Embedding) -> Result<(), RecordingError> {
         embedding.validate(self.surface.positions.len())?;
         let (modes, model_nodes) = (self.modes.len(), embedding.model_nodes);
         let check = |name: &str, found: usize, expected: usize| {
@@ -123,7 +124,7 @@ impl Recording {
             let part = RecordingPart::Surface;
             if found == expected { Ok(()) } else { Err(RecordingError::Inconsistent { part, what }) }
         };
-        check("embedding.mode_shapes", embedding.mode_shapes.len(), 3 * model_nodes * modes)?;
+        check("modes.mode_shapes", self.modes.mode_shapes.len(), 3 * model_nodes * modes)?;
         let shapes = (3 * modes).saturating_mul(self.surface.positions.len());
         if shapes > MAX_SHAPES {
             let what = format!(
@@ -131,10 +132,12 @@ impl Recording {
             );
             return Err(RecordingError::Inconsistent { part: RecordingPart::Surface, what });
         }
-        let sags = if self.gravity.is_some() { 9 * model_nodes } else { 0 };
-        check("embedding.residual_displacements", embedding.residual_displacements.len(), sags)?;
+        embedding.mode_shapes = take(&mut self.modes.mode_shapes);
         self.modes.mode_shapes = embedding.at_surface(&embedding.mode_shapes, 3 * modes);
         if let Some(gravity) = &mut self.gravity {
+            let name = "gravity.residual_displacements";
+            check(name, gravity.residual_displacements.len(), 9 * model_nodes)?;
+            embedding.residual_displacements = take(&mut gravity.residual_displacements);
             gravity.residual_displacements = embedding.at_surface(&embedding.residual_displacements, 9);
         }
         self.embedding = Some(embedding);

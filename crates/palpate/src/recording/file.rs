@@ -16,7 +16,6 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
-use core::mem::take;
 use glam::DVec3;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors, View};
@@ -302,15 +301,13 @@ impl Recording {
         let mut recording =
             Self { metadata, surface, modes, residual, gravity, sample_levels, embedding: None };
         if is_embedded {
-            let sag = recording.gravity.as_mut().map(|gravity| take(&mut gravity.residual_displacements));
             let embedding = Embedding {
                 model_nodes,
                 mean_edge: tensors.f64("embedding.mean_edge")?.first().copied().unwrap_or(f64::NAN),
                 offsets: tensors.u32("embedding.offsets")?,
                 nodes: tensors.u32("embedding.nodes")?,
                 weights: tensors.f32("embedding.weights")?,
-                mode_shapes: take(&mut recording.modes.mode_shapes),
-                residual_displacements: sag.unwrap_or_default(),
+                ..Embedding::default()
             };
             recording.embed(embedding)?;
         }
