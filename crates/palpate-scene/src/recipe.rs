@@ -69,11 +69,11 @@ impl RecordingRecipe {
         }
     }
 
-    /// Recipe of a recording of a free primitive of one material; none for others.
+    /// Recipe of a recording of a free primitive of one material; none for others, and for an embedded surface.
     pub fn of(recording: &Recording) -> Option<Self> {
         let metadata = &recording.metadata;
         let source = &metadata.provenance.source;
-        let primitive = is_primitive(source);
+        let primitive = is_primitive(source) && recording.embedding.is_none();
         let [material] = metadata.materials.as_slice() else { return None };
         (primitive && metadata.support == Support::Free && material.stiffness_pa.is_none()).then(|| {
             let material = Material { region: String::new(), ..material.clone() };

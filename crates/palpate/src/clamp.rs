@@ -65,7 +65,7 @@ impl Clamp {
 
     /// Cells of its part of the surface.
     pub(crate) fn cells(&self, recording: &Recording) -> Vec<Cell> {
-        cells(&recording.surface, recording.metadata.mesh.order, &self.triangles, self.max_cells)
+        cells(&recording.surface, recording.surface_order(), &self.triangles, self.max_cells)
     }
 }
 
