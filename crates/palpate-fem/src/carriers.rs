@@ -137,6 +137,13 @@ struct Part {
     second: Option<usize>,
 }
 
+impl Part {
+    /// Distance of a point from the box [m]; 0 inside.
+    fn distance(&self, point: DVec3) -> f64 {
+        (point - point.clamp(self.low, self.high)).length()
+    }
+}
+
 /// Elements in a leaf.
 const LEAF: usize = 4;
 
@@ -211,14 +218,14 @@ impl<'a> ElementTree<'a> {
     }
 
     fn search(&self, part: usize, point: DVec3, best: &mut Option<Coordinates>) {
-        let Some(Part { low, high, range, second }) = self.boxes.get(part) else { return };
-        let least = (point - point.clamp(*low, *high)).length();
+        let Some(own) = self.boxes.get(part) else { return };
+        let least = own.distance(point);
         if best.is_some_and(|best| best.measure() <= least) {
             return;
         }
-        match second {
+        match own.second {
             None => {
-                for &element in &self.order[range.clone()] {
+                for &element in &self.order[own.range.clone()] {
                     let found = self.coordinates(element, point);
                     if best.is_none_or(|best| found.measure() < best.measure()) {
                         *best = Some(found);
@@ -226,12 +233,8 @@ impl<'a> ElementTree<'a> {
                 }
             }
             Some(second) => {
-                let to = |part: usize| {
-                    let Part { low, high, .. } = &self.boxes[part];
-                    (point - point.clamp(*low, *high)).length()
-                };
-                let halves =
-                    if to(part + 1) <= to(*second) { [part + 1, *second] } else { [*second, part + 1] };
+                let to = |part: usize| self.boxes[part].distance(point);
+                let halves = if to(part + 1) <= to(second) { [part + 1, second] } else { [second, part + 1] };
                 halves.into_iter().for_each(|half| self.search(half, point, best));
             }
         }

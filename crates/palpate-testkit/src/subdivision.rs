@@ -35,7 +35,7 @@ pub fn embedded(coarse: &Recording) -> Recording {
     let (surface, parents) = split(&coarse.surface);
     let embedding = Embedding {
         model_nodes: coarse.surface.positions.len(),
-        // That of the new surface: kernels between patches are then those of the subdivided body.
+        // Mean edge of the new surface, for the kernels between patches of the subdivided body.
         mean_edge: surface.mean_edge(),
         offsets: (0..=parents.len() as u32).map(|node| 2 * node).collect(),
         nodes: parents.iter().flatten().map(|&node| node as u32).collect(),

@@ -5,6 +5,7 @@
 //!
 //! Reference: Zienkiewicz, Taylor & Zhu, *The Finite Element Method*, 5.
 
+use super::ShapeFunction;
 use super::elasticity::{Elasticity, ElementMatrices};
 use super::quadrature::{self, Point};
 use super::tet10::{QuadraticForm, shape_functions};
@@ -12,7 +13,7 @@ use glam::{DMat3, DVec3};
 use palpate_mesh::QuadraticTet;
 
 /// Value of each shape function, and its derivatives by the four barycentric coordinates.
-pub(super) fn shapes(forms: &[QuadraticForm; 10], at: [f64; 4]) -> [(f64, [f64; 4]); 10] {
+pub(super) fn shapes(forms: &[QuadraticForm; 10], at: [f64; 4]) -> [ShapeFunction; 10] {
     forms.map(|form| {
         let half = form.map(|row| row.iter().zip(at).map(|(q, l)| q * l).sum::<f64>());
         (half.iter().zip(at).map(|(h, l)| h * l).sum(), half.map(|h| 2.0 * h))
