@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 use crate::warning::{Warning, WarningKind};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use palpate::{ModelObject, Pose, Shape, Support};
 
 /// Diagonal of an object [m] above which it looks as if given in millimetres.
@@ -20,6 +20,9 @@ const LONG_STEP_S: f64 = 0.1;
 
 /// Gravity [m/s²] above which it looks as if given in cm/s²: ten times that of the Earth.
 const LARGE_GRAVITY_M_S2: f64 = 100.0;
+
+/// Time of rest before sleep [s] above which it looks as if given in milliseconds.
+const LONG_REST_S: f64 = 50.0;
 
 /// Coefficients of friction [1] that look like per cent: rubber has at most 4, and larger ones than 100 mean that nothing slips.
 const FRICTION_PERCENT: std::ops::RangeInclusive<f64> = 5.0..=100.0;
@@ -50,6 +53,13 @@ pub(crate) fn check_units(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning
     };
     if parameters.step_s > LONG_STEP_S {
         let message = format!("the step is {} s long: it is in seconds, 0.001 for 1 ms", parameters.step_s);
+        warn("", message);
+    }
+    if parameters.sleep_after_s > LONG_REST_S && parameters.sleep_after_s.is_finite() {
+        let message = format!(
+            "sleep_after is {} s: it is in seconds, 0.5 for 500 ms; inf for objects that never sleep",
+            parameters.sleep_after_s
+        );
         warn("", message);
     }
     let gravity = parameters.gravity.length();
@@ -98,8 +108,49 @@ pub(crate) fn check_units(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning
             warn(name, message);
         }
     }
+    warnings.extend(weak_couplings(scene, objects));
+    warnings.extend(half_turns(scene, objects));
     warnings.extend(lifting_gravity(scene, objects));
     warnings
+}
+
+/// Warnings about couplings that stretch by more than the size of every free object under its weight: their stiffness looks as if given in
+/// N/mm.
+fn weak_couplings(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning> {
+    let gravity = scene.model.parameters().gravity.length();
+    let free = objects.iter().filter(|object| object.recording.metadata.support == Support::Free);
+    // Stiffness [N/m] that carries an object at a stretch of its diagonal.
+    let carrying = free.map(|object| object.recording.mass() * gravity / object.recording.surface.diagonal());
+    let least = carrying.fold(f64::INFINITY, f64::min);
+    let devices = scene.devices.iter().zip(&scene.model.parameters().devices);
+    let couplings = devices.filter_map(|(device, of)| Some((&device.name, of.coupling?.stiffness)));
+    let weak = couplings.filter(|(_, stiffness)| least.is_finite() && *stiffness < least);
+    weak.map(|(name, stiffness)| {
+        let message = format!(
+            "the coupling of {name:?} has a stiffness of {stiffness} N/m, and carries no object at less than a stretch of the object's size \
+             ({least:.2} N/m): if it is in N/mm, multiply it by 1000, and the damping too"
+        );
+        Warning::new(WarningKind::Units, name, message)
+    })
+    .collect()
+}
+
+/// Warnings about orientations that turn by half a turn about z exactly: (0, 0, 0, 1) looks as if its scalar part stood last.
+fn half_turns(scene: &Scene, objects: &[ModelObject]) -> Vec<Warning> {
+    let of_objects = scene.object_names.iter().zip(objects.iter().map(|object| object.start.pose));
+    let of_obstacles = scene.obstacles.iter().map(|obstacle| (&obstacle.name, obstacle.start));
+    let turned = of_objects
+        .chain(of_obstacles)
+        .filter(|(_, pose)| pose.orientation == DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0));
+    turned
+        .map(|(name, _)| {
+            let message = format!(
+                "the orientation of {name:?} is [0, 0, 0, 1], half a turn about z: the scalar part w stands first, [1, 0, 0, 0] turns \
+                 nothing; for half a turn write [0, 0, 0, -1]"
+            );
+            Warning::new(WarningKind::Units, name, message)
+        })
+        .collect()
 }
 
 /// Distance of an object from the nearest other object, plane or obstacle that rests [m], at least; infinite without any.

@@ -190,10 +190,36 @@ fn numbers_in_another_unit_get_a_warning_with_their_part() {
              millimetres, divide them by 1000"
         )
     };
+    let scene = read(object, "").expect("a scene");
+    let cube = scene.model.recordings().next().expect("a cube");
+    let carrying = cube.mass() * 9.81 / cube.surface.diagonal();
     let lengths =
         "and the objects span 0.245 m: lengths are in metres; if this is in millimetres, divide it by 1000";
     for (text, kind, part, message) in [
         (format!("step = 1.0\n{object}"), WarningKind::Units, "", "the step is 1 s long: it is in seconds, 0.001 for 1 ms".to_string()),
+        (
+            format!("sleep_after = 500.0\n{object}"),
+            WarningKind::Units,
+            "",
+            "sleep_after is 500 s: it is in seconds, 0.5 for 500 ms; inf for objects that never sleep".to_string(),
+        ),
+        (
+            format!("gravity = [0.0, 0.0, -9.81]\n{object}{}", finger("tip_radius = 0.01\ncoupling = { stiffness = 0.5, damping = 0.001 }")),
+            WarningKind::Units,
+            "finger",
+            format!(
+                "the coupling of \"finger\" has a stiffness of 0.5 N/m, and carries no object at less than a stretch of the object's size \
+                 ({carrying:.2} N/m): if it is in N/mm, multiply it by 1000, and the damping too"
+            ),
+        ),
+        (
+            format!("{object}orientation = [0.0, 0.0, 0.0, 1.0]\n"),
+            WarningKind::Units,
+            "cube",
+            "the orientation of \"cube\" is [0, 0, 0, 1], half a turn about z: the scalar part w stands first, [1, 0, 0, 0] turns nothing; for \
+             half a turn write [0, 0, 0, -1]"
+                .to_string(),
+        ),
         (
             format!("gravity = [0.0, 0.0, -981.0]\n{object}"),
             WarningKind::Units,
@@ -249,6 +275,15 @@ fn numbers_in_another_unit_get_a_warning_with_their_part() {
         format!("gravity = [0.0, 0.0, 9.81]\n{object}friction = 1e3\n{wall}"),
         format!("{object}{}", floor.replace("-0.05", "-5.0")),
         format!("{object}{}", finger("tip_radius = 0.01\npatch_radius = 0.2")),
+        format!("sleep_after = inf\n{object}orientation = [0.0, 0.0, 0.0, -1.0]\n"),
+        format!(
+            "gravity = [0.0, 0.0, -9.81]\n{object}{}",
+            finger("tip_radius = 0.01\ncoupling = { stiffness = 500.0, damping = 1.0 }")
+        ),
+        format!(
+            "gravity = [0.0, 0.0, 0.0]\n{object}{}",
+            finger("tip_radius = 0.01\ncoupling = { stiffness = 0.5, damping = 0.001 }")
+        ),
     ] {
         let warnings = read(&text, "").expect("a scene").warnings;
         let asked = |warning: &&Warning| matches!(warning.kind, WarningKind::Units | WarningKind::Gravity);
