@@ -29,7 +29,8 @@ const SOLVED: f64 = 1e-9;
 /// Half the block's length less a hundredth [m]: its corners are beyond.
 const AT_THE_CORNERS_M: f64 = 0.099;
 
-/// Relative difference of the forces of a grip by 48 samples and few nodes between them, and by all nodes [1].
+/// Relative difference of the forces of a grip by 48 samples with room for few nodes between them, and for all [1]: 0.35 to 0.63 where nodes
+/// take the room of samples.
 const GRIP: f64 = 0.05;
 
 fn block() -> Arc<Recording> {
@@ -165,9 +166,9 @@ fn nodes_between_contact_samples_leave_room_for_samples() {
     // contacts than room, and it slips out.
     const HALF_LENGTH_M: f64 = 0.1;
     const HALF_BOX_M: f64 = 0.05;
-    const PRESSED_M: f64 = 8e-3;
+    const PRESSED_M: f64 = 16e-3;
     let recording = Arc::new(subdivided(&free_block(), 3));
-    let grip = |max_contact_samples: usize, max_contact_points: usize| {
+    let grip = |max_contact_points: usize| {
         let shape = Shape::Box { half_extents: DVec3::splat(HALF_BOX_M) };
         let beside = |side: f64| at(DVec3::new(side * (HALF_LENGTH_M + HALF_BOX_M), HALF_BOX_M, 0.0));
         let jaws =
@@ -175,7 +176,7 @@ fn nodes_between_contact_samples_leave_room_for_samples() {
         let parameters = ModelParameters {
             gravity: GRAVITY,
             obstacles: [vec![floor(0.0)], jaws.to_vec()].concat(),
-            max_contact_samples,
+            max_contact_samples: 48,
             max_contact_points,
             ..ModelParameters::for_reference()
         };
@@ -196,9 +197,7 @@ fn nodes_between_contact_samples_leave_room_for_samples() {
         };
         [jaw(1), jaw(2)]
     };
-    let by_nodes = grip(usize::MAX, 1024);
-    let by_samples = grip(48, 120);
-    for (got, expected) in by_samples.into_iter().zip(by_nodes) {
+    for (got, expected) in grip(120).into_iter().zip(grip(1024)) {
         assert!((got - expected).abs() < GRIP * expected, "{got} N for {expected} N");
     }
 }
