@@ -9,7 +9,7 @@ use crate::motion::RigidIntegrator;
 use crate::object::{InitialDeformation, Object, ObjectRules, ObjectStart};
 use crate::obstacle::Obstacle;
 use crate::recording::{ImpulseResponse, Recording};
-use crate::response::ResponseForm;
+use crate::response::{ContactLimits, ResponseForm};
 use crate::surface::{Cell, MIN_CONTACT_SAMPLES};
 use alloc::boxed::Box;
 use alloc::format;
@@ -45,8 +45,8 @@ pub struct ModelParameters {
     pub obstacles: Vec<Obstacle>,
     /// Clamps: parts of surfaces that are held and moved by rigid frames.
     pub clamps: Vec<Clamp>,
-    /// Upper limit of contact points of one object; memory of 9·n² numbers. Contacts beyond it are dropped, and counted in the
-    /// status.
+    /// Upper limit of contact points of one object against planes, obstacles and other objects; memory of 9·n² numbers. Where nodes or samples
+    /// are more, coarser samples replace them; contacts that find no room all the same are dropped, and counted in the status.
     pub max_contact_points: usize,
     /// Upper limit of contact samples of an object against one obstacle or object. Where more surface nodes come near,
     /// Poisson-disk samples replace them, each with the patch around it.
@@ -193,13 +193,16 @@ impl Model {
             of_object.extend(clamp.cells(&objects[clamp.object].recording));
         }
         let patch_radii: Vec<f64> = parameters.devices.iter().map(|device| device.patch_radius).collect();
-        let uses_samples = parameters.uses_samples(objects.len());
+        let contact_limits = parameters.touches_surfaces(objects.len()).then_some(ContactLimits {
+            max_samples: parameters.max_contact_samples,
+            max_points: parameters.max_contact_points,
+        });
         let rules = ObjectRules {
             step_s: h,
             gravity: parameters.gravity,
             patch_radii: &patch_radii,
             cells: &[],
-            max_contact_samples: if uses_samples { parameters.max_contact_samples } else { usize::MAX },
+            contact_limits,
         };
         let given = objects;
         let mut objects: Vec<Object> = Vec::with_capacity(given.len());
@@ -353,15 +356,9 @@ impl ModelParameters {
         !self.obstacles.is_empty() || objects > 1
     }
 
-    /// Capacity of contact points of an object, by the number of objects: one held point and the tip contacts of every device, the
-    /// cells of its clamps, and the surface nodes where surfaces meet, within `max_contact_points`.
-    pub(crate) fn point_capacity(&self, object: &Object, objects: usize) -> usize {
-        let devices = self.devices.len();
-        let surface = if self.touches_surfaces(objects) {
-            object.body.recording.surface.positions.len().min(self.max_contact_points)
-        } else {
-            0
-        };
-        (1 + MAX_TIP_CONTACTS) * devices + object.body.cells() + surface
+    /// Capacity of contact points of an object: one held point and the tip contacts of every device, the cells of its clamps, and those of
+    /// its surface.
+    pub(crate) fn point_capacity(&self, object: &Object) -> usize {
+        (1 + MAX_TIP_CONTACTS) * self.devices.len() + object.body.cells() + object.body.surface_points
     }
 }

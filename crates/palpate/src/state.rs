@@ -114,7 +114,7 @@ impl Workspace {
     pub fn new(model: &Model) -> Self {
         let parameters = &model.parameters;
         let count = model.objects.len();
-        let contacts = (0..count).map(|at| parameters.point_capacity(&model.objects[at], count)).sum();
+        let contacts = (0..count).map(|at| parameters.point_capacity(&model.objects[at])).sum();
         Self {
             collision: CollisionWorkspace::new(model.collision_scene(), contacts),
             solver: Solver::new(
@@ -137,7 +137,7 @@ impl State {
         let devices = parameters.devices.len();
         let count = model.objects.len();
         let new_object =
-            |object| ObjectState::new(object, parameters.gravity, parameters.point_capacity(object, count));
+            |object| ObjectState::new(object, parameters.gravity, parameters.point_capacity(object));
         let objects: Vec<_> = model.objects.iter().map(new_object).collect();
         let object_outputs = model.objects.iter().zip(&objects).map(|(object, state)| ObjectOutput {
             pose: state.rigid.pose,
@@ -168,7 +168,10 @@ impl State {
             devices: vec![DeviceState::new(); devices],
             clamps: parameters.clamps.iter().map(|clamp| ClampState::new(clamp.frame)).collect(),
             contacts: BoundedVec::new(contacts),
-            levels: Levels::new(count, obstacles.len()),
+            levels: Levels::new(
+                model.objects.iter().map(|object| object.body.surface_points),
+                obstacles.len(),
+            ),
             sleepers: Sleepers::new(count),
             resting: Resting {
                 contacts: objects.iter().map(|own| BoundedVec::new(resting_contacts(own))).collect(),

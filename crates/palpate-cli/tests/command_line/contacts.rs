@@ -329,13 +329,19 @@ fn an_obstacle_on_a_path_pushes_a_cube() {
 #[test]
 fn contacts_without_room_are_told_of_and_the_run_goes_on() {
     let workplace = workplace();
-    workplace.write("scene.toml", format!("max_contact_points = 4\n{FLOOR}{}", object("[0.0, 0.052, 0.0]")));
+    let scene =
+        |points: u32| format!("max_contact_points = {points}\n{FLOOR}{}", object("[0.0, 0.052, 0.0]"));
     let arguments = ["run", "scene.toml", "--duration", "0.05"];
-    let summary = workplace.json(&[&arguments[..], &["--json"]].concat());
-    assert_eq!(summary["contacts"]["count_max"], 4);
-    assert!(summary["solver"]["dropped_contacts"].as_u64().is_some_and(|dropped| dropped >= 12), "{summary}");
+    let as_json = [&arguments[..], &["--json"]].concat();
+    // The coarsest contact samples of its face are its four corners.
+    for (points, dropped) in [(4, 0), (3, 1)] {
+        workplace.write("scene.toml", scene(points));
+        let summary = workplace.json(&as_json);
+        assert_eq!(summary["contacts"]["count_max"], points);
+        assert_eq!(summary["solver"]["dropped_contacts"], dropped);
+    }
     let text = workplace.succeed(&arguments);
-    assert!(text.contains(" at once: raise max_contact_points above 4\n"), "{text}");
+    assert!(text.contains(" at once: raise max_contact_points above 3\n"), "{text}");
 }
 
 #[test]

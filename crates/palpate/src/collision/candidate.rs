@@ -69,6 +69,11 @@ impl CandidateList {
         Mark { len: self.list.len(), dropped: self.dropped }
     }
 
+    /// Number of candidates pushed since a mark, those without room among them.
+    pub(crate) fn since(&self, mark: Mark) -> usize {
+        self.list.len() - mark.len + (self.dropped - mark.dropped) as usize
+    }
+
     /// Remove what was pushed since a mark.
     pub(crate) fn rewind(&mut self, mark: Mark) {
         self.list.truncate(mark.len);

@@ -7,6 +7,7 @@
 //! Equations: docs/theory.md (C30).
 
 use super::parameters::COLLISION;
+use super::point_budget::PointBudget;
 use crate::bounded_vec::BoundedVec;
 use crate::sleep::Sleepers;
 use crate::surface::Traversal;
@@ -81,6 +82,8 @@ pub(crate) struct ObstacleLevel {
     pub(super) detail: LevelOfDetail,
     /// Search for nodes that penetrate, a part of it in each step.
     pub(super) search: Traversal,
+    /// Contact points that it asks for.
+    pub(super) points: usize,
 }
 
 /// Two objects with their levels of detail against each other.
@@ -91,6 +94,8 @@ pub(super) struct ObjectPair {
     /// Last step in which their bounding boxes overlapped, and whether they could have met in it.
     step: u64,
     pub(super) is_near: bool,
+    /// Contact points that it asks for, of each object.
+    pub(super) points: usize,
 }
 
 /// Levels of detail of a scene.
@@ -101,18 +106,46 @@ pub(crate) struct Levels {
     obstacles: usize,
     /// Pairs of objects that are near each other, ascending.
     pairs: BoundedVec<ObjectPair>,
+    budget: PointBudget,
 }
 
 impl Levels {
-    pub(crate) fn new(objects: usize, obstacles: usize) -> Self {
-        let finest = ObstacleLevel { detail: LevelOfDetail::default(), search: Traversal::FINISHED };
+    /// Finest levels, of objects with so many contact points and of so many obstacles.
+    pub(crate) fn new(points: impl ExactSizeIterator<Item = usize>, obstacles: usize) -> Self {
+        let finest =
+            ObstacleLevel { detail: LevelOfDetail::default(), search: Traversal::FINISHED, points: 0 };
+        let objects = points.len();
         let room = PAIRS_PER_OBJECT.min(objects.saturating_sub(1)) * objects;
-        Self { of_obstacles: vec![finest; objects * obstacles], obstacles, pairs: BoundedVec::new(room) }
+        Self {
+            of_obstacles: vec![finest; objects * obstacles],
+            obstacles,
+            pairs: BoundedVec::new(room),
+            budget: PointBudget::new(points),
+        }
     }
 
     /// Level of an object against an obstacle.
     pub(super) fn against_obstacle(&mut self, object: usize, obstacle: usize) -> &mut ObstacleLevel {
         &mut self.of_obstacles[object * self.obstacles + obstacle]
+    }
+
+    /// Contact points that an object may use against an obstacle in a step that has begun.
+    pub(super) fn points_against_obstacle(&self, object: usize, obstacle: usize) -> usize {
+        let ObstacleLevel { detail, points, .. } = &self.of_obstacles[object * self.obstacles + obstacle];
+        self.budget.available(object, *points, detail.is_trial)
+    }
+
+    /// Keep how many contact points an object asks for against an obstacle.
+    pub(super) fn ask_against_obstacle(&mut self, object: usize, obstacle: usize, points: usize) {
+        let known = &mut self.of_obstacles[object * self.obstacles + obstacle].points;
+        self.budget.replace(object, core::mem::replace(known, points), points);
+    }
+
+    /// Contact points that each of two objects may use against the other in a step that has begun.
+    pub(super) fn points_of_pair(&self, pair: &ObjectPair) -> usize {
+        let is_trial = pair.details.iter().any(|detail| detail.is_trial);
+        let [a, b] = pair.objects.map(|object| self.budget.available(object, pair.points, is_trial));
+        a.min(b)
     }
 
     /// Two objects that are near each other in a step: at the finest levels, unless they were near in the last step, or have slept since then; what they have
@@ -123,22 +156,33 @@ impl Levels {
         if known.is_ok_and(|at| self.pairs[at].step + 1 < step) {
             details.iter_mut().for_each(|detail| detail.since = step);
         }
-        ObjectPair { objects, details, step, is_near: false }
+        let points = known.map_or(0, |at| self.pairs[at].points);
+        ObjectPair { objects, details, step, is_near: false, points }
     }
 
-    /// Keep the levels of two objects. Without room the next step begins with the finest.
+    /// Keep the levels of two objects, and how many contact points they ask for. Without room the next step begins with the finest.
     pub(super) fn keep_pair(&mut self, pair: ObjectPair) {
-        match self.pairs.binary_search_by(|known| known.objects.cmp(&pair.objects)) {
-            Ok(at) => self.pairs[at] = pair,
-            Err(at) if !self.pairs.is_full() => self.pairs.insert(at, pair),
-            Err(_) => {}
-        }
+        let before = match self.pairs.binary_search_by(|known| known.objects.cmp(&pair.objects)) {
+            Ok(at) => core::mem::replace(&mut self.pairs[at], pair.clone()).points,
+            Err(_) if self.pairs.is_full() => return,
+            Err(at) => {
+                self.pairs.insert(at, pair.clone());
+                0
+            }
+        };
+        pair.objects.into_iter().for_each(|object| self.budget.replace(object, before, pair.points));
     }
 
     /// Forget the pairs that were not near in a step, but those of sleeping objects.
     pub(super) fn forget_pairs(&mut self, step: u64, sleepers: &Sleepers) {
-        let rests = |pair: &ObjectPair| pair.objects.iter().all(|&at| !sleepers.is_awake(at));
-        self.pairs.retain(|pair| pair.step == step || rests(pair));
+        let Self { pairs, budget, .. } = self;
+        pairs.retain(|pair| {
+            let is_kept = pair.step == step || pair.objects.iter().all(|&at| !sleepers.is_awake(at));
+            if !is_kept {
+                pair.objects.into_iter().for_each(|object| budget.replace(object, pair.points, 0));
+            }
+            is_kept
+        });
     }
 
     /// Keep the levels of an object against obstacles in the step in which it wakes, as those of pairs are.

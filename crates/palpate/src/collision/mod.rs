@@ -13,6 +13,7 @@ mod level_of_detail;
 mod narrow_phase;
 mod node_cache;
 mod parameters;
+mod point_budget;
 mod proximity;
 mod triangle_cache;
 

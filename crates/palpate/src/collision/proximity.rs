@@ -198,7 +198,7 @@ mod tests {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
         let radius = 2.0 * recording.surface.mean_edge();
-        let body = Body::new(recording.clone(), &[radius], usize::MAX, &[]);
+        let body = Body::new(recording.clone(), &[radius], None, &[]);
         let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
         let (state, points) = (response.at_rest(&recording, 1), ContactPoints::new(1));
         let mut cache = NodePositionCache::new(&body);

@@ -265,7 +265,7 @@ mod tests {
     fn follow(footprint_of: impl Fn(&Body) -> Footprint, seed_above: usize, speed: f64) -> [u32; 5] {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let body = Body::new(recording.clone(), &[2.0 * recording.surface.mean_edge()], usize::MAX, &[]);
+        let body = Body::new(recording.clone(), &[2.0 * recording.surface.mean_edge()], None, &[]);
         let footprint = footprint_of(&body);
         let response = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response");
         let (state, points) = (response.at_rest(&recording, 1), ContactPoints::new(1));

@@ -8,7 +8,7 @@ pub(crate) use state::ObjectState;
 use crate::error::ModelError;
 use crate::motion::{Inertia, RigidIntegrator, RigidState, RigidStep};
 use crate::recording::{Recording, Support};
-use crate::response::{Body, Response, ResponseForm, ResponseState, ResponseView};
+use crate::response::{Body, ContactLimits, Response, ResponseForm, ResponseState, ResponseView};
 use crate::spatial::{Pose, Twist};
 use crate::surface::Cell;
 use alloc::format;
@@ -46,8 +46,8 @@ pub(crate) struct ObjectRules<'a> {
     pub(crate) patch_radii: &'a [f64],
     /// Cells of the object's clamps.
     pub(crate) cells: &'a [Cell],
-    /// Upper limit of contact samples of a face; `usize::MAX` for all nodes.
-    pub(crate) max_contact_samples: usize,
+    /// Limits of the contacts of its surface; none where nothing meets it.
+    pub(crate) contact_limits: Option<ContactLimits>,
 }
 
 /// One object of a scene; immutable.
@@ -126,9 +126,8 @@ impl Object {
             Arc::ptr_eq(&other.body.recording, &recording) && !has_clamps
         };
         let known = others.iter().find(is_same).map(|other| other.body.clone());
-        let body = known.unwrap_or_else(|| {
-            Arc::new(Body::new(recording, &radii, rules.max_contact_samples, rules.cells))
-        });
+        let body = known
+            .unwrap_or_else(|| Arc::new(Body::new(recording, &radii, rules.contact_limits, rules.cells)));
         Ok(Self {
             body,
             response,

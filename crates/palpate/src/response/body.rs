@@ -12,17 +12,46 @@ use super::sampled_residual::{ResidualMemory, SampledResidual};
 use crate::dot_products::{dot3, dot3_single};
 use crate::recording::Recording;
 use crate::surface::{
-    Bands, Bounds, Cell, DeformationBound, SphereTree, Surface, SurfacePoint, band, node_normals,
-    smooth_heights, triangles_around,
+    Bands, Bounds, Cell, DeformationBound, MIN_CONTACT_SAMPLES, SphereTree, Surface, SurfacePoint, band,
+    node_normals, smooth_heights, triangles_around,
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use glam::{DMat3, DVec3};
 
+/// Number of partners of an object for which the coarsest level of contact samples finds room.
+const PARTNERS: usize = 4;
+
+/// Limits of the contacts of a surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ContactLimits {
+    /// Upper limit of contact samples against one partner; `usize::MAX` for all nodes.
+    pub(crate) max_samples: usize,
+    /// Upper limit of contact points of an object.
+    pub(crate) max_points: usize,
+}
+
+impl ContactLimits {
+    /// Contact points of a surface: one for every side of a node, within the limit.
+    fn points_of(&self, surface: &Surface) -> usize {
+        let is_fine = surface.positions.len() >= self.max_points;
+        if is_fine { self.max_points } else { surface.node_sides().min(self.max_points) }
+    }
+
+    /// Samples of the coarsest level that is needed.
+    fn coarsest_level(&self, surface_points: usize) -> usize {
+        let is_limited = surface_points == self.max_points;
+        let of_points = if is_limited { self.max_points / PARTNERS } else { usize::MAX };
+        self.max_samples.min(of_points.max(MIN_CONTACT_SAMPLES))
+    }
+}
+
 /// Elastic body of one object; immutable.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) recording: Arc<Recording>,
+    /// Upper limit of contact points against planes, obstacles and other objects.
+    pub(crate) surface_points: usize,
     /// Patches of the devices' radii, those of the contact samples of each level, finest first, and the cells of clamps.
     pub(crate) patches: Vec<PatchField>,
     /// Number of patches of devices, and of levels.
@@ -50,11 +79,12 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// Body with patches of the given radii [m], levels of contact samples down to `max_contact_samples`, and the cells of its clamps.
+    /// Body with patches of the given radii [m], levels of contact samples within limits (none where nothing meets its surface), and the cells
+    /// of its clamps.
     pub(crate) fn new(
         recording: Arc<Recording>,
         radii: &[f64],
-        max_contact_samples: usize,
+        limits: Option<ContactLimits>,
         cells: &[Cell],
     ) -> Self {
         let tree = SphereTree::new(&recording.surface.positions, &recording.surface.triangles);
@@ -69,7 +99,9 @@ impl Body {
         let normals = node_normals(&recording.surface);
         let heights = smooth_heights(&recording.surface, recording.surface_order());
         let max_height = heights.iter().copied().fold(0.0, f64::max);
-        for level in &*recording.levels_down_to(max_contact_samples) {
+        let surface_points = limits.map_or(0, |limits| limits.points_of(&recording.surface));
+        let coarsest = limits.map_or(usize::MAX, |limits| limits.coarsest_level(surface_points));
+        for level in &*recording.levels_down_to(coarsest) {
             patches.push(PatchField::at_samples(&recording, level, &normals, &heights));
         }
         let levels = patches.len() - radii.len();
@@ -86,6 +118,7 @@ impl Body {
         let device_patches = radii.len();
         Self {
             recording,
+            surface_points,
             patches,
             device_patches,
             levels,

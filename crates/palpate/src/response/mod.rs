@@ -23,7 +23,7 @@ mod sample_surface;
 mod sampled_residual;
 mod spring_forces;
 
-pub(crate) use body::Body;
+pub(crate) use body::{Body, ContactLimits};
 pub(crate) use contact_location::{ContactLocation, Footprint, LocationState, SpringForce};
 pub(crate) use contact_points::{ContactPoint, ContactPoints};
 

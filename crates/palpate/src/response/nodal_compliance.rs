@@ -128,7 +128,7 @@ mod tests {
     use super::super::{Footprint, Response, ResponseForm, ResponseView};
     use super::*;
     use crate::recording::Recording;
-    use crate::response::ContactPoints;
+    use crate::response::{ContactLimits, ContactPoints};
     use crate::surface::SurfacePoint;
     use alloc::sync::Arc;
     use glam::DVec3;
@@ -137,7 +137,8 @@ mod tests {
     fn compliance_between_samples_of_two_levels_is_the_computed_one() {
         let bytes = include_bytes!("../../../../data/recordings/v1_levels/ball.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let body = Body::new(recording.clone(), &[], 8, &[]);
+        let body =
+            Body::new(recording.clone(), &[], Some(ContactLimits { max_samples: 8, max_points: 512 }), &[]);
         let Response::Modal(modes) =
             Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a modal response")
         else {
@@ -172,7 +173,7 @@ mod tests {
     fn precomputed_compliance_is_that_of_modes_and_residual_compliance() {
         let bytes = include_bytes!("../../../../data/recordings/v1/free.palp");
         let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
-        let body = Body::new(recording.clone(), &[], usize::MAX, &[]);
+        let body = Body::new(recording.clone(), &[], None, &[]);
         let computed = Response::new(&recording, ResponseForm::Modal, 1e-3).expect("a response");
         let mut precomputed = computed.clone();
         precomputed.precompute_nodal_compliance(&body, core::iter::empty());

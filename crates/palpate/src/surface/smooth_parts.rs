@@ -41,6 +41,23 @@ pub(super) fn smooth_parts(surface: &Surface) -> Vec<u32> {
     parts
 }
 
+impl Surface {
+    /// Number of smooth sides of all nodes: one of a node within a face, two on an edge, three at the corner of a box. As many planes
+    /// can meet it at a time.
+    pub(crate) fn node_sides(&self) -> usize {
+        let mut sides = vec![Vec::new(); self.positions.len()];
+        for (corners, part) in self.triangles.iter().zip(smooth_parts(self)) {
+            for node in corners {
+                let of_node: &mut Vec<u32> = &mut sides[*node as usize];
+                if !of_node.contains(&part) {
+                    of_node.push(part);
+                }
+            }
+        }
+        sides.iter().map(Vec::len).sum()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::test_surfaces::ball;
@@ -58,6 +75,9 @@ mod tests {
             }
         }
         assert_eq!(parts.iter().max(), Some(&5));
+        let (low, high) = cube.extent();
+        let faces = |p: &DVec3| (0..3).filter(|&k| (p[k] - low[k]).min(high[k] - p[k]) < 1e-9).count();
+        assert_eq!(cube.node_sides(), cube.positions.iter().map(faces).sum::<usize>());
         assert!(smooth_parts(&ball(3)).iter().all(|part| *part == 0));
     }
 }

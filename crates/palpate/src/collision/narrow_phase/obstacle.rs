@@ -7,7 +7,7 @@
 //! Equations: docs/theory.md (C17), (C18), (C24).
 
 use super::point_surface::{MovingPoint, point_against_surface};
-use crate::collision::candidate::{CandidateList, CandidateSide, ContactCandidate};
+use crate::collision::candidate::{CandidateList, CandidateSide, ContactCandidate, Mark};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, contacts_between};
 use crate::collision::context::CollisionContext;
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
@@ -71,12 +71,14 @@ impl CollisionContext<'_> {
                 + COLLISION.neighbour_displacement * own.contact_displacement,
             sweep_margin: if travel > 0.5 * obstacle.shape.size() { travel } else { 0.0 },
         };
-        let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
         let known = contacts_between(self.contacts, Collider::Obstacle(number), at);
         let detail = &mut self.levels.against_obstacle(at, number).detail;
         let before_level = detail.level;
         detail.begin(self.step, known.len(), body.finest_level());
+        let available = self.levels.points_against_obstacle(at, number);
+        let max_samples = self.scene.max_contact_samples.min(available);
+        let detail = &mut self.levels.against_obstacle(at, number).detail;
         let is_near = loop {
             query.level = detail.level;
             let footprint = body.footprint_at_level(query.level);
@@ -88,11 +90,11 @@ impl CollisionContext<'_> {
             let reach = object.radius + surface.max_displacement() + travel + query.margin + body.max_height;
             let candidates = &mut self.workspace.candidates;
             let is_near = apart - reach <= obstacle.shape.radius();
-            let allowed = detail.allowed(max_samples);
+            let allowed = detail.allowed(max_samples).min(available);
             if is_near {
-                query.nodes(surface, known, candidates, mark.len.saturating_add(allowed));
+                query.nodes(surface, known, candidates, (mark, allowed));
             }
-            if candidates.list.len() - mark.len <= allowed || query.level == body.coarsest_level() {
+            if candidates.since(mark) <= allowed || query.level == body.coarsest_level() {
                 break is_near;
             }
             candidates.rewind(mark);
@@ -100,11 +102,13 @@ impl CollisionContext<'_> {
         };
         if is_near && query.level > 0 {
             let is_coarser = query.level > before_level;
-            query.refine(self, if is_coarser { &[] } else { known }, mark.len);
+            query.refine(self, if is_coarser { &[] } else { known }, (mark, available));
         }
         if obstacle.shape.has_corners() {
             query.corners(self);
         }
+        let found = self.workspace.candidates.since(mark);
+        self.levels.ask_against_obstacle(at, number, found);
     }
 }
 
@@ -149,7 +153,7 @@ impl ObstacleQuery<'_> {
         surface: &mut DeformedSurface,
         known: &[Contact],
         candidates: &mut CandidateList,
-        most: usize,
+        (mark, allowed): (Mark, usize),
     ) {
         let footprint = self.body.footprint_at_level(self.level);
         let triangles = &self.body.surface(footprint).triangles;
@@ -203,7 +207,7 @@ impl ObstacleQuery<'_> {
                 if self.level == 0 {
                     self.triangle_interior(surface, triangle, residual, candidates);
                 }
-                is_full.set(candidates.list.len() > most && self.level < self.body.coarsest_level());
+                is_full.set(candidates.since(mark) > allowed && self.level < self.body.coarsest_level());
             },
         );
     }

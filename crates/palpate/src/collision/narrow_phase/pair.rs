@@ -4,7 +4,7 @@
 use super::point_surface::{MovingPoint, point_against_surface};
 use crate::bounded_vec::BoundedVec;
 use crate::collision::broad_phase::HalfSpace;
-use crate::collision::candidate::{CandidateSide, ContactCandidate};
+use crate::collision::candidate::{CandidateSide, ContactCandidate, Mark};
 use crate::collision::contact::{Collider, Contact, ContactId, ContactLaw, FeatureId, OtherSide};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
@@ -18,22 +18,22 @@ use glam::DVec3;
 impl CollisionContext<'_> {
     /// Find the contacts of two objects, at the finest levels of detail that have few enough samples near.
     pub(crate) fn find_contacts_of_pair(&mut self, objects: [usize; 2]) {
-        let max_samples = self.scene.max_contact_samples;
         let mark = self.workspace.candidates.mark();
         let mut pair = self.levels.of_pair(objects, self.step);
         for (detail, &object) in pair.details.iter_mut().zip(&pair.objects) {
             let body = &self.scene.objects[object].body;
             detail.begin(self.step, 0, body.finest_level().min(body.coarsest_surface_level()));
         }
+        let max_samples = self.scene.max_contact_samples.min(self.levels.points_of_pair(&pair));
         loop {
             let overlap = self.overlap(&pair);
             pair.is_near |= overlap.is_some();
             let found = match overlap {
-                Some(of) => [0, 1].map(|side| self.nodes_against(&pair, side, of[side], mark.len)),
+                Some(of) => [0, 1].map(|side| self.nodes_against(&pair, side, of[side], (mark, max_samples))),
                 None => [0; 2],
             };
             let near = [0, 1].map(|side| if self.can_be_coarser(&pair, side) { found[side] } else { 0 });
-            let is_too_much = self.workspace.candidates.list.len() - mark.len > max_samples;
+            let is_too_much = self.workspace.candidates.since(mark) > max_samples;
             // Coarsen a side that has too many near, or the one that has more of them.
             let coarsens = [0, 1].map(|side| {
                 let is_larger = near[side] > 0 && near[side] == near[0].max(near[1]);
@@ -47,6 +47,7 @@ impl CollisionContext<'_> {
             }
             self.workspace.candidates.rewind(mark);
         }
+        pair.points = self.workspace.candidates.since(mark);
         self.levels.keep_pair(pair);
     }
 
@@ -61,11 +62,11 @@ impl CollisionContext<'_> {
         pair: &ObjectPair,
         side: usize,
         half_space: HalfSpace,
-        first: usize,
+        (mark, max_samples): (Mark, usize),
     ) -> usize {
         let [nodes_of, surface_of] = [pair.objects[side], pair.objects[1 - side]];
         let can_be_coarser = self.can_be_coarser(pair, side);
-        let enough = if can_be_coarser { self.scene.max_contact_samples } else { usize::MAX };
+        let enough = if can_be_coarser { max_samples } else { usize::MAX };
         let footprints = [self.footprint_of(pair, side), self.footprint_of(pair, 1 - side)];
         let [own_level, other_level] = [side, 1 - side].map(|side| pair.details[side].level as u8);
         let uses_samples = [own_level, other_level] != [0; 2];
@@ -97,7 +98,7 @@ impl CollisionContext<'_> {
                     let levels = [other_level, own_level];
                     let feature = FeatureId::NodeOnSurface { levels, node: node as u32 };
                     let id = ContactId { collider: Collider::Object(surface_of), object: nodes_of, feature };
-                    candidates.list[first..].iter().any(|candidate| candidate.id == id)
+                    candidates.list[mark.len..].iter().any(|candidate| candidate.id == id)
                 };
                 let mut corners = base.object.body.corners(&candidate.location).into_iter();
                 let is_redundant = uses_samples
@@ -106,7 +107,7 @@ impl CollisionContext<'_> {
                     candidates.push(candidate);
                 }
             }
-            if found.max(candidates.list.len() - first) > enough {
+            if found.max(candidates.since(mark)) > enough {
                 break;
             }
         }

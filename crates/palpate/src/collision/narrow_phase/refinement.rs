@@ -4,6 +4,7 @@
 //! the tolerance. They stay while they carry force or are within the tolerance.
 
 use super::obstacle::ObstacleQuery;
+use crate::collision::candidate::Mark;
 use crate::collision::contact::{Contact, FeatureId};
 use crate::collision::context::{CollisionContext, CollisionWorkspace};
 use crate::collision::deformed_surface::{DeformedSurface, SurfaceTime};
@@ -13,11 +14,17 @@ use crate::surface::Traversal;
 use glam::DVec3;
 
 impl ObstacleQuery<'_> {
-    /// Keep the nodes among the known contacts, and search on; `first` is the index of the first candidate against the obstacle.
+    /// Keep the nodes among the known contacts, and search on; `mark` is where the candidates against the obstacle begin, which has so many
+    /// contact points `available`.
     ///
     /// # Real time
     /// Costs the nodes that were added, and a limited number of visits.
-    pub(super) fn refine(&self, context: &mut CollisionContext, known: &[Contact], first: usize) {
+    pub(super) fn refine(
+        &self,
+        context: &mut CollisionContext,
+        known: &[Contact],
+        (mark, available): (Mark, usize),
+    ) {
         let max_samples = context.scene.max_contact_samples;
         // Contact samples come first: of the room for contact points, one set of them is left free.
         let points = &self.own.points;
@@ -30,7 +37,9 @@ impl ObstacleQuery<'_> {
             let point = self.own.points.of(contact.slot);
             let position = point.rest + point.state.displacement;
             let height = self.body.smooth_height(&point.location);
-            if contact.force != DVec3::ZERO || self.distance(position, height + depth) < height + depth {
+            let is_kept =
+                contact.force != DVec3::ZERO || self.distance(position, height + depth) < height + depth;
+            if is_kept && candidates.since(mark) < available {
                 let facing = self.body.outward_normal(Footprint::Point, node as usize);
                 let over_step = [position, point.rest + point.free];
                 self.meet(candidates, over_step, facing, point.location, contact.id.feature);
@@ -67,7 +76,9 @@ impl ObstacleQuery<'_> {
                 }
             },
         );
-        let max_new = room.min(max_samples.saturating_mul(2).saturating_sub(added));
+        let max_new = room
+            .min(max_samples.saturating_mul(2).saturating_sub(added))
+            .min(available.saturating_sub(candidates.since(mark)));
         for node in near_nodes.iter().map(|&node| node as usize).take(max_new) {
             let feature = FeatureId::of_node(0, node);
             let is_beside = |location: &ContactLocation| {
@@ -76,7 +87,7 @@ impl ObstacleQuery<'_> {
                         .length()
                         < self.body.node_spacing
             };
-            let mut known = candidates.list[first..].iter();
+            let mut known = candidates.list[mark.len..].iter();
             if known.any(|other| other.id.feature == feature || is_beside(&other.location)) {
                 continue;
             }
