@@ -1,6 +1,8 @@
 //! Stores of impulse responses: written, interrupted, shared, damaged, and used in scenes.
 
 use crate::workplace::{CUBE, SCENE, Table, Workplace, with_memory};
+use palpate::{Column, Recording};
+use palpate_store::{Location, TableStore};
 use palpate_testkit::{Random, made_once_per_run, wait_until};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -80,6 +82,22 @@ fn whole_files(store: &Path) -> usize {
     files(store).iter().filter(|path| !path.to_string_lossy().contains('#')).count()
 }
 
+/// Body and table of a store, column by column, every number by its bits.
+fn numbers(store: &Path) -> (Recording, Vec<Vec<u32>>) {
+    let location = Location::Folder(store.to_path_buf());
+    let (recording, table) =
+        TableStore::open(&location).and_then(TableStore::load).expect("a store without gaps");
+    let bits = |touchable: usize| {
+        table.columns.prepare(touchable).expect("a readable column");
+        match table.columns.column(touchable) {
+            Column::F32(numbers) => numbers.iter().map(|number| number.to_bits()).collect(),
+            Column::F64(_) => panic!("a table in double precision"),
+        }
+    };
+    let columns = (0..table.touchable_dofs.len()).map(bits).collect();
+    (recording, columns)
+}
+
 fn same(a: &Path, b: &Path) {
     let (a, b) = (contents(a), contents(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
@@ -138,7 +156,8 @@ fn a_recording_without_room_or_memory_goes_on_where_it_stood() {
     }
     assert!(failed >= 5, "{failed} attempts failed before {kilobytes} kB were enough");
     workplace.succeed(&TABLE);
-    same(&whole_store().0, &workplace.path("t.zarr"));
+    // Not the same bytes: a chunk is stored without compression where its compressor gets no memory.
+    assert!(numbers(&workplace.path("t.zarr")) == numbers(&whole_store().0));
 }
 
 #[test]
