@@ -11,19 +11,10 @@ import time
 import numpy as np
 import palpate
 import pytest
+from waiting import PATIENCE, until
 
-#: Longest time to wait for something that comes within milliseconds on a quiet machine [s].
-PATIENCE = 60
 #: Limits of a scene that are the same in real time and offline.
 LIMITS = {"max_contact_samples": 48, "solver_budget": 10**9}
-
-
-def until(condition):
-    """Wait until a condition holds."""
-    begun = time.monotonic()
-    while not condition():
-        assert time.monotonic() - begun < PATIENCE, "it never came"
-        time.sleep(0.002)
 
 
 def steps_of(session, count):

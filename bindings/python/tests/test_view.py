@@ -10,6 +10,7 @@ import urllib.request
 import jupyter_client
 import palpate
 import pytest
+from waiting import until
 
 PROGRAM = os.environ.get("PALPATE", "palpate")
 
@@ -28,6 +29,9 @@ def test_a_scene_in_memory_is_served_until_it_is_closed(cube, tmp_path):
             assert page.status == 200
         folder = viewer._folder.name
         assert os.path.exists(folder)
+        # A log without steps is not kept: wait until it has grown by some.
+        sizes = {0}
+        until(lambda: sizes.add((tmp_path / "touched.mcap.part").stat().st_size) or len(sizes) > 2)
     assert not viewer.is_open and not os.path.exists(folder)
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(viewer.url, timeout=5)
