@@ -106,10 +106,8 @@ impl Assembly {
         let mut y = Mat::zeros(x.nrows(), x.ncols());
         let columns: Vec<_> = y.col_iter_mut().zip(x.col_iter()).collect();
         columns.into_par_iter().for_each(|(mut out, column)| {
-            let at = |node: u32| {
-                let base = 3 * node as usize;
-                glam::DVec3::new(column[base], column[base + 1], column[base + 2])
-            };
+            let column: Vec<f64> = column.iter().copied().collect();
+            let at = |node: u32| glam::DVec3::from_slice(&column[3 * node as usize..]);
             for node in 0..self.nodes() {
                 let row = self.offsets[node]..self.offsets[node + 1];
                 let nodes = self.columns[row.clone()].iter();

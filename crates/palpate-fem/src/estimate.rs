@@ -1,14 +1,16 @@
 //! Cost of a recording before it is made: sizes, memory, file and time.
 //!
 //! Sizes of the model, the factor and the file are counted: the elimination order of the factor is computed, which is a small part of the work.
-//! Memory and time are models of them, with constants that were fitted to six bodies of 6,000 to 30,000 degrees of freedom:
+//! Memory and time are models of them, with constants that were fitted to bodies of 6,000 to 30,000 (memory) and to 275,000 (time) degrees of
+//! freedom:
 //!
 //! ```text
 //! memory = base + 6.2·factor + 2·file                 (a compact file: 8.5·(surface dofs)² in place of 2·file)
-//! time   = a·(factor entries)·(surface dofs + 8·modes) + b·dofs·modes·(surface dofs) + c·dofs·modes² + d·(surface dofs)³
+//! time   = a·(entries that the inverse visits) + b·(factor entries)·modes + c·dofs·modes² + d·dofs + e·(surface dofs)³
 //! ```
 //!
-//! d is that of the factorisation which proves a compact S positive definite. The compressed size of a compact S is a guess: it depends on the
+//! The entries of G at the surface visit those of the factor on the paths of the elimination tree: once forwards, and backwards as many for a near
+//! field, half of all for the whole matrix. e is that of the factorisation which proves a compact S positive definite. The compressed size of a compact S is a guess: it depends on the
 //! body.
 //!
 //! docs/recording.md states how well they predict four other bodies.
@@ -91,7 +93,14 @@ pub fn estimate(mesh: Mesh, parameters: &RecordParameters) -> Result<Estimate, R
     let residual = if is_quantised { quantised_bytes(carriers.nodes.len()) } else { residual };
     estimate.file_bytes = file_bytes(&estimate, &carriers, residual, is_free, is_compact);
     estimate.memory_bytes = memory_bytes(&estimate, is_quantised);
-    estimate.seconds = seconds(&estimate, is_quantised);
+    let backwards = 0.5 * (estimate.factor_bytes / 8) as f64 * 3.0 * carriers.nodes.len() as f64;
+    let forwards = pattern.path_entries(&carriers.nodes) as f64;
+    let visited = match (residual > 0, is_whole) {
+        (false, _) => 0.0,
+        (true, true) => forwards + backwards,
+        (true, false) => 2.0 * forwards,
+    };
+    estimate.seconds = seconds(&estimate, visited, is_quantised);
     Ok(estimate)
 }
 
@@ -185,20 +194,22 @@ fn memory_bytes(estimate: &Estimate, is_quantised: bool) -> u64 {
     (BASE_BYTES + FACTORS * estimate.factor_bytes as f64 + residual) as u64
 }
 
-/// Seconds of one core per factor entry and solve, per degree of freedom, mode and surface degree of freedom, per degree of freedom and
-/// two modes, and per cube of a surface degree of freedom.
-const SOLVE_S: f64 = 3.45e-10;
-const TRUNCATION_S: f64 = 4.3e-11;
-const KRYLOV_S: f64 = 1.71e-8;
+/// Seconds of one core per factor entry that the inverse visits, per factor entry and mode, per degree of freedom and two modes, per degree of
+/// freedom, and per cube of a surface degree of freedom.
+const INVERSE_S: f64 = 4.4e-11;
+const SOLVE_S: f64 = 3.5e-9;
+const KRYLOV_S: f64 = 6.3e-9;
+const CERTIFICATE_S: f64 = 4.4e-4;
 const QUANTISATION_S: f64 = 8.3e-12;
 
-fn seconds(estimate: &Estimate, is_quantised: bool) -> f64 {
+fn seconds(estimate: &Estimate, visited: f64, is_quantised: bool) -> f64 {
     let entries = estimate.factor_bytes as f64 / 8.0;
     let (dofs, modes, surface) =
         (estimate.dofs as f64, estimate.modes as f64, 3.0 * estimate.carriers as f64);
-    let cpu = SOLVE_S * entries * (surface + 8.0 * modes)
-        + TRUNCATION_S * dofs * modes * surface
+    let cpu = INVERSE_S * visited
+        + SOLVE_S * entries * modes
         + KRYLOV_S * dofs * modes * modes
+        + CERTIFICATE_S * dofs
         + if is_quantised { QUANTISATION_S * surface.powi(3) } else { 0.0 };
     cpu / estimate.threads as f64
 }

@@ -6,19 +6,23 @@
 
 use crate::assembly::Assembly;
 use crate::elimination_order::elimination_order;
-use crate::kernels::{SEQUENTIAL, avx_section, multiply, solve_lower, solve_upper};
+use crate::kernels::{SEQUENTIAL, avx_section, multiply, row_blocks, solve_lower, solve_upper};
+use crate::selected_inverse::{self, SelectedInverse};
 use crate::solve_error::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::Perm;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::{SupernodalIntranodeLbltRef, SupernodalLltRef};
+use faer::sparse::linalg::cholesky::supernodal::{
+    SupernodalIntranodeLbltRef, SupernodalLltRef, SymbolicSupernodalCholesky,
+};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Accum, Conj, Mat, MatMut, Side, unzip, zip};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Elimination order and sparsity of the factor: made once per mesh.
@@ -63,6 +67,14 @@ impl Pattern {
     /// Size of one factor [bytes].
     pub fn factor_bytes(&self) -> u64 {
         8 * self.symbolic.len_val() as u64
+    }
+
+    /// Entries that L⁻¹ takes to unit loads on some nodes: those of the factor on their paths to the root of the elimination tree, summed over the
+    /// loads.
+    pub fn path_entries(&self, nodes: &[u32]) -> u64 {
+        let places = places(&self.symbolic);
+        let dofs = nodes.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis));
+        selected_inverse::path_entries(supernodal(&self.symbolic), dofs.map(|dof| places[dof]))
     }
 
     /// Cholesky factor of K + `shift`·M; `constrained` has one entry per degree of freedom.
@@ -117,9 +129,7 @@ impl Pattern {
                 Default::default(),
             );
         });
-        let SymbolicCholeskyRaw::Supernodal(supernodal) = self.symbolic.raw() else {
-            return 0;
-        };
+        let supernodal = supernodal(&self.symbolic);
         let permutation = Perm::new_checked(forward.into_boxed_slice(), inverse.into_boxed_slice(), n);
         let factor = SupernodalIntranodeLbltRef::new(supernodal, &values, &subdiagonal, permutation.as_ref());
         let mut negative = 0;
@@ -143,23 +153,53 @@ impl Pattern {
 }
 
 impl Factor {
+    /// The inverse, by its entries.
+    pub fn inverse(&self) -> SelectedInverse<'_> {
+        SelectedInverse::new(
+            supernodal(&self.symbolic),
+            &self.values,
+            places(&self.symbolic),
+            &self.constrained,
+        )
+    }
+
     /// Solves in place for loads that are columns. Rows of constrained degrees of freedom are zeroed first, so that
     /// their solution is zero.
     pub fn solve(&self, mut columns: MatMut<'_, f64>) {
         for &row in &self.constrained {
             columns.as_mut().row_mut(row).fill(0.0);
         }
-        let symbolic = &*self.symbolic;
-        let scratch = symbolic.solve_in_place_scratch::<f64>(columns.ncols(), SEQUENTIAL);
-        let mut memory = MemBuffer::new(scratch);
-        avx_section(|| {
-            LltRef::<usize, f64>::new(symbolic, &self.values).solve_in_place_with_conj(
-                Conj::No,
-                columns,
-                SEQUENTIAL,
-                MemStack::new(&mut memory),
-            );
+        row_blocks(columns.transpose_mut(), COLUMNS_PER_SOLVE).into_par_iter().for_each(|columns| {
+            let scratch = self.symbolic.solve_in_place_scratch::<f64>(columns.nrows(), SEQUENTIAL);
+            let mut memory = MemBuffer::new(scratch);
+            avx_section(|| {
+                LltRef::<usize, f64>::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+                    Conj::No,
+                    columns.transpose_mut(),
+                    SEQUENTIAL,
+                    MemStack::new(&mut memory),
+                );
+            });
         });
+    }
+}
+
+/// Columns that one thread solves together: fewer read the factor too often, with more the cores wait for one another.
+const COLUMNS_PER_SOLVE: usize = 8;
+
+/// Place of each degree of freedom in the elimination order.
+fn places(symbolic: &SymbolicCholesky<usize>) -> Vec<usize> {
+    match symbolic.perm() {
+        Some(order) => order.arrays().1.to_vec(),
+        None => (0..symbolic.ncols()).collect(),
+    }
+}
+
+/// Supernodes of a factor.
+fn supernodal(symbolic: &SymbolicCholesky<usize>) -> &SymbolicSupernodalCholesky<usize> {
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Supernodal(supernodal) => supernodal,
+        SymbolicCholeskyRaw::Simplicial(_) => unreachable!("patterns are made with supernodes"),
     }
 }
 
@@ -194,7 +234,7 @@ impl Factor {
         for &column in &self.constrained {
             loads.as_mut().col_mut(column).fill(0.0);
         }
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return };
+        let symbolic = supernodal(&self.symbolic);
         let factor = SupernodalLltRef::new(symbolic, &self.values);
         let supernodes = || (0..symbolic.n_supernodes()).map(|s| factor.supernode(s));
         if workspace.permuted.nrows() != k || workspace.permuted.ncols() != n {
@@ -310,6 +350,35 @@ mod tests {
                 // Round-off of a system of condition up to 1e4.
                 assert!(difference < 1e-11 * columns.norm_max(), "{loads}: {difference:e}");
             }
+        }
+    }
+
+    #[test]
+    fn selected_entries_of_the_inverse_are_those_of_solutions() {
+        let (assembly, discretisation) = assembly([5, 4, 3], ElementOrder::Quadratic);
+        let pattern = Pattern::new(&assembly).expect("a pattern");
+        let mut constrained = vec![false; discretisation.dofs()];
+        constrained[..9].fill(true);
+        let factor = pattern.factor(&assembly, &constrained, 0.0).expect("a factor");
+        let inverse = factor.inverse();
+        let last = discretisation.dofs() - 1;
+        // Among them loads and rows that are constrained, the same, and far from each other in the elimination tree.
+        let every = |stride: usize| (0..=last).step_by(stride).collect::<Vec<_>>();
+        for (loads, rows) in [
+            (vec![last], vec![last]),
+            (vec![4], every(7)),
+            (vec![last, 4, 100, 101, 400], vec![3, 50, last]),
+            (every(31), every(1)),
+            (every(1), every(41)),
+        ] {
+            let mut solved = Mat::zeros(discretisation.dofs(), loads.len());
+            loads.iter().enumerate().for_each(|(j, &load)| solved[(load, j)] = 1.0);
+            factor.solve(solved.as_mut());
+            let entries = inverse.block(&loads, &rows);
+            let difference = |(i, j): (usize, usize)| (entries[(j, i)] - solved[(rows[i], j)]).abs();
+            let pairs = (0..rows.len()).flat_map(|i| (0..loads.len()).map(move |j| (i, j)));
+            let largest = pairs.map(difference).fold(0.0, f64::max);
+            assert!(largest <= 1e-11 * solved.norm_max(), "{loads:?}: {largest:e}");
         }
     }
 }

@@ -83,7 +83,9 @@ impl KrylovSpaces {
         // quasi-statically.
         let last = modes.squares.last().copied().unwrap_or(1.0);
         let fastest = (std::f64::consts::PI / step_s).powi(2).max(16.0 * last);
-        let factors = [system.shifted_factor(0.1 * fastest)?, system.shifted_factor(fastest)?];
+        let (slow, fast) =
+            rayon::join(|| system.shifted_factor(0.1 * fastest), || system.shifted_factor(fastest));
+        let factors = [slow?, fast?];
         let mut block = without_kept_modes(system, modes, system.elastic_compliance(loads.clone()));
         let mut blocks = vec![block.clone()];
         progress.advance(1);

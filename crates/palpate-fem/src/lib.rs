@@ -34,6 +34,7 @@ mod record;
 mod record_error;
 pub mod reference;
 mod residual;
+mod selected_inverse;
 mod solve_error;
 mod supports;
 mod system;

@@ -1,21 +1,23 @@
 //! Residual compliance S = G − Φ·Λ⁻¹·Φᵀ on the touchable (surface) degrees of freedom.
 //!
-//! Column by column from the factor, in blocks. Stored in f32: rounding moves an entry by at most 2⁻²⁴ of
+//! Of G the entries between touchable nodes alone are computed, in blocks. Stored in f32: rounding moves an entry by at most 2⁻²⁴ of
 //! itself, so each diagonal entry is raised by 2⁻²⁴ of its row's absolute sum, which keeps S positive
 //! semi-definite (Gershgorin) and changes it by less than a millionth.
 //!
-//! Equations: docs/theory.md (C4).
+//! Equations: docs/theory.md (C4), (C91).
 
-use crate::kernels::avx_section;
+use crate::kernels::multiply;
 use crate::modes::ElasticModes;
 use crate::progress::Progress;
 use crate::quantise::quantised;
+use crate::selected_inverse::SelectedInverse;
 use crate::solve_error::SolveError;
-use crate::system::System;
-use faer::Mat;
-use glam::DVec3;
+use crate::system::{SelectedCompliance, System};
+use faer::{Accum, Mat};
+use glam::{DMat3, DVec3};
 use palpate::{GravityResponse, MAX_QUANTISED_NODES, NearField, ResidualCompliance};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Part of the residual compliance that a recording keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,8 +50,8 @@ const WHOLE_UP_TO: usize = 12_000;
 /// diagonal; the taper keeps 94 % of an entry one edge away.
 const NEAR_EDGES: f64 = 12.0;
 
-/// Columns that one thread solves together.
-const COLUMNS_PER_SOLVE: usize = 48;
+/// Nodes whose three columns one thread solves together.
+const NODES_PER_SOLVE: usize = 32;
 
 /// Largest relative rounding error of f32.
 const F32_ROUNDING: f64 = 1.0 / (1_u64 << 24) as f64;
@@ -99,56 +101,121 @@ pub(crate) fn truncated_displacements(
     system.elastic_compliance(loads) - &modes.shapes * amplitudes
 }
 
-/// Columns of S at the surface for a range of touchable degrees of freedom: columns[j][i] = S_ij.
-fn columns(
-    system: &System,
-    modes: &ElasticModes,
-    surface_nodes: &[u32],
-    range: std::ops::Range<usize>,
-) -> Vec<Vec<f64>> {
-    let n = system.discretisation.dofs();
-    let mut loads = Mat::zeros(n, range.len());
-    for (column, touchable) in range.clone().enumerate() {
-        loads[(dof(surface_nodes, touchable), column)] = 1.0;
-    }
-    let gains = Mat::from_fn(modes.squares.len(), range.len(), |i, column| {
-        modes.shapes[(dof(surface_nodes, range.start + column), i)]
-    });
-    let solved = truncated_displacements(system, modes, loads, &gains);
-    let at_surface = |column: usize| {
-        (0..3 * surface_nodes.len()).map(|row| solved[(dof(surface_nodes, row), column)]).collect()
-    };
-    (0..range.len()).map(at_surface).collect()
+/// S between the touchable nodes, block by block.
+struct SurfaceResidual<'a> {
+    surface_nodes: &'a [u32],
+    inverse: SelectedInverse<'a>,
+    /// S is the inverse less left·rightᵀ, which have a row per touchable degree of freedom: rigid motions and kept modes.
+    left: Mat<f64>,
+    right: Mat<f64>,
+    /// Touchable nodes in the order in which the factor eliminates them, so that those of a block share most of their paths.
+    order: Vec<u32>,
 }
 
-/// Visits every column of S once, a block per thread at a time.
-fn for_each_column(
-    system: &System,
-    modes: &ElasticModes,
-    surface_nodes: &[u32],
-    progress: &mut dyn Progress,
-    mut visit: impl FnMut(usize, &[f64]),
-) -> Result<(), SolveError> {
-    let touchable = 3 * surface_nodes.len();
-    progress.begin("residual compliance", touchable as u64);
-    let starts: Vec<usize> = (0..touchable).step_by(COLUMNS_PER_SOLVE).collect();
-    for batch in starts.chunks(rayon::current_num_threads()) {
-        if progress.is_interrupted() {
-            return Err(SolveError::Interrupted);
-        }
-        let solved: Vec<_> = batch
-            .par_iter()
-            .map(|&start| {
-                let range = start..(start + COLUMNS_PER_SOLVE).min(touchable);
-                avx_section(|| columns(system, modes, surface_nodes, range))
+/// S between two touchable nodes [m/N]: that of a row and that of a load, whose axes are rows and columns.
+struct NodeBlock {
+    row: usize,
+    load: usize,
+    entries: DMat3,
+}
+
+impl<'a> SurfaceResidual<'a> {
+    fn new(system: &'a System, modes: &ElasticModes, surface_nodes: &'a [u32]) -> Self {
+        let SelectedCompliance { inverse, left, right } = system.selected_compliance();
+        let (count, rigid) = (modes.squares.len(), left.ncols());
+        let beside = |mode: &dyn Fn(usize, usize) -> f64, rest: &Mat<f64>| {
+            Mat::from_fn(3 * surface_nodes.len(), count + rigid, |touchable, j| {
+                let dof = dof(surface_nodes, touchable);
+                if j < count { mode(dof, j) } else { rest[(dof, j - count)] }
             })
-            .collect();
-        for (&start, block) in batch.iter().zip(&solved) {
-            block.iter().enumerate().for_each(|(at, column)| visit(start + at, column));
-            progress.advance(block.len() as u64);
+        };
+        let left = beside(&|dof, j| modes.shapes[(dof, j)] / modes.squares[j], &left);
+        let right = beside(&|dof, j| modes.shapes[(dof, j)], &right);
+        let mut order: Vec<u32> = (0..surface_nodes.len() as u32).collect();
+        order.sort_by_key(|&node| inverse.place(dof(surface_nodes, 3 * node as usize)));
+        Self { surface_nodes, inverse, left, right, order }
+    }
+
+    /// Blocks between a part of the order and the nodes that it wants, from the first of the part on.
+    fn blocks(&self, part: Range<usize>, is_wanted: impl Fn(usize, usize) -> bool) -> Vec<NodeBlock> {
+        let own = &self.order[part.clone()];
+        let is_near = |row: &u32| own.iter().any(|&load| is_wanted(*row as usize, load as usize));
+        let rows: Vec<u32> = self.order[part.start..].iter().copied().filter(is_near).collect();
+        let touchable = |nodes: &[u32]| -> Vec<usize> {
+            nodes.iter().flat_map(|&node| (0..3).map(move |axis| 3 * node as usize + axis)).collect()
+        };
+        let (loads_at, rows_at) = (touchable(own), touchable(&rows));
+        let dofs =
+            |at: &[usize]| -> Vec<usize> { at.iter().map(|&at| dof(self.surface_nodes, at)).collect() };
+        let mut entries = self.inverse.block(&dofs(&loads_at), &dofs(&rows_at));
+        let of =
+            |side: &Mat<f64>, at: &[usize]| Mat::from_fn(at.len(), side.ncols(), |i, j| side[(at[i], j)]);
+        let (right, left) = (of(&self.right, &loads_at), of(&self.left, &rows_at));
+        multiply(entries.as_mut(), Accum::Add, right.as_ref(), left.transpose(), -1.0);
+        let block = |(i, j): (usize, usize)| {
+            let columns = [0, 1, 2].map(|b| [0, 1, 2].map(|a| entries[(3 * j + b, 3 * i + a)]));
+            let entries = DMat3::from_cols_array_2d(&columns);
+            let (row, load) = (rows[i] as usize, own[j] as usize);
+            let symmetric = if row == load { (entries + entries.transpose()) * 0.5 } else { entries };
+            NodeBlock { row, load, entries: symmetric }
+        };
+        // The first rows are the part itself: of its pairs, those of a row that comes before the load are the others mirrored.
+        let pairs = (0..rows.len()).flat_map(|i| (0..own.len().min(i + 1)).map(move |j| (i, j)));
+        pairs.map(block).filter(|block| is_wanted(block.row, block.load)).collect()
+    }
+
+    /// Visits the block of every wanted pair of nodes once, a part of the order per thread at a time.
+    fn for_each_block(
+        &self,
+        is_wanted: impl Fn(usize, usize) -> bool + Sync,
+        progress: &mut dyn Progress,
+        mut visit: impl FnMut(NodeBlock),
+    ) -> Result<(), SolveError> {
+        progress.begin("residual compliance", 3 * self.order.len() as u64);
+        let starts: Vec<usize> = (0..self.order.len()).step_by(NODES_PER_SOLVE).collect();
+        for batch in starts.chunks(rayon::current_num_threads()) {
+            if progress.is_interrupted() {
+                return Err(SolveError::Interrupted);
+            }
+            let part = |start: usize| start..(start + NODES_PER_SOLVE).min(self.order.len());
+            let solved: Vec<_> =
+                batch.par_iter().map(|&start| self.blocks(part(start), &is_wanted)).collect();
+            for (&start, blocks) in batch.iter().zip(solved) {
+                blocks.into_iter().for_each(&mut visit);
+                progress.advance(3 * part(start).len() as u64);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Diagonal of S [m/N], raised by what rounding to f32 moves the entries of its rows by.
+struct RaisedDiagonal {
+    own: Vec<f64>,
+    sums: Vec<f64>,
+}
+
+impl RaisedDiagonal {
+    fn new(nodes: usize) -> Self {
+        Self { own: vec![0.0; 3 * nodes], sums: vec![0.0; 3 * nodes] }
+    }
+
+    fn add(&mut self, block: &NodeBlock) {
+        for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+            let value = block.entries.col(b)[a];
+            self.sums[3 * block.row + a] += value.abs();
+            if block.row != block.load {
+                self.sums[3 * block.load + b] += value.abs();
+            } else if a == b {
+                self.own[3 * block.row + a] = value;
+            }
         }
     }
-    Ok(())
+
+    /// Raised entry of a degree of freedom.
+    fn raised(&self, dof: usize) -> f32 {
+        (self.own[dof].max(0.0) + F32_ROUNDING * self.sums[dof]) as f32
+    }
 }
 
 /// Whole S; quantised where it is compact and not too large.
@@ -168,6 +235,11 @@ fn whole(
     })
 }
 
+/// Entries of a block, row by row.
+fn by_rows(entries: DMat3) -> [f32; 9] {
+    entries.transpose().to_cols_array().map(|entry| entry as f32)
+}
+
 /// Node blocks of the lower triangle, nine numbers each [m/N].
 fn lower_blocks(
     system: &System,
@@ -176,20 +248,23 @@ fn lower_blocks(
     progress: &mut dyn Progress,
 ) -> Result<Vec<f32>, SolveError> {
     let nodes = surface_nodes.len();
-    let mut blocks = vec![0.0_f32; 9 * nodes * (nodes + 1) / 2];
-    // Both triangles of the blocks on the diagonal.
-    let mut set = |i: usize, j: usize, value: f64| {
-        let first = 9 * (i / 3 * (i / 3 + 1) / 2 + j / 3);
-        blocks[first + 3 * (i % 3) + j % 3] = value as f32;
-        if i / 3 == j / 3 {
-            blocks[first + 3 * (j % 3) + i % 3] = value as f32;
-        }
-    };
-    for_each_column(system, modes, surface_nodes, progress, |j, column| {
-        column.iter().enumerate().skip(j + 1).for_each(|(i, &value)| set(i, j, value));
-        let raised = column[j].max(0.0) + F32_ROUNDING * column.iter().map(|v| v.abs()).sum::<f64>();
-        set(j, j, raised);
-    })?;
+    let first = |row: usize, column: usize| 9 * (row * (row + 1) / 2 + column);
+    let mut blocks = vec![0.0_f32; first(nodes, 0)];
+    let mut diagonal = RaisedDiagonal::new(nodes);
+    let residual = SurfaceResidual::new(system, modes, surface_nodes);
+    residual.for_each_block(
+        |_, _| true,
+        progress,
+        |block| {
+            diagonal.add(&block);
+            let NodeBlock { row, load, entries } = block;
+            let lower = if row >= load { entries } else { entries.transpose() };
+            blocks[first(row.max(load), row.min(load))..][..9].copy_from_slice(&by_rows(lower));
+        },
+    )?;
+    for (node, axis) in (0..nodes).flat_map(|node| (0..3).map(move |axis| (node, axis))) {
+        blocks[first(node, node) + 4 * axis] = diagonal.raised(3 * node + axis);
+    }
     Ok(blocks)
 }
 
@@ -202,46 +277,34 @@ fn near_field(
 ) -> Result<ResidualCompliance, SolveError> {
     let positions: Vec<DVec3> =
         surface_nodes.iter().map(|&node| system.discretisation.nodes[node as usize]).collect();
+    let distance = |a: usize, b: usize| (positions[a] - positions[b]).length();
+    let is_near = |a: usize, b: usize| distance(a, b) < radius;
     let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
-    // S is symmetric: column j is row j. Blocks above the diagonal are copied from below at the end, so
-    // that both triangles are the same numbers.
-    for_each_column(system, modes, surface_nodes, progress, |j, column| {
-        let (node, axis) = (j / 3, j % 3);
-        if axis == 0 {
-            let within = (0..positions.len()).filter(|&i| (positions[i] - positions[node]).length() < radius);
-            near.nodes.extend(within.map(|i| i as u32));
-            near.blocks.resize(9 * near.nodes.len(), 0.0);
-            near.offsets.push(near.nodes.len() as u32);
-        }
-        let row = near.offsets[node] as usize..near.nodes.len();
-        let mut sum = 0.0;
-        for at in row.clone() {
-            let other = near.nodes[at] as usize;
-            let taper = NearField::taper((positions[other] - positions[node]).length() / radius);
-            for part in 0..3 {
-                let value = column[3 * other + part] * taper;
-                near.blocks[9 * at + 3 * axis + part] = value as f32;
-                sum += value.abs();
+    for node in 0..positions.len() {
+        near.nodes
+            .extend((0..positions.len()).filter(|&other| is_near(node, other)).map(|other| other as u32));
+        near.offsets.push(near.nodes.len() as u32);
+    }
+    near.blocks.resize(9 * near.nodes.len(), 0.0);
+    let NearField { offsets, nodes, blocks, .. } = &mut near;
+    let place = |row: usize, column: usize| {
+        let own = offsets[row] as usize..offsets[row + 1] as usize;
+        nodes[own.clone()].binary_search(&(column as u32)).ok().map(|at| 9 * (own.start + at))
+    };
+    let mut diagonal = RaisedDiagonal::new(positions.len());
+    let residual = SurfaceResidual::new(system, modes, surface_nodes);
+    residual.for_each_block(is_near, progress, |NodeBlock { row, load, entries }| {
+        let entries = entries * NearField::taper(distance(row, load) / radius);
+        diagonal.add(&NodeBlock { row, load, entries });
+        for (own, other, entries) in [(row, load, entries), (load, row, entries.transpose())] {
+            if let Some(first) = place(own, other) {
+                blocks[first..][..9].copy_from_slice(&by_rows(entries));
             }
-        }
-        if let Some(own) = row.into_iter().find(|&at| near.nodes[at] as usize == node) {
-            near.blocks[9 * own + 4 * axis] = (column[j].max(0.0) + F32_ROUNDING * sum) as f32;
         }
     })?;
-    for node in 0..positions.len() {
-        for at in near.offsets[node] as usize..near.offsets[node + 1] as usize {
-            let other = near.nodes[at] as usize;
-            let row = near.offsets[other] as usize..near.offsets[other + 1] as usize;
-            if other > node {
-                continue;
-            }
-            if let Ok(mirror) = near.nodes[row.clone()].binary_search(&(node as u32)) {
-                for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
-                    if other < node || a > b {
-                        near.blocks[9 * (row.start + mirror) + 3 * b + a] = near.blocks[9 * at + 3 * a + b];
-                    }
-                }
-            }
+    for (node, axis) in (0..positions.len()).flat_map(|node| (0..3).map(move |axis| (node, axis))) {
+        if let Some(first) = place(node, node) {
+            blocks[first + 4 * axis] = diagonal.raised(3 * node + axis);
         }
     }
     Ok(ResidualCompliance::NearField(near))

@@ -12,13 +12,14 @@
 //! motions give the same G. For a body with fixed nodes G is the inverse of K on the free ones.
 //! Reference: Géradin & Rixen, *Mechanical Vibrations*, 3.5.
 //!
-//! Equations: docs/theory.md (C1), (C2).
+//! Equations: docs/theory.md (C1), (C2), (C91).
 
 use crate::assembly::{Assembly, SystemMatrix};
 use crate::discretisation::Discretisation;
 use crate::factor::{Factor, Pattern};
 use crate::kernels::{avx_section, use_sequential_kernels};
 use crate::memory::check_memory;
+use crate::selected_inverse::SelectedInverse;
 use crate::solve_error::SolveError;
 use crate::supports::SupportedDofs;
 use faer::{Mat, MatRef};
@@ -45,6 +46,13 @@ pub struct System {
 struct Rigid {
     shapes: Mat<f64>,
     weighted: Mat<f64>,
+}
+
+/// G by its entries: those of an inverse, less left·rightᵀ, which have a row per degree of freedom.
+pub(crate) struct SelectedCompliance<'a> {
+    pub(crate) inverse: SelectedInverse<'a>,
+    pub(crate) left: Mat<f64>,
+    pub(crate) right: Mat<f64>,
 }
 
 impl System {
@@ -133,6 +141,26 @@ impl System {
         self.factor.solve(loads.as_mut());
         self.remove_rigid(&mut loads);
         loads
+    }
+
+    /// G by its entries. Of a free body, multiplied out:
+    ///
+    /// ```text
+    /// G = K⁻ − Y·Φrᵀ − Φr·(Y − Φr·C)ᵀ        Y = K⁻·M·Φr,  C = Φrᵀ·M·Y
+    /// ```
+    pub(crate) fn selected_compliance(&self) -> SelectedCompliance<'_> {
+        let inverse = self.factor.inverse();
+        let n = self.discretisation.dofs();
+        let Some(Rigid { shapes, weighted }) = &self.rigid else {
+            return SelectedCompliance { inverse, left: Mat::zeros(n, 0), right: Mat::zeros(n, 0) };
+        };
+        let mut relief = weighted.clone();
+        self.factor.solve(relief.as_mut());
+        let other = avx_section(|| &relief - shapes * (weighted.transpose() * &relief));
+        let beside = |a: &Mat<f64>, b: &Mat<f64>| {
+            Mat::from_fn(n, 12, |i, j| if j < 6 { a[(i, j)] } else { b[(i, j - 6)] })
+        };
+        SelectedCompliance { inverse, left: beside(&relief, shapes), right: beside(shapes, &other) }
     }
 
     /// Subtracts from loads the inertia forces of the rigid motion that they cause: (I − M·Φr·Φrᵀ)·B.
