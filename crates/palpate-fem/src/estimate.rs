@@ -10,10 +10,10 @@
 //! ```
 //!
 //! The entries of G at the surface visit those of the factor on the paths of the elimination tree: once forwards, and backwards as many for a near
-//! field, half of all for the whole matrix. e is that of the factorisation which proves a compact S positive definite. The compressed size of a compact S is a guess: it depends on the
-//! body.
+//! field, half of all for the whole matrix. e is that of the factorisation which proves a compact S positive definite. The compressed size of a
+//! compact S is a guess: it depends on the body.
 //!
-//! docs/recording.md states how well they predict four other bodies.
+//! docs/recording.md states how well they predict six bodies.
 
 use crate::assembly::Assembly;
 use crate::carriers::Carriers;

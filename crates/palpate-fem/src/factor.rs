@@ -1,4 +1,4 @@
-//! Sparse factors of K + s·M: the only module that uses faer's sparse factorisations.
+//! Sparse factors of K + s·M: with `selected_inverse` and `substitution` the only module that uses faer's sparse factorisations.
 //!
 //! Constrained degrees of freedom keep their row with a diagonal entry alone, so that sizes never change;
 //! a right-hand side is zero there. For s ≥ 0 the factor is Cholesky's; for s < 0 the inertia of
@@ -6,12 +6,13 @@
 
 use crate::assembly::Assembly;
 use crate::elimination_order::elimination_order;
-use crate::kernels::{SEQUENTIAL, avx_section, multiply, row_blocks, solve_lower, solve_upper};
+use crate::kernels::{SEQUENTIAL, avx_section, row_blocks};
 use crate::selected_inverse::{self, SelectedInverse};
 use crate::solve_error::SolveError;
+use crate::substitution::{substitute_backwards, substitute_forwards};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::Perm;
-use faer::reborrow::{Reborrow, ReborrowMut};
+use faer::reborrow::Reborrow;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::supernodal::{
     SupernodalIntranodeLbltRef, SupernodalLltRef, SymbolicSupernodalCholesky,
@@ -21,7 +22,7 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Accum, Conj, Mat, MatMut, Side, unzip, zip};
+use faer::{Conj, Mat, MatMut, Side};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -248,31 +249,11 @@ impl Factor {
         for new in 0..n {
             x.col_mut(new).copy_from(loads.as_ref().col(at(new)));
         }
-        // Xᵀ ← L⁻¹·Xᵀ, supernode by supernode; the matrix holds X.
         for supernode in supernodes() {
-            let (block, rows) = (supernode.val(), supernode.pattern());
-            let (start, width) = (supernode.start(), block.ncols());
-            let (diagonal, off) = block.split_at_row(width);
-            let mut own = x.as_mut().subcols_mut(start, width);
-            solve_lower(diagonal, own.rb_mut().transpose_mut());
-            let mut change = below.as_mut().subcols_mut(0, rows.len());
-            multiply(change.rb_mut(), Accum::Replace, own.rb(), off.transpose(), 1.0);
-            for (i, &row) in rows.iter().enumerate() {
-                zip!(x.col_mut(row), change.rb().col(i)).for_each(|unzip!(x, change)| *x -= *change);
-            }
+            substitute_forwards(supernode, supernode.start(), x.as_mut(), below.as_mut(), |place| place);
         }
-        // Xᵀ ← L⁻ᵀ·Xᵀ, backwards.
         for supernode in supernodes().rev() {
-            let (block, rows) = (supernode.val(), supernode.pattern());
-            let (start, width) = (supernode.start(), block.ncols());
-            let (diagonal, off) = block.split_at_row(width);
-            let mut known = below.as_mut().subcols_mut(0, rows.len());
-            for (i, &row) in rows.iter().enumerate() {
-                known.rb_mut().col_mut(i).copy_from(x.col(row));
-            }
-            let mut own = x.as_mut().subcols_mut(start, width);
-            multiply(own.rb_mut(), Accum::Add, known.rb(), off, -1.0);
-            solve_upper(diagonal.transpose(), own.rb_mut().transpose_mut());
+            substitute_backwards(supernode, supernode.start(), x.as_mut(), below.as_mut(), |place| place);
         }
         for new in 0..n {
             loads.as_mut().col_mut(at(new)).copy_from(x.col(new));

@@ -36,6 +36,7 @@ pub mod reference;
 mod residual;
 mod selected_inverse;
 mod solve_error;
+mod substitution;
 mod supports;
 mod system;
 pub mod table;

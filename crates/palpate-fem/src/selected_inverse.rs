@@ -7,10 +7,9 @@
 //!
 //! Equations: docs/theory.md (C91).
 
-use crate::kernels::{multiply, solve_lower, solve_upper};
-use faer::reborrow::{Reborrow, ReborrowMut};
+use crate::substitution::{substitute_backwards, substitute_forwards};
+use faer::Mat;
 use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
-use faer::{Accum, Mat, unzip, zip};
 
 /// Elimination tree of the supernodes of a factor.
 struct EliminationTree {
@@ -106,29 +105,10 @@ impl<'a> SelectedInverse<'a> {
             x[(load, column(self.places[dof]))] = 1.0;
         }
         for (s, _) in on_paths().filter(|(_, need)| need.loads) {
-            let supernode = self.factor.supernode(s);
-            let (block, pattern) = (supernode.val(), supernode.pattern());
-            let (diagonal, off) = block.split_at_row(block.ncols());
-            let mut own = x.as_mut().subcols_mut(starts[s], block.ncols());
-            solve_lower(diagonal, own.rb_mut().transpose_mut());
-            let mut change = below.as_mut().subcols_mut(0, pattern.len());
-            multiply(change.rb_mut(), Accum::Replace, own.rb(), off.transpose(), 1.0);
-            for (i, &place) in pattern.iter().enumerate() {
-                zip!(x.as_mut().col_mut(column(place)), change.rb().col(i))
-                    .for_each(|unzip!(x, change)| *x -= *change);
-            }
+            substitute_forwards(self.factor.supernode(s), starts[s], x.as_mut(), below.as_mut(), column);
         }
         for (s, _) in on_paths().rev().filter(|(_, need)| need.rows) {
-            let supernode = self.factor.supernode(s);
-            let (block, pattern) = (supernode.val(), supernode.pattern());
-            let (diagonal, off) = block.split_at_row(block.ncols());
-            let mut known = below.as_mut().subcols_mut(0, pattern.len());
-            for (i, &place) in pattern.iter().enumerate() {
-                known.rb_mut().col_mut(i).copy_from(x.col(column(place)));
-            }
-            let mut own = x.as_mut().subcols_mut(starts[s], block.ncols());
-            multiply(own.rb_mut(), Accum::Add, known.rb(), off, -1.0);
-            solve_upper(diagonal.transpose(), own.rb_mut().transpose_mut());
+            substitute_backwards(self.factor.supernode(s), starts[s], x.as_mut(), below.as_mut(), column);
         }
         let mut entries = Mat::zeros(loads.len(), rows.len());
         for (i, &dof) in rows.iter().enumerate().filter(|(_, dof)| !self.is_constrained[**dof]) {
