@@ -19,14 +19,10 @@ pub(crate) struct SolverParameters {
     pub(crate) sample_slop: f64,
     /// Residual that is used, and reported as unsolved, at the limit of sweeps.
     pub(super) rough_tolerance: f64,
-    /// Upper limits of exact evaluations, each of which reduces the residual of the rotation by a factor of about
-    /// h·|ω| + strain, and of sweeps over all of them.
-    pub(super) max_evaluations: u32,
+    /// Upper limit of sweeps over all evaluations.
     pub(super) max_sweeps: u32,
     /// Change of a contact that a sweep skips, as a share of the accuracy that the sweeps aim at.
     pub(super) skip: f64,
-    /// Change of force that is not propagated, by the displacement of its own point.
-    pub(super) min_change: f64,
     /// Goal of the sweeps between two evaluations, as a share of the residual before them.
     pub(super) sweep_goal: f64,
     /// Rotation within an evaluation [rad] from which contacts are linearised again.
@@ -53,10 +49,8 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     visits_with_samples: 60,
     sample_slop: 2e-3,
     rough_tolerance: 1e-4,
-    max_evaluations: 40,
     max_sweeps: 400,
     skip: 0.1,
-    min_change: 3e-10,
     sweep_goal: 0.02,
     relinearise: 0.01,
     max_turn: 0.3,
@@ -64,6 +58,10 @@ pub(crate) const SOLVER: SolverParameters = SolverParameters {
     jam: 0.05,
     recovery: 0.1,
 };
+
+/// Upper limit of exact evaluations, each of which reduces the residual of the rotation by a factor of about h·|ω| + strain. Reached only
+/// where they diverge.
+pub(super) const MAX_EVALUATIONS: u32 = 40;
 
 /// Round-off of a length, as a share of (distance from the origin + size): a few roundings of x + R·(r + u).
 pub(super) const ROUND_OFF: f64 = 8.0 * f64::EPSILON;

@@ -11,7 +11,7 @@
 
 use super::constraint::{Constraint, Yielding};
 use super::coulomb::{solve_contact, tangents};
-use super::parameters::{ROUND_OFF, SOLVER, UNSOLVED};
+use super::parameters::{MAX_EVALUATIONS, ROUND_OFF, UNSOLVED};
 use crate::collision::{Contact, ContactLaw, OtherSide};
 use crate::device::DeviceState;
 use crate::motion::{RigidIncrement, RigidIntegrator, RigidStep};
@@ -333,13 +333,12 @@ impl ContactProblem<'_> {
     pub(crate) fn predict_under_prescribed_forces(&mut self, at: usize) -> bool {
         let object = &self.objects[at];
         let own = &mut self.states[at];
-        own.points.least_move = 0.0;
         own.points.release_forces();
         own.end = own.free;
         own.restore_prescribed_forces();
         let allowed = ROUND_OFF * own.reach(object);
         let mut last = f64::INFINITY;
-        for _ in 0..SOLVER.max_evaluations {
+        for _ in 0..MAX_EVALUATIONS {
             let residual = self.evaluate_motion(at, object.inertia.is_some());
             if residual <= allowed || residual >= last {
                 last = residual.min(last);

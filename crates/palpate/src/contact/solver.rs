@@ -17,7 +17,7 @@
 
 use super::bilateral::BilateralSystem;
 use super::islands::Islands;
-use super::parameters::{ROUND_OFF, SOLVER, UNSOLVED};
+use super::parameters::{MAX_EVALUATIONS, ROUND_OFF, SOLVER, UNSOLVED};
 use super::problem::{ContactProblem, larger};
 use crate::collision::{ContactLaw, OtherSide};
 use alloc::vec::Vec;
@@ -161,13 +161,9 @@ impl Solver {
         report: &mut SolverReport,
     ) {
         let touches = self.members.iter().any(|&c| !problem.contacts[c as usize].is_held());
-        // Held points alone are solved to round-off, and their stiff rows would turn what is not propagated into forces.
-        let is_exact = self.members.len() <= SOLVER.few_contacts || !touches;
-        let min_change = if is_exact { 0.0 } else { SOLVER.min_change };
         let mut island = Island { touches, reach: 0.0, size: f64::INFINITY, dependent: 0 };
         for at in self.bodies.iter().map(|&at| at as usize) {
             let radius = problem.objects[at].radius;
-            problem.states[at].points.least_move = min_change * radius;
             island.reach = island.reach.max(problem.states[at].reach(&problem.objects[at]));
             island.size = island.size.min(radius);
         }
@@ -187,10 +183,6 @@ impl Solver {
         report.islands_out_of_budget += u32::from(is_out_of_budget);
         let round_off = island.round_off();
         // Contacts may be loose, the equations of motion under their forces not: the energy ledger relies on them.
-        // Displacements are those of the forces, to the last change.
-        for &body in &self.bodies {
-            problem.states[body as usize].points.least_move = 0.0;
-        }
         let is_solved = (is_solved || is_out_of_budget) && {
             problem.project_forces(&self.members);
             self.evaluate_to(problem, round_off) <= UNSOLVED * island.reach
@@ -232,7 +224,7 @@ impl Solver {
             let tolerance = if touches { self.tolerance(progress.visits) * size } else { 8.0 * round_off };
             let is_met = residual <= tolerance;
             let is_out_of_budget = touches && !is_met && residual.is_finite() && progress.is_out_of_budget();
-            let is_last = progress.iterations == SOLVER.max_evaluations
+            let is_last = progress.iterations == MAX_EVALUATIONS
                 || progress.sweeps >= SOLVER.max_sweeps
                 || !residual.is_finite();
             if is_met || is_out_of_budget || is_last {
@@ -290,7 +282,7 @@ impl Solver {
         problem.release_forces(&self.bodies, &self.members);
         self.start(problem);
         self.linearise(problem);
-        for _ in 0..SOLVER.max_evaluations {
+        for _ in 0..MAX_EVALUATIONS {
             let moved = self.sweep(problem, 0.0);
             if moved <= round_off {
                 break;
@@ -326,7 +318,7 @@ impl Solver {
     /// Evaluate until the residual of the rotations is down to a goal [m], or gets no smaller. Gives it.
     fn evaluate_to(&self, problem: &mut ContactProblem, goal: f64) -> f64 {
         let mut last = f64::INFINITY;
-        for _ in 0..SOLVER.max_evaluations {
+        for _ in 0..MAX_EVALUATIONS {
             let residual = self.evaluate(problem);
             if residual <= goal || residual >= last {
                 return residual;

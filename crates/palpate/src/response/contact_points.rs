@@ -56,8 +56,6 @@ pub(crate) struct ContactPoints {
     /// Forces g [N, body] and displacements C·g [m, body], three numbers per point.
     forces: Vec<f64>,
     moved: Vec<f64>,
-    /// Displacement [m] below which a change of force is postponed.
-    pub(crate) least_move: f64,
     unused: Vec<usize>,
     /// Index in `points` of each slot's point.
     at: Vec<usize>,
@@ -72,7 +70,6 @@ impl ContactPoints {
             stride,
             forces: vec![0.0; stride],
             moved: vec![0.0; stride],
-            least_move: 0.0,
             unused: (0..capacity).rev().collect(),
             at: vec![0; capacity],
         }
@@ -192,8 +189,7 @@ impl ContactPoints {
     pub(crate) fn push(&mut self, at: usize, force_in_body: DVec3) {
         let change = force_in_body - DVec3::from_slice(&self.forces[3 * at..]);
         self.points[at].force_in_body = force_in_body;
-        let own = self.compliance[3 * at * self.stride + 3 * at];
-        if change == DVec3::ZERO || change.length() * own < self.least_move {
+        if change == DVec3::ZERO {
             return;
         }
         force_in_body.write_to_slice(&mut self.forces[3 * at..]);
@@ -219,7 +215,6 @@ impl ContactPoints {
     }
 
     fn drop_force(&mut self, at: usize) {
-        self.least_move = 0.0;
         self.push(at, DVec3::ZERO);
     }
 
