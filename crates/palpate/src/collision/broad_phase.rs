@@ -91,7 +91,7 @@ impl SweepAndPrune {
 /// Sphere that holds a device's tip over the step.
 fn tip_sphere(parameters: &DeviceParameters, device: &DeviceState) -> (DVec3, f64) {
     let travel = (device.proxy_under_force() - device.proxy).length();
-    (device.proxy, parameters.tip_radius + COLLISION.motion_factor * travel)
+    (device.proxy, parameters.tip_radius + travel)
 }
 
 /// Box about a sphere (centre, radius).
@@ -185,8 +185,7 @@ impl CollisionContext<'_> {
         let displacement = (0..=body.coarsest_surface_level())
             .map(|level| body.bounds(body.footprint_at_level(level)).max_displacement(&bound))
             .fold(0.0, f64::max);
-        let slack =
-            body.max_height + COLLISION.margin * body.edge + COLLISION.motion_factor * self.motion(at);
+        let slack = body.max_height + COLLISION.margin * body.edge + self.motion(at);
         (own.rigid.pose.position, object.radius + displacement + slack)
     }
 
@@ -202,8 +201,7 @@ impl CollisionContext<'_> {
         let objects = self.scene.objects;
         let edge = objects[a].body.edge.max(objects[b].body.edge);
         let heights = objects[a].body.max_height + objects[b].body.max_height;
-        let slack =
-            heights + COLLISION.margin * edge + COLLISION.motion_factor * (self.motion(a) + self.motion(b));
+        let slack = heights + COLLISION.margin * edge + self.motion(a) + self.motion(b);
         let between = self.states[b].rigid.pose.position - self.states[a].rigid.pose.position;
         let Some(along) = between.try_normalize() else {
             return Some([HalfSpace { direction: DVec3::X, offset: f64::NEG_INFINITY }; 2]);

@@ -11,15 +11,13 @@ pub(super) struct CollisionParameters {
     pub(super) margin: f64,
     /// Displacement of a free node by the forces on its neighbours, as a share of theirs: an upper bound between neighbours.
     pub(super) neighbour_displacement: f64,
-    /// Safety factor on motions that are predicted without contact force.
-    pub(super) motion_factor: f64,
     /// Depth beyond which a point that was not in contact has not come through this surface, and motion in a step beyond which
     /// a tip is swept: of a tip, a share of its radius.
     pub(super) max_depth: f64,
     /// Gap between a fast tip and a surface at which they are in contact, and a sweep has arrived, as a share of its radius.
     pub(super) tip_margin: f64,
-    /// Change of location that a persistent contact ignores: a share of the tip's size, or of the edge of a decimated
-    /// surface. A new location costs its responses.
+    /// Change of location that a persistent contact ignores, as a share of the tip's size, and of a triangle's edge: a new location costs its
+    /// responses. A point so close to an edge or a corner lies on it.
     pub(super) location_tolerance: [f64; 2],
     /// Cosine between the normals of two triangles below which there is a crease between them (within 32° they are one face).
     pub(super) crease_cosine: f64,
@@ -28,8 +26,6 @@ pub(super) struct CollisionParameters {
     pub(super) opposing_cosine: f64,
     /// Distance over the rim of a face, of an object or a box, that a node may slide before it leaves the face.
     pub(super) overhang: f64,
-    /// Barycentric weight below which a point lies on the opposite edge.
-    pub(super) on_edge: f64,
     /// Skin of a triangle cache, as a share of mean edge and reach.
     pub(super) skin: f64,
     /// Steps that a rebuild takes, if it visits as many spheres and triangles as the last one.
@@ -50,14 +46,12 @@ pub(super) struct CollisionParameters {
 pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     margin: 2e-3,
     neighbour_displacement: 0.3,
-    motion_factor: 1.5,
     max_depth: 0.5,
     tip_margin: 0.05,
     location_tolerance: [1e-3, 1e-2],
     crease_cosine: 0.85,
     opposing_cosine: -0.2,
     overhang: 0.1,
-    on_edge: 0.02,
     skin: 0.5,
     rebuild_steps: 4,
     seed_above: 48,

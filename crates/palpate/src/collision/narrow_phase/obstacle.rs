@@ -228,7 +228,7 @@ impl ObstacleQuery<'_> {
         let local = positions.map(|p| self.obstacle_from_body.transform_point3(p));
         let Some(weights) = self.obstacle.shape.deepest(local) else { return };
         // Inside the triangle, or on an edge, which counts for one of its two triangles.
-        let is_thin = |k: &usize| weights[*k] < COLLISION.on_edge;
+        let is_thin = |k: &usize| weights[*k] < COLLISION.location_tolerance[1];
         let edge = (0..3).find(is_thin).map(|k| (corners[(k + 1) % 3], corners[(k + 2) % 3]));
         if (0..3).filter(is_thin).count() > 1 || edge.is_some_and(|(a, b)| a > b) {
             return;
@@ -266,7 +266,7 @@ impl ObstacleQuery<'_> {
         let height = self.body.smooth_height(&location);
         let travel = (end - start).length();
         let facing = self.obstacle_from_body.matrix3 * facing;
-        let depths = [COLLISION.max_depth * self.body.edge, self.margin + COLLISION.motion_factor * travel];
+        let depths = [COLLISION.max_depth * self.body.edge, self.margin + travel];
         let limits = (depths, COLLISION.overhang * self.body.edge);
         let distance = |p: DVec3| {
             let found = shape.pressed_face(p, |normal| opposes(normal, facing), limits);

@@ -102,7 +102,8 @@ impl CollisionContext<'_> {
                 };
                 let mut corners = base.object.body.corners(&candidate.location).into_iter();
                 let is_redundant = uses_samples
-                    && corners.all(|(node, weight)| weight < COLLISION.on_edge || is_candidate(node));
+                    && corners
+                        .all(|(node, weight)| weight < COLLISION.location_tolerance[1] || is_candidate(node));
                 if !is_redundant {
                     candidates.push(candidate);
                 }

@@ -48,8 +48,7 @@ pub(crate) fn point_against_surface(
     let (margin, reach) = (COLLISION.margin * edge, moving.reach());
     query.nearest_triangles(surface, (point, facing), reach, known);
     let nearest = query.found.first().copied()?;
-    let allowed =
-        heights + margin + COLLISION.motion_factor * (travel + surface.predicted_motion(nearest.triangle));
+    let allowed = heights + margin + travel + surface.predicted_motion(nearest.triangle);
     let on_face = nearest.weights.iter().all(|w| *w > ROUND_OFF);
     let mut inside = query.is_inside(surface.body, point);
     let mut at_border = false;

@@ -70,13 +70,13 @@ impl CollisionContext<'_> {
         }
         surface.exclude_own_residual(own_contacts, flat_radius(parameters, body));
         let query = &mut workspace.query;
-        let reach = tip + COLLISION.motion_factor * travel + 10.0 * COLLISION.margin * body.edge;
+        let reach = tip + travel + 10.0 * COLLISION.margin * body.edge;
         let triangles = self.caches.triangles[number].of(at, self.step);
         triangles.find(query, &mut surface, start, reach);
         // The surface here moves about as its nearest nodes do.
         let mut motion = motion;
         if let Some(nearest) = query.found.first().copied() {
-            let local = COLLISION.motion_factor * surface.predicted_motion(nearest.triangle);
+            let local = surface.predicted_motion(nearest.triangle);
             motion = motion.min(travel + local + 5.0 * COLLISION.margin * body.edge);
         }
         // Slow tips: all that can be met is near now. Fast tips: present contacts, and a sweep.
@@ -90,7 +90,7 @@ impl CollisionContext<'_> {
                 let SurfacePoint { triangle, weights } = own.points.of(contact.slot).location.point;
                 (start - at_weights(surface.corners(triangle), weights)).length()
             });
-            pressing.fold(tip, f64::max) + COLLISION.motion_factor * motion
+            pressing.fold(tip, f64::max) + motion
         };
         if needed > reach {
             triangles.find(query, &mut surface, start, needed);
