@@ -84,8 +84,8 @@ fn rest(
     cases: &[(usize, f64)],
 ) -> Result<Vec<Check>, VerifyError> {
     /// The last part of the run, of which the force is a mean.
-    const STEPS: u32 = 4000;
-    const LATE: u32 = 1000;
+    const STEPS: u32 = 2000;
+    const LATE: u32 = 500;
     let weight = body.mass() * GRAVITY_M_S2;
     let lie = |most: usize| -> Result<(f64, f64, RunInvariants), VerifyError> {
         let model = scene(most, 1e-3, 0.5, vec![object_at(body, DVec3::Y * half, DVec3::ZERO)])?;
