@@ -83,8 +83,8 @@ fn rest(
     half: f64,
     cases: &[(usize, f64)],
 ) -> Result<Vec<Check>, VerifyError> {
-    /// The last part of the run, of which the force is a mean.
     const STEPS: u32 = 2000;
+    /// The last part of the run, of which the force is a mean.
     const LATE: u32 = 500;
     let weight = body.mass() * GRAVITY_M_S2;
     let lie = |most: usize| -> Result<(f64, f64, RunInvariants), VerifyError> {

@@ -129,7 +129,7 @@ impl ContactPoints {
     /// Costs modes × points.
     pub(crate) fn set_location(&mut self, view: &mut ResponseView, slot: usize, location: ContactLocation) {
         let at = self.at[slot];
-        self.drop_force(at);
+        self.push(at, DVec3::ZERO);
         let start = view.assign(slot, &location);
         let rest = view.body.rest_position(&location);
         let point = &mut self.points[at];
@@ -155,7 +155,7 @@ impl ContactPoints {
     /// # Real time
     pub(crate) fn remove(&mut self, slot: usize) {
         let (at, last) = (self.at[slot], self.points.len() - 1);
-        self.drop_force(at);
+        self.push(at, DVec3::ZERO);
         if at != last {
             // The last point takes the free index.
             for other in 0..last {
@@ -212,10 +212,6 @@ impl ContactPoints {
         for point in &mut self.points {
             (point.force, point.force_in_body) = (DVec3::ZERO, DVec3::ZERO);
         }
-    }
-
-    fn drop_force(&mut self, at: usize) {
-        self.push(at, DVec3::ZERO);
     }
 
     /// Displacement of a point under the present forces [m, body].
