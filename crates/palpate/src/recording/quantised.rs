@@ -6,7 +6,7 @@
 //!
 //! Mode shapes: a power of two as the step of each mode, so that rounding them again changes nothing.
 
-use super::residual::lower_block;
+use super::residual::{lower_block, product, product_in_triangle, transposed_product};
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
@@ -42,6 +42,22 @@ impl QuantisedCompliance {
         DMat3::from_cols(column(0), column(1), column(2))
     }
 
+    /// Displacement of a node under nodal forces [N]: u_i = s_i·Σ_j q_ij·(s_j·f_j) [m], with the scales outside the sum.
+    ///
+    /// # Real time
+    /// Costs the forces.
+    pub(super) fn displacement(&self, node: usize, loads: &[(u32, DVec3)]) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for &(other, force) in loads {
+            sum += product_in_triangle(
+                &self.blocks,
+                (node, other as usize),
+                self.scales_of(other as usize) * force,
+            );
+        }
+        self.scales_of(node) * sum
+    }
+
     /// Add the displacements of all nodes under nodal forces [N] to `out` [m]: u_i = s_i·Σ_j q_ij·(s_j·f_j), with the scales outside the sum.
     pub(crate) fn add_displacements(&self, loads: &[(u32, DVec3)], out: &mut [DVec3]) {
         let mut sums = vec![DVec3::ZERO; out.len()];
@@ -53,18 +69,12 @@ impl QuantisedCompliance {
             let row = &self.blocks[9 * lower_block(node, 0)..];
             let (row, _) = row.as_chunks::<9>();
             for (sum, q) in below.iter_mut().zip(row) {
-                let [a, b, c, d, e, f, g, h, i] = q.map(f64::from);
-                sum.x += a * scaled.x + d * scaled.y + g * scaled.z;
-                sum.y += b * scaled.x + e * scaled.y + h * scaled.z;
-                sum.z += c * scaled.x + f * scaled.y + i * scaled.z;
+                *sum += transposed_product(q, scaled);
             }
             for (other, sum) in (node..).zip(above) {
                 let first = 9 * lower_block(other, node);
                 let Some(q) = self.blocks[first..].first_chunk::<9>() else { continue };
-                let [a, b, c, d, e, f, g, h, i] = q.map(f64::from);
-                sum.x += a * scaled.x + b * scaled.y + c * scaled.z;
-                sum.y += d * scaled.x + e * scaled.y + f * scaled.z;
-                sum.z += g * scaled.x + h * scaled.y + i * scaled.z;
+                *sum += product(q, scaled);
             }
         }
         for (node, (u, sum)) in out.iter_mut().zip(sums).enumerate() {

@@ -65,6 +65,26 @@ impl ResidualCompliance {
         }
     }
 
+    /// Displacement of a node under nodal forces [N]: Σ_j S_ij·f_j [m].
+    ///
+    /// # Real time
+    /// Costs the forces.
+    pub(crate) fn displacement(&self, node: usize, loads: &[(u32, DVec3)]) -> DVec3 {
+        match self {
+            Self::None => DVec3::ZERO,
+            Self::Whole(blocks) => {
+                let of = |&(other, force): &(u32, DVec3)| {
+                    product_in_triangle(blocks, (node, other as usize), force)
+                };
+                loads.iter().map(of).sum()
+            }
+            Self::Quantised(quantised) => quantised.displacement(node, loads),
+            Self::NearField(_) => {
+                loads.iter().map(|&(other, force)| self.block(node, other as usize) * force).sum()
+            }
+        }
+    }
+
     /// Whether every pair of nodes has a block.
     pub(crate) fn is_whole(&self) -> bool {
         matches!(self, Self::Whole(_) | Self::Quantised(_))
@@ -259,6 +279,34 @@ pub(crate) fn block_at(blocks: &[f32], at: usize) -> DMat3 {
     DMat3::from_cols(row(0), row(1), row(2)).transpose()
 }
 
+/// Product of the node block (i, j) of a symmetric matrix, whose lower triangle is given, and a vector.
+///
+/// # Real time
+pub(super) fn product_in_triangle<X: Copy + Into<f64>>(
+    lower: &[X],
+    (i, j): (usize, usize),
+    v: DVec3,
+) -> DVec3 {
+    let first = 9 * lower_block(i.max(j), i.min(j));
+    match lower[first..].first_chunk() {
+        Some(block) if i < j => transposed_product(block, v),
+        Some(block) => product(block, v),
+        None => DVec3::ZERO,
+    }
+}
+
+/// Product of a node block, given row by row, and a vector.
+pub(super) fn product<X: Copy + Into<f64>>(block: &[X; 9], v: DVec3) -> DVec3 {
+    let [a, b, c, d, e, f, g, h, i] = block.map(X::into);
+    DVec3::new(a * v.x + b * v.y + c * v.z, d * v.x + e * v.y + f * v.z, g * v.x + h * v.y + i * v.z)
+}
+
+/// Product of the transpose of a node block and a vector.
+pub(super) fn transposed_product<X: Copy + Into<f64>>(block: &[X; 9], v: DVec3) -> DVec3 {
+    let [a, b, c, d, e, f, g, h, i] = block.map(X::into);
+    DVec3::new(a * v.x + d * v.y + g * v.z, b * v.x + e * v.y + h * v.z, c * v.x + f * v.y + i * v.z)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -291,7 +339,8 @@ mod tests {
             residual.add_displacements(&loads, &mut out);
             for (i, u) in out.into_iter().enumerate() {
                 let sum: DVec3 = loads.iter().map(|&(j, f)| residual.block(i, j as usize) * f).sum();
-                assert!((u - DVec3::Y - sum).length() < 1e-14 * (1.0 + sum.length()), "{i}: {u} {sum}");
+                let near = |u: DVec3| (u - sum).length() < 1e-14 * (1.0 + sum.length());
+                assert!(near(u - DVec3::Y) && near(residual.displacement(i, &loads)), "{i}: {u} {sum}");
             }
         }
     }

@@ -124,13 +124,11 @@ impl NodalForces {
         springs: &[SpringForce],
         node: usize,
     ) -> DVec3 {
-        let residual = &body.recording.residual;
-        let at_nodes = self.loaded.iter();
-        let at_nodes = at_nodes.map(|&(other, force)| residual.block(node, other as usize) * force);
+        let by_nodes = body.recording.residual.displacement(node, &self.loaded);
         let of_samples = springs.iter().filter(|spring| spring.location.footprint != Footprint::Point);
         let by_sample =
             |spring: &SpringForce| body.residual_of_model_node(node, &spring.location) * spring.force;
-        at_nodes.chain(of_samples.map(by_sample)).sum()
+        by_nodes + of_samples.map(by_sample).sum::<DVec3>()
     }
 
     /// Cache the residual displacement of a node [m, body].
