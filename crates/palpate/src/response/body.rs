@@ -379,6 +379,17 @@ impl Body {
         sum
     }
 
+    /// Largest residual displacement of a node, or of a tip's patch about a node, per force on a location, over that of the location [1].
+    ///
+    /// # Real time
+    pub(super) fn residual_peak(&self, location: &ContactLocation) -> f64 {
+        match self.patch(location.footprint).map(|patch| &patch.centres) {
+            None => 1.0,
+            Some(PatchCentres::Nodes(kernel)) => kernel.peak(&self.recording, &location.point),
+            Some(PatchCentres::Samples(samples)) => samples.peak(&location.point),
+        }
+    }
+
     /// Residual compliance between two locations [m/N]; zero between patches of tips and other footprints, which couple by the
     /// modes alone.
     ///

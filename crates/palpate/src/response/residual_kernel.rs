@@ -73,7 +73,7 @@ impl ResidualKernel {
 
     /// √tr(D) of the patch about a node [√(m/N)].
     pub(super) fn size(&self, node: usize) -> f64 {
-        libm::sqrt(trace(&(self.factors[node] * self.factors[node].transpose())))
+        libm::sqrt(square(&self.factors[node]))
     }
 
     /// Factor A at a surface point [√(m/N)].
@@ -83,6 +83,16 @@ impl ResidualKernel {
         let corners = recording.surface.corners(point);
         let used = corners.iter().filter(|corner| corner.1 != 0.0);
         used.map(|&(node, w)| self.factors[node] * w).fold(DMat3::ZERO, |a, b| a + b)
+    }
+
+    /// Largest factor A at the nodes about a surface point, over that at the point, in the Frobenius norm [1].
+    ///
+    /// # Real time
+    pub(super) fn peak(&self, recording: &Recording, point: &SurfacePoint) -> f64 {
+        let own = square(&self.factor_at(recording, point));
+        let used = recording.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
+        let largest = used.map(|(node, _)| square(&self.factors[node])).fold(own, f64::max);
+        if own > 0.0 { libm::sqrt(largest / own) } else { 1.0 }
     }
 
     /// Residual displacement Σ K·f of the patch about a node [m, body] under forces with their rest positions and Aᵀ·f [√J], each constant
@@ -125,6 +135,11 @@ impl ResidualKernel {
         let (a, b) = (self.factor_at(recording, a), self.factor_at(recording, b));
         a * b.transpose() * NearField::taper(distance / self.range)
     }
+}
+
+/// Square of the Frobenius norm.
+pub(super) fn square(matrix: &DMat3) -> f64 {
+    matrix.to_cols_array().iter().map(|x| x * x).sum()
 }
 
 fn trace(matrix: &DMat3) -> f64 {

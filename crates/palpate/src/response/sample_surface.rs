@@ -16,6 +16,7 @@
 //!
 //! Equations: docs/theory.md (C59), (C60).
 
+use super::residual_kernel::square;
 use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
 use crate::surface::{
     EDGE_COSINE, OneSidedPatch, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint,
@@ -49,6 +50,8 @@ pub(crate) struct SampleSurface {
     pub(super) residual: ResidualCompliance,
     /// Residual compliance between vertices and the model's nodes [m/N].
     pub(super) to_nodes: PatchNodeCompliance,
+    /// Largest displacement of a node per force on each vertex, over that of the vertex [1]: a node within a patch moves farther than its average.
+    peaks: Vec<f32>,
 }
 
 /// Vertices of a sample surface before the response of the body is known: where they are, and the decimated surface between them.
@@ -115,7 +118,9 @@ impl SampleSurface {
         let tree = SphereTree::new(&surface.positions, &surface.triangles[..in_tree]);
         let to_nodes = PatchNodeCompliance::new(&recording.residual, weights, recording.model_nodes());
         let residual = averaged(&recording.residual, &to_nodes, weights);
-        Self { samples, one_sided, normals, surface, is_surface, triangle, tree, residual, to_nodes }
+        let peaks = (0..weights.len()).map(|vertex| to_nodes.peak(vertex, &residual.block(vertex, vertex)));
+        let peaks = peaks.collect();
+        Self { samples, one_sided, normals, surface, is_surface, triangle, tree, residual, to_nodes, peaks }
     }
 
     /// Number of vertices: samples and one-sided patches.
@@ -159,6 +164,13 @@ impl SampleSurface {
     pub(super) fn residual_at(&self, vertex: usize, point: &SurfacePoint) -> DMat3 {
         let between = |other: usize| self.residual.block(vertex, other);
         self.used_corners(point).map(|(other, weight)| between(other) * weight).sum()
+    }
+
+    /// Largest displacement of a node per force on a point of the decimated surface, over that of the point [1]: of the vertices about it.
+    ///
+    /// # Real time
+    pub(super) fn peak(&self, point: &SurfacePoint) -> f64 {
+        self.used_corners(point).map(|(vertex, _)| f64::from(self.peaks[vertex])).fold(1.0, f64::max)
     }
 
     /// Residual compliance of a vertex per force that nodes share by weights [m/N].
@@ -294,6 +306,13 @@ impl PatchNodeCompliance {
             .map(|at| (self.nodes[at] as usize, block_at(&self.blocks, at)))
     }
 
+    /// Largest displacement of a node per force on a patch, over that of the patch with its own compliance [m/N]; in the Frobenius norm [1].
+    fn peak(&self, patch: usize, own: &DMat3) -> f32 {
+        let largest = self.row(patch).map(|(_, block)| square(&block)).fold(0.0, f64::max);
+        let own = square(own);
+        if own > 0.0 { libm::sqrt(largest / own) as f32 } else { 1.0 }
+    }
+
     /// Displacement of a patch per force at a node [m/N].
     ///
     /// # Real time
@@ -343,5 +362,48 @@ impl Accumulator {
             is_used[at] = false;
             (at, core::mem::replace(&mut sums[at], DMat3::ZERO))
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::modal::BEYOND_CONTACTS;
+    use super::super::{Body, ContactLimits, ContactLocation, Footprint};
+    use crate::recording::Recording;
+    use alloc::sync::Arc;
+    use glam::DVec3;
+
+    #[test]
+    fn no_node_moves_farther_than_the_peak_of_a_sample_allows() {
+        let files = [
+            &include_bytes!("../../../../data/recordings/v1_levels/ball.palp")[..],
+            include_bytes!("../../../../data/recordings/v1/free.palp"),
+        ];
+        let (mut highest, mut tightest) = (1.0_f64, 0.0_f64);
+        for bytes in files {
+            let recording = Arc::new(Recording::from_bytes(bytes).expect("a released recording"));
+            let limits = ContactLimits { max_samples: 8, max_points: 512 };
+            let body = Body::new(recording.clone(), &[], Some(limits), &[]);
+            for level in 1..=body.coarsest_level() {
+                let footprint = body.footprint_at_level(level);
+                for vertex in 0..body.vertices(footprint) {
+                    let location = ContactLocation { point: body.node_point(footprint, vertex), footprint };
+                    let peak = body.residual_peak(&location);
+                    highest = highest.max(peak);
+                    for k in 0..13 {
+                        let angle = |p: f64| libm::sin(p * f64::from(k) + p);
+                        let force = DVec3::new(angle(1.3), angle(2.1), angle(3.7));
+                        let own = (body.residual(&location, &location) * force).length();
+                        let of_node =
+                            |node| (body.residual_at(Footprint::Point, node, &location) * force).length();
+                        let most = (0..recording.surface.positions.len()).map(of_node).fold(0.0, f64::max);
+                        let share = most / (BEYOND_CONTACTS * peak * own);
+                        assert!(share <= 1.0, "level {level}, vertex {vertex}: {share}");
+                        tightest = tightest.max(share);
+                    }
+                }
+            }
+        }
+        assert!(highest > 1.2 && tightest > 0.8, "{highest} {tightest}");
     }
 }
