@@ -63,6 +63,11 @@ pub fn cayley(v: DVec3) -> DQuat {
     DQuat::from_xyzw(0.5 * v.x, 0.5 * v.y, 0.5 * v.z, 1.0).normalize()
 }
 
+/// Square of the Frobenius norm of a matrix.
+pub(crate) fn frobenius_square(matrix: &DMat3) -> f64 {
+    matrix.to_cols_array().iter().map(|x| x * x).sum()
+}
+
 /// Cross-product matrix v̂, with v̂·a = v × a.
 pub(crate) fn cross_matrix(v: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))

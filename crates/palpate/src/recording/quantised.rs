@@ -6,7 +6,7 @@
 //!
 //! Mode shapes: a power of two as the step of each mode, so that rounding them again changes nothing.
 
-use super::residual::{lower_block, product, product_in_triangle, transposed_product};
+use super::residual::{lower_block, product_in_triangle, transposed_product};
 use crate::error::{RecordingError, RecordingPart};
 use alloc::format;
 use alloc::string::String;
@@ -49,11 +49,8 @@ impl QuantisedCompliance {
     pub(super) fn displacement(&self, node: usize, loads: &[(u32, DVec3)]) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for &(other, force) in loads {
-            sum += product_in_triangle(
-                &self.blocks,
-                (node, other as usize),
-                self.scales_of(other as usize) * force,
-            );
+            let other = other as usize;
+            sum += product_in_triangle(&self.blocks, (node, other), self.scales_of(other) * force);
         }
         self.scales_of(node) * sum
     }
@@ -72,9 +69,7 @@ impl QuantisedCompliance {
                 *sum += transposed_product(q, scaled);
             }
             for (other, sum) in (node..).zip(above) {
-                let first = 9 * lower_block(other, node);
-                let Some(q) = self.blocks[first..].first_chunk::<9>() else { continue };
-                *sum += product(q, scaled);
+                *sum += product_in_triangle(&self.blocks, (other, node), scaled);
             }
         }
         for (node, (u, sum)) in out.iter_mut().zip(sums).enumerate() {

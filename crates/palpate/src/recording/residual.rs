@@ -296,7 +296,7 @@ pub(super) fn product_in_triangle<X: Copy + Into<f64>>(
 }
 
 /// Product of a node block, given row by row, and a vector.
-pub(super) fn product<X: Copy + Into<f64>>(block: &[X; 9], v: DVec3) -> DVec3 {
+fn product<X: Copy + Into<f64>>(block: &[X; 9], v: DVec3) -> DVec3 {
     let [a, b, c, d, e, f, g, h, i] = block.map(X::into);
     DVec3::new(a * v.x + b * v.y + c * v.z, d * v.x + e * v.y + f * v.z, g * v.x + h * v.y + i * v.z)
 }

@@ -3,7 +3,7 @@
 //! Each modal coordinate q [m·√kg] is an oscillator under a held force (`oscillator`). The residual compliance S [m/N] is the
 //! static compliance of the modes that are not kept (`sampled_residual`), d the forces whose static displacement it has.
 //!
-//! Equations: docs/theory.md (C3), (C7), (C55) to (C57).
+//! Equations: docs/theory.md (C3), (C7), (C55) to (C57), (C92).
 
 use super::ContactPoint;
 use super::modal_deformation::ModalDeformation;
@@ -83,10 +83,12 @@ impl ResidualBound {
     /// forces [m]. They are largest at the contacts, and where they have been.
     fn advance(&mut self, (largest, largest_held): (f64, f64), has_left: bool, residual: &SampledResidual) {
         let (decay, lead) = (residual.decay(), residual.lead());
+        let [largest, largest_held] =
+            [largest, largest_held].map(|of_contacts| BEYOND_CONTACTS * of_contacts);
         let left = if has_left { decay * self.relaxed + lead * self.held } else { 0.0 };
-        self.total = BEYOND_CONTACTS * largest + left;
-        self.relaxed = decay * self.relaxed + (1.0 - decay) * BEYOND_CONTACTS * largest_held;
-        self.held = BEYOND_CONTACTS * largest_held;
+        self.total = largest + left;
+        self.relaxed = decay * self.relaxed + (1.0 - decay) * largest_held;
+        self.held = largest_held;
     }
 }
 

@@ -11,6 +11,7 @@
 //! Equations: docs/theory.md (C28), (C29).
 
 use crate::recording::{NearField, Recording, ResidualCompliance};
+use crate::spatial::frobenius_square;
 use crate::surface::{PatchWeights, SurfacePoint};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -73,25 +74,33 @@ impl ResidualKernel {
 
     /// √tr(D) of the patch about a node [√(m/N)].
     pub(super) fn size(&self, node: usize) -> f64 {
-        libm::sqrt(square(&self.factors[node]))
+        libm::sqrt(frobenius_square(&self.factors[node]))
     }
 
     /// Factor A at a surface point [√(m/N)].
     ///
     /// # Real time
     pub(super) fn factor_at(&self, recording: &Recording, point: &SurfacePoint) -> DMat3 {
-        let corners = recording.surface.corners(point);
-        let used = corners.iter().filter(|corner| corner.1 != 0.0);
-        used.map(|&(node, w)| self.factors[node] * w).fold(DMat3::ZERO, |a, b| a + b)
+        self.factors_about(recording, point).map(|(factor, w)| factor * w).fold(DMat3::ZERO, |a, b| a + b)
+    }
+
+    /// Factors A of the nodes about a surface point, with their weights.
+    fn factors_about(
+        &self,
+        recording: &Recording,
+        point: &SurfacePoint,
+    ) -> impl Iterator<Item = (DMat3, f64)> {
+        let used = recording.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
+        used.map(|(node, weight)| (self.factors[node], weight))
     }
 
     /// Largest factor A at the nodes about a surface point, over that at the point, in the Frobenius norm [1].
     ///
     /// # Real time
     pub(super) fn peak(&self, recording: &Recording, point: &SurfacePoint) -> f64 {
-        let own = square(&self.factor_at(recording, point));
-        let used = recording.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0);
-        let largest = used.map(|(node, _)| square(&self.factors[node])).fold(own, f64::max);
+        let own = frobenius_square(&self.factor_at(recording, point));
+        let at_nodes = self.factors_about(recording, point).map(|(factor, _)| frobenius_square(&factor));
+        let largest = at_nodes.fold(own, f64::max);
         if own > 0.0 { libm::sqrt(largest / own) } else { 1.0 }
     }
 
@@ -135,11 +144,6 @@ impl ResidualKernel {
         let (a, b) = (self.factor_at(recording, a), self.factor_at(recording, b));
         a * b.transpose() * NearField::taper(distance / self.range)
     }
-}
-
-/// Square of the Frobenius norm.
-pub(super) fn square(matrix: &DMat3) -> f64 {
-    matrix.to_cols_array().iter().map(|x| x * x).sum()
 }
 
 fn trace(matrix: &DMat3) -> f64 {

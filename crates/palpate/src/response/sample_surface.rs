@@ -14,10 +14,10 @@
 //! compliance D [m/N] between samples is that of the nodes, averaged on both sides: as exact as it is recorded, and positive
 //! semi-definite with it.
 //!
-//! Equations: docs/theory.md (C59), (C60).
+//! Equations: docs/theory.md (C59), (C60), (C92).
 
-use super::residual_kernel::square;
 use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
+use crate::spatial::frobenius_square;
 use crate::surface::{
     EDGE_COSINE, OneSidedPatch, PatchWeights, SampleLevel, SphereTree, Surface, SurfacePoint,
 };
@@ -308,8 +308,8 @@ impl PatchNodeCompliance {
 
     /// Largest displacement of a node per force on a patch, over that of the patch with its own compliance [m/N]; in the Frobenius norm [1].
     fn peak(&self, patch: usize, own: &DMat3) -> f32 {
-        let largest = self.row(patch).map(|(_, block)| square(&block)).fold(0.0, f64::max);
-        let own = square(own);
+        let largest = self.row(patch).map(|(_, block)| frobenius_square(&block)).fold(0.0, f64::max);
+        let own = frobenius_square(own);
         if own > 0.0 { libm::sqrt(largest / own) as f32 } else { 1.0 }
     }
 
