@@ -68,6 +68,13 @@ pub(crate) fn frobenius_square(matrix: &DMat3) -> f64 {
     matrix.to_cols_array().iter().map(|x| x * x).sum()
 }
 
+/// Upper bound of the spectral norm of a matrix: √(‖M‖₁·‖M‖_∞), exact for a multiple of the identity.
+pub(crate) fn spectral_bound(matrix: &DMat3) -> f64 {
+    let [a, b, c] = [matrix.x_axis.abs(), matrix.y_axis.abs(), matrix.z_axis.abs()];
+    let largest_column = a.element_sum().max(b.element_sum()).max(c.element_sum());
+    libm::sqrt(largest_column * (a + b + c).max_element())
+}
+
 /// Cross-product matrix v̂, with v̂·a = v × a.
 pub(crate) fn cross_matrix(v: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))

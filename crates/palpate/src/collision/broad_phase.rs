@@ -242,7 +242,10 @@ impl CollisionContext<'_> {
         let (own, body) = (&self.states[at], &self.scene.objects[at].body);
         let positions = &mut self.workspace.positions[at];
         let moment = SurfaceTime::StepStart(self.step);
-        DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment)
+        let mut surface =
+            DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
+        surface.localise_residual(&own.response, self.step);
+        surface
     }
 }
 

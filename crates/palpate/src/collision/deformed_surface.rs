@@ -8,8 +8,10 @@
 //! Equations: docs/theory.md (C19).
 
 use super::node_cache::NodePositionCache;
+use super::parameters::COLLISION;
 use crate::response::{
     Body, ContactLocation, ContactPoints, Footprint, NodalForces, ResponseState, SpringForce,
+    SubtreeCompliance,
 };
 use crate::surface::{
     Centre, DeformationBound, DeformingNodes, Surface, Traversal, area_normal, at_weights,
@@ -78,6 +80,16 @@ pub(crate) struct DeformedSurface<'a> {
     flat_radius: f64,
     cache: &'a mut NodePositionCache,
     bound: DeformationBound,
+    /// Bounds of the residual displacement by subtrees, where they are used.
+    local: Option<LocalBounds<'a>>,
+}
+
+/// Subtrees whose residual displacement is bounded one by one.
+struct LocalBounds<'a> {
+    level: usize,
+    subtrees: &'a SubtreeCompliance,
+    /// Distance of a table's surface from that of its modes [m].
+    surface_error: f64,
 }
 
 impl<'a> DeformedSurface<'a> {
@@ -115,7 +127,28 @@ impl<'a> DeformedSurface<'a> {
             flat_radius: 0.0,
             cache,
             bound,
+            local: None,
         }
+    }
+
+    /// Bound the residual displacement subtree by subtree from now on, at the start of a step: farther from the forces it is smaller. Bounds that
+    /// outlive the step must not use it.
+    ///
+    /// # Real time
+    /// Costs the forces times the subtrees, once a step and level of detail.
+    pub(crate) fn localise_residual(&mut self, state: &ResponseState, step: u64) {
+        let is_large = self.bound.max_residual > COLLISION.local_residual * self.body.edge;
+        let subtrees = self.body.subtrees(self.footprint).filter(|_| is_large);
+        if let (Some(level), Some(subtrees)) = (self.body.level_of(self.footprint), subtrees) {
+            self.cache.residual_bounds.compute((level, subtrees), self.body, state, step);
+            self.local = Some(LocalBounds { level, subtrees, surface_error: state.surface_error() });
+        }
+    }
+
+    /// Bound of the residual displacement of a subtree [m], chosen among those of its level.
+    fn residual_of(&self, subtree: impl FnOnce(&SubtreeCompliance) -> usize) -> f64 {
+        let Some(LocalBounds { level, subtrees, surface_error }) = &self.local else { return f64::INFINITY };
+        self.cache.residual_bounds.of(*level, subtree(subtrees)) + surface_error
     }
 
     /// Exclude the contacts' own residual displacement within a radius [m] of their locations: the indentation by a tip does not
@@ -161,6 +194,11 @@ impl<'a> DeformedSurface<'a> {
     /// Upper bound of the residual displacement of any node [m].
     pub(crate) fn max_residual(&self) -> f64 {
         self.bound.max_residual
+    }
+
+    /// Upper bound of the residual displacement of a node or contact sample [m].
+    pub(crate) fn max_residual_of(&self, node: usize) -> f64 {
+        self.bound.max_residual.min(self.residual_of(|subtrees| subtrees.of_vertex(node)))
     }
 
     /// Begin a traversal that takes every node once.
@@ -291,12 +329,12 @@ impl<'a> DeformedSurface<'a> {
     /// Costs the nodes that come near to the bound.
     pub(crate) fn support(&mut self, direction: DVec3, least: f64) -> f64 {
         let farthest = core::cell::Cell::new(least);
-        let residual = self.max_residual();
         self.traverse(
             |_, _, centre, radius| centre.dot(direction) + radius > farthest.get(),
             |surface, triangle| {
-                for node in surface.surface().triangles[triangle as usize] {
-                    let support = surface.modal_position(node as usize).dot(direction) + residual;
+                for node in surface.surface().triangles[triangle as usize].map(|node| node as usize) {
+                    let residual = surface.max_residual_of(node);
+                    let support = surface.modal_position(node).dot(direction) + residual;
                     farthest.set(farthest.get().max(support));
                 }
             },
@@ -344,6 +382,10 @@ impl<'a> DeformedSurface<'a> {
 impl DeformingNodes for DeformedSurface<'_> {
     fn rest(&self, node: usize) -> DVec3 {
         DeformedSurface::rest(self, node)
+    }
+
+    fn residual_bound(&self, at: usize) -> f64 {
+        self.residual_of(|subtrees| subtrees.of_tree_node(at))
     }
 
     /// With residual displacement where it is smooth; elsewhere it counts for the sphere's radius.

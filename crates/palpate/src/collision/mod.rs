@@ -15,6 +15,7 @@ mod node_cache;
 mod parameters;
 mod point_budget;
 mod proximity;
+mod residual_bounds;
 mod triangle_cache;
 
 pub(crate) use candidate::{CandidateSide, ContactCandidate};

@@ -1,5 +1,6 @@
 //! Node positions of one object, computed on demand and kept for a moment of the step.
 
+use super::residual_bounds::ResidualBounds;
 use crate::response::{Body, ContactPoints, Footprint};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -52,6 +53,8 @@ pub(crate) struct NodePositionCache {
     /// Nodes that the present traversal has reached.
     marks: Vec<u32>,
     mark: u32,
+    /// Bounds of the residual displacement of subtrees.
+    pub(super) residual_bounds: ResidualBounds,
 }
 
 impl NodePositionCache {
@@ -71,6 +74,7 @@ impl NodePositionCache {
             single: [(); 2].map(|()| vec![0.0; body.recording.modes.len()]),
             marks: vec![0; nodes],
             mark: 0,
+            residual_bounds: ResidualBounds::new(body),
         }
     }
 
@@ -92,6 +96,7 @@ impl NodePositionCache {
     /// Forget the positions of the step.
     pub(super) fn forget(&mut self) {
         self.key = None;
+        self.residual_bounds.forget();
     }
 
     /// Leave out the residual displacement of some contacts from now on.

@@ -26,6 +26,8 @@ pub(super) struct CollisionParameters {
     pub(super) opposing_cosine: f64,
     /// Distance over the rim of a face, of an object or a box, that a node may slide before it leaves the face.
     pub(super) overhang: f64,
+    /// Residual displacement above which it is bounded subtree by subtree: the smallest spheres have a radius of about an edge.
+    pub(super) local_residual: f64,
     /// Skin of a triangle cache, as a share of mean edge and reach.
     pub(super) skin: f64,
     /// Steps that a rebuild takes, if it visits as many spheres and triangles as the last one.
@@ -52,6 +54,7 @@ pub(super) const COLLISION: CollisionParameters = CollisionParameters {
     crease_cosine: 0.85,
     opposing_cosine: -0.2,
     overhang: 0.1,
+    local_residual: 0.1,
     skin: 0.5,
     rebuild_steps: 4,
     seed_above: 48,

@@ -2,13 +2,14 @@
 //!
 //! Equations: docs/theory.md (C27), (C28), (C29).
 
-use super::contact_location::{ContactLocation, Footprint, SpringForce};
-use super::level_residual::{LevelPair, LevelResidual};
+mod residual;
+
+use super::contact_location::{ContactLocation, Footprint};
+use super::level_residual::LevelResidual;
 use super::modal_distances::{ModalDistances, residual_size};
 use super::patch_field::{PatchCentres, PatchField};
-use super::residual_kernel::ResidualKernel;
 use super::sample_surface::SampleSurface;
-use super::sampled_residual::{ResidualMemory, SampledResidual};
+use super::subtree_compliance::SubtreeCompliance;
 use crate::dot_products::{dot3, dot3_single};
 use crate::recording::Recording;
 use crate::surface::{
@@ -17,7 +18,7 @@ use crate::surface::{
 };
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// Number of partners of an object for which the coarsest level of contact samples finds room.
 const PARTNERS: usize = 4;
@@ -61,6 +62,8 @@ pub(crate) struct Body {
     between_levels: Vec<LevelResidual>,
     tree: SphereTree,
     bounds: Bounds,
+    /// Residual compliance of the tree's subtrees; none where nothing meets the surface.
+    subtrees: Option<SubtreeCompliance>,
     /// Mean edge length of the triangles at rest [m].
     pub(crate) edge: f64,
     /// Distance below which contacts depend on one another [m]: between the model's nodes, of an embedded surface; 0 of others.
@@ -109,6 +112,7 @@ impl Body {
         if !cells.is_empty() {
             patches.push(PatchField::at_cells(&recording, cells));
         }
+        let subtrees = limits.map(|_| SubtreeCompliance::of_surface(&recording, &tree));
         let (mut around, mut first_around) = (Vec::new(), alloc::vec![0]);
         for triangles in triangles_around(&recording.surface) {
             around.extend(triangles);
@@ -125,6 +129,7 @@ impl Body {
             between_levels,
             tree,
             bounds,
+            subtrees,
             edge,
             node_spacing,
             around,
@@ -364,6 +369,14 @@ impl Body {
         self.patch(footprint).map_or(&self.bounds, |patch| &patch.bounds)
     }
 
+    /// Residual compliance of the subtrees of a footprint's tree; none of patches of tips and of clamps.
+    pub(crate) fn subtrees(&self, footprint: Footprint) -> Option<&SubtreeCompliance> {
+        match footprint {
+            Footprint::Point => self.subtrees.as_ref(),
+            Footprint::Patch(_) => self.level_of(footprint).and(self.samples(footprint)).map(|s| &s.subtrees),
+        }
+    }
+
     /// Sag of a location beyond the modes under a gravity [m/s², body]; zero for a free body [m, body]. That of a contact sample is averaged
     /// over its patch.
     pub(crate) fn sag(&self, location: &ContactLocation, gravity: DVec3) -> DVec3 {
@@ -378,156 +391,4 @@ impl Body {
         });
         sum
     }
-
-    /// Largest residual displacement of a node, or of a tip's patch about a node, per force on a location, over that of the location [1].
-    ///
-    /// # Real time
-    pub(super) fn residual_peak(&self, location: &ContactLocation) -> f64 {
-        match self.patch(location.footprint).map(|patch| &patch.centres) {
-            None => 1.0,
-            Some(PatchCentres::Nodes(kernel)) => kernel.peak(&self.recording, &location.point),
-            Some(PatchCentres::Samples(samples)) => samples.peak(&location.point),
-        }
-    }
-
-    /// Residual compliance between two locations [m/N]; zero between patches of tips and other footprints, which couple by the
-    /// modes alone.
-    ///
-    /// # Real time
-    pub(crate) fn residual(&self, a: &ContactLocation, b: &ContactLocation) -> DMat3 {
-        match self.kernel(a.footprint) {
-            Some(kernel) if a.footprint == b.footprint => kernel.between(&self.recording, &a.point, &b.point),
-            _ => used(self.corners(a))
-                .map(|(node, weight)| self.residual_at(a.footprint, node, b) * weight)
-                .sum(),
-        }
-    }
-
-    /// Residual compliance [m/N] of a surface node or a contact sample: its displacement per force at a location.
-    ///
-    /// # Real time
-    /// Costs a few blocks; between samples of different levels a patch.
-    pub(super) fn residual_at(&self, footprint: Footprint, node: usize, location: &ContactLocation) -> DMat3 {
-        if self.is_tip(footprint) || self.is_tip(location.footprint) {
-            return DMat3::ZERO;
-        }
-        match (self.samples(footprint), self.samples(location.footprint)) {
-            (None, None) => self.residual_of_node(node, location),
-            (Some(own), _) if footprint == location.footprint => own.residual_at(node, &location.point),
-            (Some(own), _) => {
-                if let Some(known) = self.between_levels(footprint, location.footprint) {
-                    let of = |(sample, weight): (usize, f64)| known.between(node, sample) * weight;
-                    return used(self.corners(location)).map(of).sum();
-                }
-                let sum = |(corner, weight): (usize, f64)| match self.patch(location.footprint) {
-                    None => own.to_nodes.averaged(node, self.recording.model_nodes_of(corner)) * weight,
-                    Some(patch) => own.to_nodes.averaged(node, patch.weights.of(corner)) * weight,
-                };
-                used(self.corners(location)).map(sum).sum()
-            }
-            (None, Some(_)) => {
-                let of_model = self.recording.model_nodes_of(node);
-                of_model.map(|(node, weight)| self.residual_of_model_node(node, location) * weight).sum()
-            }
-        }
-    }
-
-    /// Residual compliance [m/N] of a model node: its displacement per force at a contact sample; zero for patches of tips.
-    ///
-    /// # Real time
-    pub(super) fn residual_of_model_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
-        let Some(samples) = self.samples(location.footprint) else { return DMat3::ZERO };
-        let of = |sample: usize| samples.to_nodes.between(sample, node).transpose();
-        used(self.corners(location)).map(|(sample, weight)| of(sample) * weight).sum()
-    }
-
-    /// Residual compliance between the contact samples of two levels, if it is precomputed.
-    fn between_levels(&self, a: Footprint, b: Footprint) -> Option<LevelPair<'_>> {
-        let (a, b) = (self.level_of(a)?.checked_sub(1)?, self.level_of(b)?.checked_sub(1)?);
-        LevelPair::find(&self.between_levels, [a, b])
-    }
-
-    /// Whether a footprint is a patch of tips.
-    pub(crate) fn is_tip(&self, footprint: Footprint) -> bool {
-        matches!(footprint, Footprint::Patch(index) if (index as usize) < self.device_patches)
-    }
-
-    fn kernel(&self, footprint: Footprint) -> Option<&ResidualKernel> {
-        match &self.patch(footprint)?.centres {
-            PatchCentres::Nodes(kernel) => Some(kernel),
-            PatchCentres::Samples(_) => None,
-        }
-    }
-
-    /// Spring force at a location with the memory of its forces [N, body].
-    ///
-    /// # Real time
-    pub(super) fn spring_force(
-        &self,
-        location: ContactLocation,
-        memory: ResidualMemory,
-        residual: &SampledResidual,
-    ) -> SpringForce {
-        let rest = self.rest_position(&location);
-        let factor = self
-            .kernel(location.footprint)
-            .map_or(DMat3::ZERO, |kernel| kernel.factor_at(&self.recording, &location.point).transpose());
-        let force = residual.effective(&memory);
-        SpringForce { location, memory, force, rest, factor, factored: factor * force }
-    }
-
-    /// Residual displacement of a node or contact sample under a force [m, body].
-    ///
-    /// # Real time
-    pub(crate) fn residual_displacement(
-        &self,
-        footprint: Footprint,
-        node: usize,
-        applied: &SpringForce,
-    ) -> DVec3 {
-        self.residual_at(footprint, node, &applied.location) * applied.force
-    }
-
-    /// Residual displacement of the patch of a tip about a node [m, body] under forces on patches of the same radius, each constant up to a
-    /// distance [m] from it.
-    ///
-    /// # Real time
-    pub(crate) fn tip_displacement<'s>(
-        &self,
-        footprint: Footprint,
-        node: usize,
-        forces: impl Iterator<Item = (&'s SpringForce, f64)>,
-    ) -> DVec3 {
-        let Some(kernel) = self.kernel(footprint) else { return DVec3::ZERO };
-        let forces = forces.map(|(force, flat_radius)| (force.rest, force.factored, flat_radius));
-        kernel.displacement(&self.recording, node, forces)
-    }
-
-    /// Distribution of a force at a location to the model's nodes, with weights; a node may come more than once. Corners that have no weight but for
-    /// round-off get none.
-    pub(super) fn distribute(&self, location: &ContactLocation, mut give: impl FnMut(usize, f64)) {
-        for (corner, weight) in self.corners(location) {
-            match self.patch(location.footprint) {
-                _ if weight.abs() <= f64::EPSILON => {}
-                None => self.recording.model_nodes_of(corner).for_each(|(node, w)| give(node, w * weight)),
-                Some(patch) => patch.weights.of(corner).for_each(|(node, w)| give(node, w * weight)),
-            }
-        }
-    }
-
-    /// Residual compliance of a surface node [m/N]: its displacement per force at a location.
-    pub(super) fn residual_of_node(&self, node: usize, location: &ContactLocation) -> DMat3 {
-        let recording = &self.recording;
-        let of = |own: usize| {
-            let mut sum = DMat3::ZERO;
-            self.distribute(location, |other, weight| sum += recording.residual.block(own, other) * weight);
-            sum
-        };
-        recording.model_nodes_of(node).map(|(own, weight)| of(own) * weight).sum()
-    }
-}
-
-/// Corners that carry weight.
-fn used(corners: [(usize, f64); 3]) -> impl Iterator<Item = (usize, f64)> {
-    corners.into_iter().filter(|(_, weight)| *weight != 0.0)
 }

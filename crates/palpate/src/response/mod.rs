@@ -22,6 +22,7 @@ mod residual_kernel;
 mod sample_surface;
 mod sampled_residual;
 mod spring_forces;
+mod subtree_compliance;
 
 pub(crate) use body::{Body, ContactLimits};
 pub(crate) use contact_location::{ContactLocation, Footprint, LocationState, SpringForce};
@@ -31,6 +32,7 @@ pub(crate) use nodal_forces::NodalForces;
 pub use oscillator::{OscillatorState, SampledOscillator};
 pub(crate) use residual_fields::ResidualFields;
 pub use sampled_residual::SampledResidual;
+pub(crate) use subtree_compliance::SubtreeCompliance;
 
 use crate::error::ModelError;
 use crate::recording::{ImpulseResponse, Recording};
@@ -338,11 +340,15 @@ impl ResponseState {
 
     /// Upper bound of the displacement of any node beyond the modes [m]: at points and contact samples, or at patches of tips.
     pub(crate) fn max_residual(&self, of_tips: bool) -> f64 {
-        let beyond_the_surface = match self {
+        self.modal().residual_bounds[usize::from(of_tips)].total + self.surface_error()
+    }
+
+    /// Upper bound of the distance between a table's surface and that of its modes [m].
+    pub(crate) fn surface_error(&self) -> f64 {
+        match self {
             Self::Modal(_) => 0.0,
             Self::Fir(state) => state.surface_error,
-        };
-        self.modal().residual_bounds[usize::from(of_tips)].total + beyond_the_surface
+        }
     }
 
     /// Energies [J].

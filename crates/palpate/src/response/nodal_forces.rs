@@ -33,7 +33,7 @@ impl NodalForces {
     }
 
     /// Loaded model nodes with their forces [N, body].
-    pub(super) fn loaded(&self) -> &[(u32, DVec3)] {
+    pub(crate) fn loaded(&self) -> &[(u32, DVec3)] {
         &self.loaded
     }
 

@@ -16,6 +16,7 @@
 //!
 //! Equations: docs/theory.md (C59), (C60), (C92).
 
+use super::subtree_compliance::SubtreeCompliance;
 use crate::recording::{NearField, Recording, ResidualCompliance, block_at};
 use crate::spatial::frobenius_square;
 use crate::surface::{
@@ -46,6 +47,8 @@ pub(crate) struct SampleSurface {
     triangle: Vec<u32>,
     /// Tree over the decimated surface, or over the samples where there is none.
     pub(crate) tree: SphereTree,
+    /// Residual compliance of its subtrees.
+    pub(super) subtrees: SubtreeCompliance,
     /// Residual compliance D between vertices [m/N].
     pub(super) residual: ResidualCompliance,
     /// Residual compliance between vertices and the model's nodes [m/N].
@@ -120,7 +123,20 @@ impl SampleSurface {
         let residual = averaged(&recording.residual, &to_nodes, weights);
         let peaks = (0..weights.len()).map(|vertex| to_nodes.peak(vertex, &residual.block(vertex, vertex)));
         let peaks = peaks.collect();
-        Self { samples, one_sided, normals, surface, is_surface, triangle, tree, residual, to_nodes, peaks }
+        let subtrees = SubtreeCompliance::of_samples(&tree, (&surface, samples), &one_sided, &to_nodes);
+        Self {
+            samples,
+            one_sided,
+            normals,
+            surface,
+            is_surface,
+            triangle,
+            tree,
+            subtrees,
+            residual,
+            to_nodes,
+            peaks,
+        }
     }
 
     /// Number of vertices: samples and one-sided patches.
@@ -300,8 +316,13 @@ impl PatchNodeCompliance {
         out
     }
 
+    /// Number of the model's nodes.
+    pub(super) fn node_count(&self) -> usize {
+        self.node_count
+    }
+
     /// Blocks of a patch's row, with their nodes.
-    fn row(&self, patch: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
+    pub(super) fn row(&self, patch: usize) -> impl Iterator<Item = (usize, DMat3)> + '_ {
         (self.offsets[patch]..self.offsets[patch + 1])
             .map(|at| (self.nodes[at] as usize, block_at(&self.blocks, at)))
     }

@@ -23,7 +23,8 @@ pub(crate) use quadratic_face::smooth_heights;
 pub(crate) use sample_level::MAX_LEVELS;
 pub use sample_level::{MIN_CONTACT_SAMPLES, SampleLevel};
 pub(crate) use sphere_tree::{
-    Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, band,
+    Bands, Bounds, Centre, DeformationBound, DeformingNodes, RigidNodes, SphereTree, Traversal, UpperPart,
+    band,
 };
 pub(crate) use triangle::{area_normal, at_weights, nearest_on_triangle};
 

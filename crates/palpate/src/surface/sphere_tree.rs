@@ -79,6 +79,16 @@ struct TreeNode {
     second: u32,
 }
 
+/// Upper part of a sphere tree: its subtrees, down to those that are not divided, its leaves.
+#[derive(Debug, Clone)]
+pub(crate) struct UpperPart {
+    /// Subtree that each tree node is or lies in: the leaves come first.
+    pub(crate) of_node: Vec<u32>,
+    pub(crate) leaves: usize,
+    /// Halves of every other subtree, which come before it.
+    pub(crate) halves: Vec<[u32; 2]>,
+}
+
 /// Displacement bounds of the surface nodes below a tree node, per √(2·energy) of each band of modes and of the residual
 /// compliance [m/√J].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -150,6 +160,11 @@ pub(crate) enum Centre {
 pub(crate) trait DeformingNodes {
     fn rest(&self, node: usize) -> DVec3;
     fn position(&mut self, node: usize) -> DVec3;
+
+    /// Upper bound of the residual displacement of the surface nodes below a tree node [m], beside the bound of all.
+    fn residual_bound(&self, _tree_node: usize) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// Node positions of a rigid surface.
@@ -261,6 +276,39 @@ impl SphereTree {
         Bounds { subtrees }
     }
 
+    /// Upper part of the tree, down to subtrees of at most so many triangles.
+    pub(crate) fn upper_part(&self, most: usize) -> UpperPart {
+        let mut of_node = vec![u32::MAX; self.nodes.len()];
+        let mut leaves = 0;
+        // Children come after their parents.
+        for (at, node) in self.nodes.iter().enumerate() {
+            if of_node[at] == u32::MAX && (node.count as usize <= most || node.second == 0) {
+                of_node[at] = leaves;
+                leaves += 1;
+            }
+            if of_node[at] != u32::MAX && node.second != 0 {
+                (of_node[at + 1], of_node[node.second as usize]) = (of_node[at], of_node[at]);
+            }
+        }
+        let mut halves = Vec::new();
+        for at in (0..self.nodes.len()).rev() {
+            if of_node[at] == u32::MAX {
+                halves.push([at + 1, self.nodes[at].second as usize].map(|half| of_node[half]));
+                of_node[at] = leaves + halves.len() as u32 - 1;
+            }
+        }
+        UpperPart { of_node, leaves: leaves as usize, halves }
+    }
+
+    /// Triangles of every leaf of the upper part.
+    pub(crate) fn triangles_of_leaves(&self, upper: &UpperPart) -> Vec<Vec<u32>> {
+        let mut triangles = vec![Vec::new(); upper.leaves];
+        for (node, &leaf) in self.nodes.iter().zip(&upper.of_node).filter(|(node, _)| node.second == 0) {
+            triangles[leaf as usize].extend(self.triangles_of(node));
+        }
+        triangles
+    }
+
     fn triangles_of(&self, node: &TreeNode) -> impl Iterator<Item = u32> + '_ {
         self.triangles[node.first as usize..(node.first + node.count) as usize].iter().copied()
     }
@@ -339,6 +387,8 @@ impl SphereTree {
             *depth -= 1;
             let at = stack[*depth] as usize;
             let (node, subtree) = (&self.nodes[at], &bounds.subtrees[at]);
+            let max_residual = bound.max_residual.min(surface.residual_bound(at));
+            let bound = &DeformationBound { max_residual, ..*bound };
             if !Self::enter(node, subtree, bound, surface, &near) {
                 continue;
             }

@@ -38,6 +38,10 @@ pub struct Arguments {
     /// Number of repeats: the minimum over them is taken for each step, its compute time without interruptions
     #[arg(long, default_value_t = 1, value_name = "N")]
     runs: usize,
+    /// Number of random motions in rows of random pointers and throws: their steps are timed together. Such motion is chaotic, and one
+    /// alone may change by a third with the last digit of a number
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seeds: u64,
     /// Time only the rows whose name contains this
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
@@ -75,6 +79,9 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.runs == 0 {
         return Err(Failure("--runs is 0, expected 1 or more".into()));
     }
+    if arguments.seeds == 0 {
+        return Err(Failure("--seeds is 0, expected 1 or more".into()));
+    }
     let before = arguments.against.as_deref().map(baseline::read).transpose()?.unwrap_or_default();
     let cube = |cells, modes| -> Result<Arc<Recording>, Failure> {
         Ok(Arc::new(cached_cube(cells, modes, arguments.cache.as_deref())?))
@@ -105,7 +112,7 @@ pub fn bench(arguments: &Arguments) -> Result<(), Failure> {
     });
     let touch = touch::cases(usual.clone(), cube(16, 200)?);
     let table = table::cases(cube(4, 100)?);
-    let rough = rough::cases(usual, arguments.cache.as_deref());
+    let rough = rough::cases(usual, arguments.cache.as_deref(), arguments.seeds);
     let wanted = |label: &str| arguments.only.as_deref().is_none_or(|text| label.contains(text));
     let cases =
         held.chain(touch).chain(table).chain(rough).chain(many::cases()).filter(|(label, _)| wanted(label));

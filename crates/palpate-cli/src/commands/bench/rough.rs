@@ -23,14 +23,14 @@ const THROW_STEPS: usize = 500;
 /// Speed of a throw [m/s].
 const THROW_M_S: f64 = 3.0;
 
-/// Seed of throws and random pointers.
+/// Seed of throws and random pointers, the first of several.
 const SEED: u64 = 11;
 
 /// Contact samples in real time.
 const SAMPLES: usize = 48;
 
-/// Cases with the paper's cube and the scenes of the page.
-pub fn cases(cube: Arc<Recording>, cache: Option<&Path>) -> Vec<Case> {
+/// Cases with the paper's cube and the scenes of the page, with so many random motions each.
+pub fn cases(cube: Arc<Recording>, cache: Option<&Path>, seeds: u64) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     let mut add = |label: String, run: Box<dyn Fn(usize) -> Result<Vec<u32>, Failure>>| {
         cases.push((format!("rough: {label}"), run));
@@ -49,7 +49,9 @@ pub fn cases(cube: Arc<Recording>, cache: Option<&Path>) -> Vec<Case> {
         let cache = cache.clone();
         add(
             format!("scene {}, random pointers", scene.id),
-            Box::new(move |steps| random_pointers(cache.as_deref(), scene.id, steps)),
+            Box::new(move |steps| {
+                over_seeds(seeds, |seed| random_pointers(cache.as_deref(), scene.id, steps, seed))
+            }),
         );
     }
     let (held, swept, thrown) = (cube.clone(), cube.clone(), cube);
@@ -61,7 +63,10 @@ pub fn cases(cube: Arc<Recording>, cache: Option<&Path>) -> Vec<Case> {
         "cube on a floor, a finger sweeps over 40 cm at 4 Hz".into(),
         Box::new(move |steps| swept_cube(&swept, steps)),
     );
-    add("cube thrown into a corner at 3 m/s".into(), Box::new(move |steps| thrown_cube(&thrown, steps)));
+    add(
+        "cube thrown into a corner at 3 m/s".into(),
+        Box::new(move |steps| over_seeds(seeds, |seed| thrown_cube(&thrown, steps, seed))),
+    );
     for (max_contact_samples, what) in [(usize::MAX, "all nodes"), (SAMPLES, "48 contact samples")] {
         add(
             format!("blob of 1,000 nodes and order 2, falls on a table by 1 cm, {what}"),
@@ -105,14 +110,23 @@ fn on_scene(
     }))
 }
 
+/// Compute times of several random motions, one after the other [ns].
+fn over_seeds(
+    seeds: u64,
+    mut times: impl FnMut(u64) -> Result<Vec<u32>, Failure>,
+) -> Result<Vec<u32>, Failure> {
+    let all: Result<Vec<_>, _> = (SEED..SEED + seeds).map(&mut times).collect();
+    Ok(all?.concat())
+}
+
 /// Compute times of a built-in scene with random pointers [ns].
-fn random_pointers(cache: Option<&Path>, id: &str, steps: usize) -> Result<Vec<u32>, Failure> {
+fn random_pointers(cache: Option<&Path>, id: &str, steps: usize, seed: u64) -> Result<Vec<u32>, Failure> {
     let OpenedScene { scene, .. } = SceneLibrary::new(cache)?.open_built_in(id, &mut SilentProgress)?;
     let h = scene.model.parameters().step_s;
     let slots = scene.devices.iter().enumerate().filter(|(_, device)| device.pointer);
     let mut pointers: Vec<(usize, RandomPointer)> =
         slots.map(|(slot, device)| (slot, RandomPointer::new(device.parameters.tip_radius))).collect();
-    let mut random = Random::new(SEED);
+    let mut random = Random::new(seed);
     Ok(timed(&scene.model, steps, |time, state| {
         let mut input = scene.input_at(time);
         for (slot, pointer) in &mut pointers {
@@ -173,8 +187,8 @@ fn wall(normal: DVec3, position: DVec3) -> Obstacle {
 }
 
 /// Throws from always other sides, each with a turn and a spin of its own.
-fn thrown_cube(cube: &Arc<Recording>, steps: usize) -> Result<Vec<u32>, Failure> {
-    let mut random = Random::new(SEED);
+fn thrown_cube(cube: &Arc<Recording>, steps: usize, seed: u64) -> Result<Vec<u32>, Failure> {
+    let mut random = Random::new(seed);
     let mut times = Vec::new();
     while times.len() < steps.min(MAX_STEPS) {
         let mut parameters = on_a_floor(SAMPLES);

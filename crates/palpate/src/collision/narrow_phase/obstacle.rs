@@ -87,6 +87,7 @@ impl CollisionContext<'_> {
             let surface =
                 &mut DeformedSurface::new(body, footprint, &own.response, &own.points, positions, moment);
             surface.cover_prediction();
+            surface.localise_residual(&own.response, self.step);
             let reach = object.radius + surface.max_displacement() + travel + query.margin + body.max_height;
             let candidates = &mut self.workspace.candidates;
             let is_near = apart - reach <= obstacle.shape.radius();
@@ -158,7 +159,6 @@ impl ObstacleQuery<'_> {
         let footprint = self.body.footprint_at_level(self.level);
         let triangles = &self.body.surface(footprint).triangles;
         let is_full = core::cell::Cell::new(false);
-        let residual = surface.max_residual();
         surface.clear_marks();
         surface.traverse(
             |surface, of, centre, radius| {
@@ -185,6 +185,7 @@ impl ObstacleQuery<'_> {
                         Some(point) => point.rest + point.state.displacement,
                         None => {
                             let height = self.body.node_height(footprint, node);
+                            let residual = surface.max_residual_of(node);
                             let reach = self.margin + residual + self.sweep_margin + height;
                             let modal = surface.modal_position(node);
                             if !self.approaches(modal, || surface.predicted_position(node), reach) {
@@ -205,7 +206,7 @@ impl ObstacleQuery<'_> {
                     self.meet(candidates, [position, free], facing, location, feature);
                 }
                 if self.level == 0 {
-                    self.triangle_interior(surface, triangle, residual, candidates);
+                    self.triangle_interior(surface, triangle, candidates);
                 }
                 is_full.set(candidates.since(mark) > allowed && self.level < self.body.coarsest_level());
             },
@@ -217,7 +218,6 @@ impl ObstacleQuery<'_> {
         &self,
         surface: &mut DeformedSurface,
         triangle: u32,
-        residual: f64,
         candidates: &mut CandidateList,
     ) {
         if !self.obstacle.shape.is_round() {
@@ -233,6 +233,7 @@ impl ObstacleQuery<'_> {
         if (0..3).filter(is_thin).count() > 1 || edge.is_some_and(|(a, b)| a > b) {
             return;
         }
+        let residual = corners.map(|node| surface.max_residual_of(node)).into_iter().fold(0.0, f64::max);
         let far = f64::INFINITY;
         let deepest = self.distance(at_weights(positions, weights), far);
         let is_nearer = |p: &DVec3| self.distance(*p, far) < deepest + 0.5 * self.margin;

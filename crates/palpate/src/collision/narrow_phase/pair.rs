@@ -76,8 +76,9 @@ impl CollisionContext<'_> {
         let side = |number: usize, footprint, cache| {
             let (own, object) = (&states[number], &scene.objects[number]);
             let moment = SurfaceTime::StepStart(*step);
-            let surface =
+            let mut surface =
                 DeformedSurface::new(&object.body, footprint, &own.response, &own.points, cache, moment);
+            surface.localise_residual(&own.response, *step);
             Side { number, own, object, footprint, surface }
         };
         let (mut nodes, mut base) =
@@ -157,7 +158,6 @@ impl Side<'_> {
             + object.body.max_height
             + base.object.body.max_height;
         let direction = pose.orientation.inverse() * half_space.direction;
-        let residual = surface.max_residual();
         let is_near = |point: DVec3, radius: f64| {
             let in_base = || base_pose.body_from_world(pose.world_from_body(point));
             point.dot(direction) + radius > half_space.offset
@@ -169,8 +169,10 @@ impl Side<'_> {
             |_, _, centre, radius| is_near(centre, radius),
             |surface, triangle| {
                 for node in surface.surface().triangles[triangle as usize] {
-                    if surface.mark_node(node as usize)
-                        && is_near(surface.modal_position(node as usize), residual)
+                    let at = node as usize;
+                    let residual = surface.max_residual_of(at);
+                    if surface.mark_node(at)
+                        && is_near(surface.modal_position(at), residual)
                         && !near_nodes.is_full()
                     {
                         near_nodes.push(node);
@@ -209,7 +211,7 @@ fn approach(
         edge: nodes.object.body.edge.min(base.object.body.edge),
     };
     // Residual displacement costs more: it is bounded here.
-    let reach = moving.reach() + nodes.surface.max_residual();
+    let reach = moving.reach() + nodes.surface.max_residual_of(node);
     base.surface.may_be_within(moving.point, reach).then_some(moving)
 }
 

@@ -56,7 +56,7 @@ impl ObstacleQuery<'_> {
         let moment = SurfaceTime::StepStart(context.step);
         let (response, points) = (&self.own.response, &self.own.points);
         let mut surface = DeformedSurface::new(self.body, Footprint::Point, response, points, cache, moment);
-        let residual = surface.max_residual();
+        surface.localise_residual(&self.own.response, context.step);
         surface.clear_marks();
         surface.resume_traversal(
             (search, COLLISION.search_visits),
@@ -66,6 +66,7 @@ impl ObstacleQuery<'_> {
             |surface, triangle| {
                 for node in surface.surface().triangles[triangle as usize] {
                     let at = node as usize;
+                    let residual = surface.max_residual_of(at);
                     let is_deep = surface.mark_node(at)
                         && self.gap(surface.modal_position(at), (Footprint::Point, at), residual)
                             < residual - depth
