@@ -36,6 +36,11 @@ const PROFILE = "palpate:page";
 const PERIOD_MS = 0.5;
 const RETRY_MS = 1000;
 const SILENCE_MS = 1000;
+/** Time for the scene to answer a reading. Its own safety takes force away after 20 ms; this is for a scene that has hung. */
+const ANSWER_MS = 50;
+/** Interval of commands without force while the scene hangs. */
+const HELD_BACK_MS = 20;
+const NO_FORCE: Vector = [0, 0, 0];
 
 /** Device of an inventory, by its identifier; an error says what is missing. */
 export function deviceOf({ inverse3 }: ServiceState): string {
@@ -67,13 +72,16 @@ export function commandOf(device: string, [x, y, z]: Vector, isFirst: boolean): 
 export interface HaplyListener {
   /** A device is there. */
   connected(device: string): void;
-  /** Update with a reading, or none: returns the force to command [N, device frame]. */
-  exchange(reading: Reading | null): Vector;
+  /** Reading of the device, or none that could be read: [`HaplyConnection.answer`] takes the force. */
+  read(reading: Reading | null): void;
   /** The connection is lost, and is tried again. */
   lost(reason: string): void;
 }
 
-/** Connection to the service, which is tried again until it is closed. */
+/**
+ * Connection to the service, which is tried again until it is closed. Each reading waits for its answer; without one in time the device is commanded
+ * no force until the scene answers again.
+ */
 export class HaplyConnection {
   private socket: WebSocket | null = null;
   private device: string | null = null;
@@ -81,6 +89,11 @@ export class HaplyConnection {
   /** Time of the last command [ms, performance.now]. */
   private sentAt = Number.NEGATIVE_INFINITY;
   private timer: ReturnType<typeof setTimeout> | undefined;
+  /** Whether the scene has a reading that it has not answered, and whether it is too late for that. */
+  private isAwaited = false;
+  private isLate = false;
+  private answerTimer: ReturnType<typeof setTimeout> | undefined;
+  private heldBackTimer: ReturnType<typeof setTimeout> | undefined;
   private isClosed = false;
 
   constructor(
@@ -90,13 +103,23 @@ export class HaplyConnection {
     this.connect();
   }
 
+  /** Answers the last reading with a force [N, device frame]. The force for a reading that is too old is not commanded. */
+  answer(force: Vector): void {
+    if (!this.isAwaited) return;
+    clearTimeout(this.answerTimer);
+    const isLate = this.isLate;
+    this.isAwaited = this.isLate = false;
+    // The state after the next command asks the scene again.
+    if (!isLate) this.command(force);
+  }
+
   /** Commands zero force and closes the connection, which ends the session. */
   close(): void {
     this.isClosed = true;
     clearTimeout(this.timer);
-    const { socket, device } = this;
-    if (socket?.readyState === WebSocket.OPEN && device !== null) socket.send(commandOf(device, [0, 0, 0], this.isFirst));
-    socket?.close();
+    this.forgetReading();
+    this.command(NO_FORCE);
+    this.socket?.close();
   }
 
   private connect(): void {
@@ -130,11 +153,29 @@ export class HaplyConnection {
     } catch (error) {
       if (this.device === null) this.lose(reasonOf(error));
     }
-    if (this.device !== null) this.command(socket, this.device, this.listener.exchange(reading));
+    if (this.device === null) return;
+    if (this.isLate) {
+      clearTimeout(this.heldBackTimer);
+      this.heldBackTimer = setTimeout(() => this.command(NO_FORCE), HELD_BACK_MS);
+    }
+    if (this.isAwaited) return;
+    this.isAwaited = true;
+    this.answerTimer = setTimeout(() => {
+      this.isLate = true;
+      this.command(NO_FORCE);
+    }, ANSWER_MS);
+    this.listener.read(reading);
   }
 
-  private command(socket: WebSocket, device: string, force: Vector): void {
-    if (socket.readyState !== WebSocket.OPEN) return;
+  private forgetReading(): void {
+    clearTimeout(this.answerTimer);
+    clearTimeout(this.heldBackTimer);
+    this.isAwaited = this.isLate = false;
+  }
+
+  private command(force: Vector): void {
+    const { socket, device } = this;
+    if (device === null || socket?.readyState !== WebSocket.OPEN) return;
     socket.send(commandOf(device, force, this.isFirst));
     this.isFirst = false;
     this.sentAt = performance.now();
@@ -148,11 +189,11 @@ export class HaplyConnection {
 
   private lose(reason: string): void {
     clearTimeout(this.timer);
+    this.forgetReading();
     const { socket } = this;
     this.socket = null;
     socket?.close();
     if (this.isClosed) return;
-    this.listener.exchange(null);
     this.listener.lost(reason);
     this.timer = setTimeout(() => this.connect(), RETRY_MS);
   }

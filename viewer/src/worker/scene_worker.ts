@@ -3,7 +3,8 @@
 import { type Instance, Sent, textOf, unsigned } from "../../../bindings/web/palpate/memory";
 import { withParts } from "../../../bindings/web/palpate/parts";
 import type { ClientMessage, SceneSummary } from "../protocol/messages";
-import { HaplyConnection, type Reading, type Vector } from "./haply_device";
+import type { Reading, Vector } from "./haply_device";
+import type { FromHaply, ToHaply } from "./haply_messages";
 import { liveExports, loadLiveModule } from "./live_module";
 import { makeLog, type RecordedRun } from "./log_writer";
 import type { HaplyPlace, ToWorker } from "./messages";
@@ -47,7 +48,8 @@ class SceneRunner {
   /** Files of the scene, and those of the scene that is recorded for a log, with the time of its start [s since 1970]. */
   private files: SceneFiles | null = null;
   private recorded: { files: SceneFiles; startS: number } | null = null;
-  private haply: HaplyConnection | null = null;
+  /** Worker of the Haply device. */
+  private haply: Worker | null = null;
   private readonly frames = new FrameStream();
   private readonly ticker = new Ticker(() => this.advance());
 
@@ -175,20 +177,29 @@ class SceneRunner {
 
   /** Connects a Haply device, or none. */
   setHaply(address: string | null): void {
-    this.haply?.close();
+    const ask = (worker: Worker | null, message: ToHaply) => worker?.postMessage(message);
+    ask(this.haply, { kind: "close" });
     this.haply = null;
     if (this.live !== 0) liveExports(this.instance).live_detach_device(this.live);
     if (address === null) return;
     const tellState = (state: "connected" | "lost", text: string) => post({ kind: "haply", state, text });
-    try {
-      this.haply = new HaplyConnection(address, {
-        connected: (device) => tellState("connected", `Inverse3 ${device}`),
-        exchange: (reading) => this.exchange(reading),
-        lost: (reason) => tellState("lost", reason),
-      });
-    } catch (error) {
-      tellState("lost", reasonOf(error));
-    }
+    const worker = new Worker(new URL("./haply_worker.ts", import.meta.url), { type: "module" });
+    this.haply = worker;
+    worker.onmessage = ({ data }: MessageEvent<FromHaply>) => {
+      if (worker !== this.haply) return;
+      switch (data.kind) {
+        case "connected":
+          tellState("connected", `Inverse3 ${data.device}`);
+          break;
+        case "reading":
+          ask(worker, { kind: "force", force: this.exchange(data.reading) });
+          break;
+        case "lost":
+          this.exchange(null);
+          tellState("lost", data.reason);
+      }
+    };
+    ask(worker, { kind: "connect", address });
   }
 
   /** Attaches the Haply device to the scene, at a place. */

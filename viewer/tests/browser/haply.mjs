@@ -114,6 +114,17 @@ export const haplyCases = [
       await screenshot(page, "haply");
       const before = service.commands;
       await until(() => service.commands > before + 50, () => "the updates have ended");
+      // A scene that hangs leaves no force behind.
+      const worker = page.workers().find((known) => known.url().includes("scene_worker"));
+      const hang = worker.evaluate(() => {
+        const end = performance.now() + 1500;
+        while (performance.now() < end);
+      });
+      await wait(700);
+      assert(service.force.every((part) => part === 0), `a force of ${service.force} N while the scene hangs`);
+      await hang;
+      const hung = service.commands;
+      await until(() => service.commands > hung + 50, () => "the updates have ended with the hang");
       // A service that goes away is told, and comes back without force.
       await service.stop();
       await page.waitForSelector("text=Waiting: ");

@@ -72,6 +72,37 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
+test("a scene that hangs leaves no force behind, and is asked anew when it answers again", () => {
+  vi.useFakeTimers();
+  vi.stubGlobal("WebSocket", FakeSocket);
+  let readings = 0;
+  const connection = new HaplyConnection("ws://localhost:10001", {
+    connected: () => undefined,
+    read: () => (readings += 1),
+    lost: (reason) => expect.fail(reason),
+  });
+  const socket = FakeSocket.last;
+  const upward = () => (JSON.parse(socket.commands.at(-1) ?? "") as { inverse3: { commands: { set_cursor_force: { vector: { z: number } } } }[] }).inverse3[0]?.commands.set_cursor_force.vector.z;
+  socket.say(state());
+  connection.answer([0, 1, 0]);
+  expect(upward()).toBe(1);
+  vi.advanceTimersByTime(45);
+  expect([readings, upward()]).toEqual([2, 1]);
+  // Longer than a silent service may take.
+  vi.advanceTimersByTime(3000);
+  expect([readings, upward()]).toEqual([2, 0]);
+  expect(socket.commands.length).toBeGreaterThan(50);
+  // The answer comes too late for its reading.
+  connection.answer([0, 2, 0]);
+  expect(upward()).toBe(0);
+  vi.advanceTimersByTime(45);
+  expect([readings, upward()]).toEqual([3, 0]);
+  connection.answer([0, 3, 0]);
+  expect(upward()).toBe(3);
+  connection.close();
+  expect(upward()).toBe(0);
+});
+
 test("commands are paced, a silent service is lost and tried again, and the last command has no force", () => {
   vi.useFakeTimers();
   vi.stubGlobal("WebSocket", FakeSocket);
@@ -79,7 +110,10 @@ test("commands are paced, a silent service is lost and tried again, and the last
   const readings: unknown[] = [];
   const connection = new HaplyConnection("ws://localhost:10001", {
     connected: (device) => told.push(device),
-    exchange: (reading) => (readings.push(reading), [0, 1, 0]),
+    read: (reading) => {
+      readings.push(reading);
+      connection.answer([0, 1, 0]);
+    },
     lost: (reason) => told.push(reason),
   });
   const first = FakeSocket.last;
