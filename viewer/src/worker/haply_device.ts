@@ -72,8 +72,8 @@ export function commandOf(device: string, [x, y, z]: Vector, isFirst: boolean): 
 export interface HaplyListener {
   /** A device is there. */
   connected(device: string): void;
-  /** Reading of the device, or none that could be read: [`HaplyConnection.answer`] takes the force. */
-  read(reading: Reading | null): void;
+  /** Reading of the device, or none that could be read, with its number: [`HaplyConnection.answer`] takes the force for it. */
+  read(reading: Reading | null, number: number): void;
   /** The connection is lost, and is tried again. */
   lost(reason: string): void;
 }
@@ -89,8 +89,9 @@ export class HaplyConnection {
   /** Time of the last command [ms, performance.now]. */
   private sentAt = Number.NEGATIVE_INFINITY;
   private timer: ReturnType<typeof setTimeout> | undefined;
-  /** Whether the scene has a reading that it has not answered, and whether it is too late for that. */
-  private isAwaited = false;
+  /** Number of readings so far, of the one that the scene has not answered, and whether it is too late for that. */
+  private readings = 0;
+  private awaited: number | null = null;
   private isLate = false;
   private answerTimer: ReturnType<typeof setTimeout> | undefined;
   private heldBackTimer: ReturnType<typeof setTimeout> | undefined;
@@ -103,12 +104,13 @@ export class HaplyConnection {
     this.connect();
   }
 
-  /** Answers the last reading with a force [N, device frame]. The force for a reading that is too old is not commanded. */
-  answer(force: Vector): void {
-    if (!this.isAwaited) return;
+  /** Answers the last reading with a force [N, device frame]. The force for one that is too old, or of a lost connection, is not commanded. */
+  answer(number: number, force: Vector): void {
+    if (number !== this.awaited) return;
     clearTimeout(this.answerTimer);
     const isLate = this.isLate;
-    this.isAwaited = this.isLate = false;
+    this.awaited = null;
+    this.isLate = false;
     // The state after the next command asks the scene again.
     if (!isLate) this.command(force);
   }
@@ -158,19 +160,21 @@ export class HaplyConnection {
       clearTimeout(this.heldBackTimer);
       this.heldBackTimer = setTimeout(() => this.command(NO_FORCE), HELD_BACK_MS);
     }
-    if (this.isAwaited) return;
-    this.isAwaited = true;
+    if (this.awaited !== null) return;
+    this.readings += 1;
+    this.awaited = this.readings;
     this.answerTimer = setTimeout(() => {
       this.isLate = true;
       this.command(NO_FORCE);
     }, ANSWER_MS);
-    this.listener.read(reading);
+    this.listener.read(reading, this.awaited);
   }
 
   private forgetReading(): void {
     clearTimeout(this.answerTimer);
     clearTimeout(this.heldBackTimer);
-    this.isAwaited = this.isLate = false;
+    this.awaited = null;
+    this.isLate = false;
   }
 
   private command(force: Vector): void {

@@ -11,7 +11,7 @@ function connect(address: string): void {
   try {
     connection = new HaplyConnection(address, {
       connected: (device) => scope.postMessage({ kind: "connected", device }),
-      read: (reading) => scope.postMessage({ kind: "reading", reading }),
+      read: (reading, number) => scope.postMessage({ kind: "reading", number, reading }),
       lost: (reason) => scope.postMessage({ kind: "lost", reason }),
     });
   } catch (error) {
@@ -21,7 +21,7 @@ function connect(address: string): void {
 
 self.onmessage = ({ data }: MessageEvent<ToHaply>) => {
   if (data.kind === "connect") connect(data.address);
-  else if (data.kind === "force") connection?.answer(data.force);
+  else if (data.kind === "force") connection?.answer(data.number, data.force);
   else {
     connection?.close();
     scope.close();

@@ -192,7 +192,7 @@ class SceneRunner {
           tellState("connected", `Inverse3 ${data.device}`);
           break;
         case "reading":
-          ask(worker, { kind: "force", force: this.exchange(data.reading) });
+          ask(worker, { kind: "force", number: data.number, force: this.exchange(data.reading) });
           break;
         case "lost":
           this.exchange(null);

@@ -78,13 +78,13 @@ test("a scene that hangs leaves no force behind, and is asked anew when it answe
   let readings = 0;
   const connection = new HaplyConnection("ws://localhost:10001", {
     connected: () => undefined,
-    read: () => (readings += 1),
+    read: (_, number) => (readings = number),
     lost: (reason) => expect.fail(reason),
   });
   const socket = FakeSocket.last;
   const upward = () => (JSON.parse(socket.commands.at(-1) ?? "") as { inverse3: { commands: { set_cursor_force: { vector: { z: number } } } }[] }).inverse3[0]?.commands.set_cursor_force.vector.z;
   socket.say(state());
-  connection.answer([0, 1, 0]);
+  connection.answer(1, [0, 1, 0]);
   expect(upward()).toBe(1);
   vi.advanceTimersByTime(45);
   expect([readings, upward()]).toEqual([2, 1]);
@@ -93,11 +93,14 @@ test("a scene that hangs leaves no force behind, and is asked anew when it answe
   expect([readings, upward()]).toEqual([2, 0]);
   expect(socket.commands.length).toBeGreaterThan(50);
   // The answer comes too late for its reading.
-  connection.answer([0, 2, 0]);
+  connection.answer(2, [0, 2, 0]);
   expect(upward()).toBe(0);
   vi.advanceTimersByTime(45);
   expect([readings, upward()]).toEqual([3, 0]);
-  connection.answer([0, 3, 0]);
+  // Nor does one for a reading that nobody waits for count.
+  connection.answer(2, [0, 2, 0]);
+  expect(upward()).toBe(0);
+  connection.answer(3, [0, 3, 0]);
   expect(upward()).toBe(3);
   connection.close();
   expect(upward()).toBe(0);
@@ -110,9 +113,9 @@ test("commands are paced, a silent service is lost and tried again, and the last
   const readings: unknown[] = [];
   const connection = new HaplyConnection("ws://localhost:10001", {
     connected: (device) => told.push(device),
-    read: (reading) => {
+    read: (reading, number) => {
       readings.push(reading);
-      connection.answer([0, 1, 0]);
+      connection.answer(number, [0, 1, 0]);
     },
     lost: (reason) => told.push(reason),
   });

@@ -70,10 +70,11 @@ impl ResidualBounds {
         let Self { sizes, loaded, .. } = self;
         loaded.drain(..).for_each(|node| sizes[node as usize] = 0.0);
         let mut add = |node: usize, size: f64| {
+            let size = size as f32;
             if sizes[node] == 0.0 && size > 0.0 {
                 loaded.push(node as u32);
             }
-            sizes[node] += size as f32;
+            sizes[node] += size;
         };
         for (node, force) in state.nodal().loaded() {
             add(*node as usize, force.length());

@@ -24,6 +24,7 @@ use crate::surface::{
 };
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use glam::{DMat3, DVec3};
 
 /// No triangle.
@@ -123,7 +124,7 @@ impl SampleSurface {
         let residual = averaged(&recording.residual, &to_nodes, weights);
         let peaks = (0..weights.len()).map(|vertex| to_nodes.peak(vertex, &residual.block(vertex, vertex)));
         let peaks = peaks.collect();
-        let subtrees = SubtreeCompliance::of_samples(&tree, (&surface, samples), &one_sided, &to_nodes);
+        let subtrees = SubtreeCompliance::of_samples(&tree, &surface, (samples, &one_sided), &to_nodes);
         Self {
             samples,
             one_sided,
@@ -148,14 +149,12 @@ impl SampleSurface {
     ///
     /// # Real time
     pub(super) fn facing_vertex(&self, sample: usize, direction: impl FnOnce() -> DVec3) -> usize {
-        let first = self.one_sided.partition_point(|of| (*of as usize) < sample);
-        let count = self.one_sided[first..].iter().take_while(|of| **of as usize == sample).count();
-        if count == 0 {
+        let further = one_sided_vertices((self.samples, &self.one_sided), sample);
+        if further.is_empty() {
             return sample;
         }
         let direction = direction();
         let facing = |vertex: usize| self.normals[vertex].dot(direction);
-        let further = (0..count).map(|side| self.samples + first + side);
         further.fold(sample, |best, vertex| if facing(vertex) > facing(best) { vertex } else { best })
     }
 
@@ -201,6 +200,13 @@ impl SampleSurface {
     fn used_corners(&self, point: &SurfacePoint) -> impl Iterator<Item = (usize, f64)> {
         self.surface.corners(point).into_iter().filter(|corner| corner.1 != 0.0)
     }
+}
+
+/// Vertices that are one-sided patches of a sample, by the number of samples and the sample of each such vertex.
+pub(super) fn one_sided_vertices((samples, of_sample): (usize, &[u32]), sample: usize) -> Range<usize> {
+    let first = of_sample.partition_point(|of| (*of as usize) < sample);
+    let count = of_sample[first..].iter().take_while(|of| **of as usize == sample).count();
+    samples + first..samples + first + count
 }
 
 /// Positions [m] of vertices at these nodes with these normals: on the smooth surface, averaged along the normal.

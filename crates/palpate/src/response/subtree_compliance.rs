@@ -5,12 +5,12 @@
 //! max_{i∈T} |uᵢ| ≤ Σⱼ c_Tj·|fⱼ|        c_Tj = max_{i∈T} √(‖Sᵢⱼ‖₁·‖Sᵢⱼ‖_∞)
 //! ```
 //!
-//! with the surface nodes or contact samples i below the subtree T and the model's nodes j. Kept for subtrees of some dozens of
+//! with the surface nodes or contact samples i below the subtree T and the model's nodes j. Kept for subtrees of about ten
 //! nodes; the subtrees above take the largest of theirs.
 //!
 //! Equations: docs/theory.md (C93).
 
-use super::sample_surface::PatchNodeCompliance;
+use super::sample_surface::{PatchNodeCompliance, one_sided_vertices};
 use crate::recording::{Recording, ResidualCompliance};
 use crate::spatial::spectral_bound;
 use crate::surface::{SphereTree, Surface, UpperPart};
@@ -65,15 +65,13 @@ impl SubtreeCompliance {
     /// Subtrees over contact samples; a sample on a crease moves at most as the largest of its patches.
     pub(super) fn of_samples(
         tree: &SphereTree,
-        (surface, samples): (&Surface, usize),
-        one_sided: &[u32],
+        surface: &Surface,
+        (samples, one_sided): (usize, &[u32]),
         to_nodes: &PatchNodeCompliance,
     ) -> Self {
         let vertices = |corner: u32, give: &mut dyn FnMut(usize)| {
             give(corner as usize);
-            let first = one_sided.partition_point(|&of| of < corner);
-            let count = one_sided[first..].iter().take_while(|&&of| of == corner).count();
-            (samples + first..samples + first + count).for_each(give);
+            one_sided_vertices((samples, one_sided), corner as usize).for_each(give);
         };
         let row = |vertex: usize, largest: &mut dyn FnMut(usize, f64)| {
             to_nodes.row(vertex).for_each(|(node, block)| largest(node, spectral_bound(&block)));
@@ -190,7 +188,7 @@ mod tests {
     use alloc::sync::Arc;
     use glam::DVec3;
 
-    /// The same recording with the near field of its residual compliance, within a radius [m].
+    /// Copy of a recording with the near field of its residual compliance alone, within a radius [m].
     fn with_near_field(recording: &Recording, radius: f64) -> Recording {
         let positions = &recording.surface.positions;
         let mut near = NearField { radius, offsets: vec![0], nodes: Vec::new(), blocks: Vec::new() };
